@@ -1,0 +1,143 @@
+// The text of a channel, as it stands in the plugin's MJCF attributes, to components.
+//
+//   label: a b | x0 x1 ... | y0 y1 ... ; label: a b | x... | y...
+//
+// One component after another, separated by ';'. The label and its ':' may be left out. [a, b] is
+// the interval in normalised joint position, x the control points in the component's own coordinate
+// (from 0 to 1), y their values in physical units. Every error is one sentence (std::invalid_argument).
+#ifndef JODA_ATTRIBUTES_H_
+#define JODA_ATTRIBUTES_H_
+
+#include <Eigen/Core>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "field.h"
+
+namespace joda {
+
+inline constexpr double kMinWidth = 1e-9;  // narrowest interval or gap between control points
+
+namespace internal {
+
+inline std::string_view Trim(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
+}
+
+// Splits at every separator; "a;b;" gives "a", "b" and "".
+inline std::vector<std::string_view> Split(std::string_view text, char separator) {
+  std::vector<std::string_view> out;
+  for (;;) {
+    const auto at = text.find(separator);
+    out.push_back(text.substr(0, at));
+    if (at == std::string_view::npos) return out;
+    text.remove_prefix(at + 1);
+  }
+}
+
+inline std::string Quote(std::string_view text) {
+  std::string out = "\"" + std::string(text.substr(0, 40));
+  return out + (text.size() > 40 ? "...\"" : "\"");
+}
+
+}  // namespace internal
+
+// Numbers separated by white space; throws for anything else, infinities and NaN included.
+inline Eigen::VectorXd ParseNumbers(std::string_view text) {
+  std::vector<double> out;
+  text = internal::Trim(text);
+  while (!text.empty()) {
+    const std::string_view word = text.substr(0, text.find_first_of(" \t\r\n"));
+    double value;
+    const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (result.ec != std::errc() || result.ptr != word.data() + word.size() ||
+        !std::isfinite(value)) {
+      throw std::invalid_argument(internal::Quote(word) + " is not a finite number");
+    }
+    out.push_back(value);
+    text = internal::Trim(text.substr(word.size()));
+  }
+  return Eigen::Map<Eigen::VectorXd>(out.data(), static_cast<Eigen::Index>(out.size()));
+}
+
+// Throws unless the component is one that can be evaluated; `nonnegative` for friction and damping.
+inline void Validate(const Component& c, bool nonnegative) {
+  const auto fail = [](const std::string& what) { throw std::invalid_argument(what); };
+  if (!(0 <= c.a && c.a < c.b && c.b <= 1)) {
+    fail("the interval must satisfy 0 <= a < b <= 1, in normalised joint position");
+  }
+  if (c.b - c.a < kMinWidth) fail("the interval is narrower than 1e-9 of the range");
+  if (c.x.size() < 2) fail("at least two control points are needed");
+  if (c.x.size() != c.y.size()) {
+    fail("x has " + std::to_string(c.x.size()) + " numbers and y has " +
+         std::to_string(c.y.size()) + "; they must be equally many");
+  }
+  const Eigen::Index n = c.x.size();
+  if (c.x[0] != 0 || c.x[n - 1] != 1) fail("x must begin at 0 and end at 1");
+  for (Eigen::Index k = 0; k + 1 < n; ++k) {
+    if (!(c.x[k + 1] - c.x[k] >= kMinWidth)) fail("x must increase, by 1e-9 at least");
+  }
+  if (!c.x.allFinite() || !c.y.allFinite()) fail("every number must be finite");
+  if (nonnegative && c.y.minCoeff() < 0) fail("values of friction and damping must not be negative");
+}
+
+// All components of one channel; the text may be empty.
+inline std::vector<Component> ParseChannel(std::string_view text, bool nonnegative) {
+  std::vector<Component> out;
+  if (internal::Trim(text).empty()) return out;
+  const auto pieces = internal::Split(text, ';');
+  for (size_t i = 0; i < pieces.size(); ++i) {
+    const std::string_view piece = internal::Trim(pieces[i]);
+    if (piece.empty() && i + 1 == pieces.size()) break;  // a closing ';'
+    const auto parts = internal::Split(piece, '|');
+    const auto colon = parts[0].rfind(':');
+    const bool labelled = colon != std::string_view::npos;
+    Component c;
+    c.label = std::string(internal::Trim(labelled ? parts[0].substr(0, colon) : ""));
+    try {
+      if (parts.size() != 3) {
+        throw std::invalid_argument("expected \"label: a b | x ... | y ...\", got " +
+                                    internal::Quote(piece));
+      }
+      const auto interval = ParseNumbers(labelled ? parts[0].substr(colon + 1) : parts[0]);
+      if (interval.size() != 2) {
+        throw std::invalid_argument("expected the two numbers of the interval before the first |");
+      }
+      c.a = interval[0];
+      c.b = interval[1];
+      c.x = ParseNumbers(parts[1]);
+      c.y = ParseNumbers(parts[2]);
+      Validate(c, nonnegative);
+    } catch (const std::invalid_argument& error) {
+      const std::string name = c.label.empty() ? "" : " " + internal::Quote(c.label);
+      throw std::invalid_argument("component " + std::to_string(i + 1) + name + ": " +
+                                  error.what());
+    }
+    out.push_back(std::move(c));
+  }
+  return out;
+}
+
+// "sum" (also for an empty text) or "max".
+inline Combine ParseCombine(std::string_view text) {
+  text = internal::Trim(text);
+  if (text.empty() || text == "sum") return Combine::kSum;
+  if (text == "max") return Combine::kMax;
+  throw std::invalid_argument("must be \"sum\" or \"max\", got " + internal::Quote(text));
+}
+
+// One channel from its two attributes.
+inline PiecewiseCubic ParsePiecewiseCubic(std::string_view text, std::string_view combine,
+                                          bool nonnegative) {
+  return PiecewiseCubic(ParseChannel(text, nonnegative), ParseCombine(combine));
+}
+
+}  // namespace joda
+
+#endif  // JODA_ATTRIBUTES_H_

@@ -1,0 +1,160 @@
+#include "config.h"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <utility>
+
+#include "attributes.h"
+
+namespace joda {
+namespace {
+
+constexpr int kMaxJoints = 6;  // hinges and slides that one MuJoCo body can have
+
+// "range", then the texts of the channels.
+constexpr std::array<const char*, 7> kKeys = {"range",    "conservative",     "conservative_combine",
+                                              "friction", "friction_combine", "damping",
+                                              "damping_combine"};
+
+const char* Value(const mjModel* m, int instance, const std::string& key) {
+  const char* value = mj_getPluginConfig(m, instance, key.c_str());
+  return value ? value : "";
+}
+
+bool IsConfigured(const mjModel* m, int instance, const std::string& prefix) {
+  return std::any_of(kKeys.begin(), kKeys.end(),
+                     [&](const char* key) { return *Value(m, instance, prefix + key); });
+}
+
+std::string Name(const mjModel* m, int type, int id, const std::string& kind) {
+  const char* name = mj_id2name(m, type, id);
+  return name ? kind + " '" + name + "'" : "unnamed " + kind + " " + std::to_string(id);
+}
+
+int FindBody(const mjModel* m, int instance) {
+  const int* first = m->body_plugin;
+  const int* last = m->body_plugin + m->nbody;
+  const auto count = std::count(first, last, instance);
+  if (count != 1) {
+    throw std::invalid_argument(
+        std::to_string(count) +
+        " bodies refer to it; put <plugin instance=\"...\"/> into exactly the one body that the "
+        "joint moves");
+  }
+  return static_cast<int>(std::find(first, last, instance) - first);
+}
+
+// The joint at `place` among those of the body; -1 stands for the only one.
+int FindJoint(const mjModel* m, int body, int place) {
+  const int count = m->body_jntnum[body];
+  const std::string has =
+      Name(m, mjOBJ_BODY, body, "body") + " has " + std::to_string(count) + " joints";
+  if (place < 0 && count > 1) {
+    throw std::invalid_argument(has +
+                                "; write each attribute with the joint's place in the body in "
+                                "front, as in \"0.friction\"");
+  }
+  if (std::max(place, 0) >= count) {
+    throw std::invalid_argument(has + ", none at place " + std::to_string(std::max(place, 0)));
+  }
+  const int joint = m->body_jntadr[body] + std::max(place, 0);
+  const int type = m->jnt_type[joint];
+  if (type != mjJNT_HINGE && type != mjJNT_SLIDE) {
+    throw std::invalid_argument(JointName(m, joint) + " is a " +
+                                (type == mjJNT_BALL ? "ball" : "free") +
+                                " joint; a profile needs a hinge or a slide");
+  }
+  return joint;
+}
+
+// Joint positions at s = 0 and s = 1: the attribute, or else the joint's own limits.
+std::pair<double, double> ParseRange(const mjModel* m, int joint, const char* text) {
+  const mjtNum* own = m->jnt_range + 2 * joint;
+  if (!*text && own[0] < own[1]) return {own[0], own[1]};
+  if (!*text) {
+    throw std::invalid_argument(JointName(m, joint) +
+                                " has no range; give it one, or write this attribute");
+  }
+  const auto range = ParseNumbers(text);
+  if (range.size() != 2 || !(range[0] < range[1])) {
+    throw std::invalid_argument("expected two increasing numbers, got " + internal::Quote(text));
+  }
+  return {range[0], range[1]};
+}
+
+// Adds the attribute's name to the errors of `parse`.
+template <typename Parse>
+auto Attribute(const std::string& key, const Parse& parse) {
+  try {
+    return parse();
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument("attribute \"" + key + "\": " + error.what());
+  }
+}
+
+// A channel from its two attributes, keys[0] the components and keys[1] sum or max.
+PiecewiseCubic ParseNamed(const std::string& prefix, const char* const* keys,
+                          const char* const* texts, bool nonnegative) {
+  const Combine combine = Attribute(prefix + keys[1], [&] { return ParseCombine(texts[1]); });
+  return Attribute(prefix + keys[0], [&] {
+    return PiecewiseCubic(ParseChannel(texts[0], nonnegative), combine);
+  });
+}
+
+}  // namespace
+
+const std::vector<std::string>& AttributeNames() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> out(kKeys.begin(), kKeys.end());
+    for (int k = 0; k < kMaxJoints; ++k) {
+      for (const char* key : kKeys) out.push_back(std::to_string(k) + "." + key);
+    }
+    return out;
+  }();
+  return names;
+}
+
+std::string JointName(const mjModel* m, int joint) { return Name(m, mjOBJ_JOINT, joint, "joint"); }
+
+Profile ParseProfile(const std::string& prefix, double lo, double hi, const char* const texts[6]) {
+  const char* const* keys = kKeys.data() + 1;
+  Profile profile;
+  profile.lo = lo;
+  profile.hi = hi;
+  profile.conservative = ParseNamed(prefix, keys, texts, false);
+  profile.friction = ParseNamed(prefix, keys + 2, texts + 2, true);
+  profile.damping = ParseNamed(prefix, keys + 4, texts + 4, true);
+  return profile;
+}
+
+void CheckFriction(const mjModel* m, int joint, const Profile& profile) {
+  const bool has_row = m->dof_frictionloss[m->jnt_dofadr[joint]] > 0;
+  if (has_row || profile.friction.coefficients().isZero(0)) return;
+  throw std::invalid_argument(JointName(m, joint) +
+                              " has a friction channel but no friction row in the solver; add "
+                              "frictionloss=\"1e-12\" to the joint");
+}
+
+std::vector<JointConfig> ReadConfig(const mjModel* m, int instance) {
+  const int body = FindBody(m, instance);
+  std::vector<JointConfig> out;
+  for (int place = -1; place < kMaxJoints; ++place) {
+    const std::string prefix = place < 0 ? "" : std::to_string(place) + ".";
+    if (!IsConfigured(m, instance, prefix)) continue;
+    const int joint = FindJoint(m, body, place);
+    if (!out.empty() && out.back().joint == joint) {
+      throw std::invalid_argument(JointName(m, joint) +
+                                  " is configured twice, with and without \"0.\" in front");
+    }
+    std::array<const char*, kKeys.size()> texts;
+    for (size_t i = 0; i < kKeys.size(); ++i) texts[i] = Value(m, instance, prefix + kKeys[i]);
+    const auto [lo, hi] =
+        Attribute(prefix + kKeys[0], [&] { return ParseRange(m, joint, texts[0]); });
+    out.push_back({joint, ParseProfile(prefix, lo, hi, texts.data() + 1)});
+    CheckFriction(m, joint, out.back().profile);
+  }
+  return out;
+}
+
+}  // namespace joda

@@ -1,0 +1,258 @@
+// A channel of a joint's profile: local PCHIP components, merged at load into one piecewise cubic.
+//
+// The channel is a function of the normalised joint position s = (q - lo) / (hi - lo). A component
+// covers its closed interval [a, b]; outside it contributes nothing. Components are summed, or the
+// largest of those that cover s is taken. Where none covers s the channel is zero. Beyond the range
+// (s < 0 or s > 1) the channel keeps the value it has at that end.
+#ifndef JODA_FIELD_H_
+#define JODA_FIELD_H_
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pchip.h"
+
+namespace joda {
+
+struct Component {
+  std::string label;
+  double a, b;        // interval in s, 0 <= a < b <= 1
+  Eigen::VectorXd x;  // control points in u = (s - a) / (b - a), from 0 to 1
+  Eigen::VectorXd y;  // values in physical units
+};
+
+enum class Combine { kSum, kMax };
+
+struct Sample {
+  double value = 0;
+  double slope = 0;  // derivative with respect to s
+};
+
+namespace internal {
+
+inline Sample Cubic(const Eigen::Vector4d& c, double t) {
+  return {((c[3] * t + c[2]) * t + c[1]) * t + c[0], (3 * c[3] * t + 2 * c[2]) * t + c[1]};
+}
+
+// The same cubic about the origin t0.
+inline Eigen::Vector4d Shift(const Eigen::Vector4d& c, double t0) {
+  const Sample at = Cubic(c, t0);
+  return {at.value, at.slope, 3 * c[3] * t0 + c[2], c[3]};
+}
+
+// Interior zeros of c1 + 2 c2 t + 3 c3 t^2 on (0, w): the turning points of the cubic.
+inline std::vector<double> TurningPoints(const Eigen::Vector4d& c, double w) {
+  std::vector<double> out;
+  const double qa = 3 * c[3], qb = 2 * c[2], qc = c[1];
+  const double disc = qb * qb - 4 * qa * qc;
+  if (disc < 0) return out;
+  const double q = -0.5 * (qb + (qb < 0 ? -1 : 1) * std::sqrt(disc));
+  for (const double t : {q / qa, qc / q}) {
+    if (t > 0 && t < w) out.push_back(t);  // false for the infinities and NaN of a lower degree
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Interior sign changes of the cubic on (0, w), to rounding: bisection between turning points.
+inline std::vector<double> Roots(const Eigen::Vector4d& c, double w) {
+  std::vector<double> ends = TurningPoints(c, w), out;
+  ends.insert(ends.begin(), 0);
+  ends.push_back(w);
+  for (size_t i = 0; i + 1 < ends.size(); ++i) {
+    double lo = ends[i], hi = ends[i + 1];
+    const double sign = Cubic(c, lo).value;
+    if (sign * Cubic(c, hi).value >= 0) continue;
+    for (int k = 0; k < 100 && lo < hi; ++k) {
+      const double mid = 0.5 * (lo + hi);
+      if (mid == lo || mid == hi) break;
+      (sign * Cubic(c, mid).value > 0 ? lo : hi) = mid;
+    }
+    out.push_back(hi);
+  }
+  return out;
+}
+
+// One component's cubics in s: knots t (size n + 1) and coefficients about each left knot.
+struct Local {
+  Eigen::VectorXd t;
+  Eigen::Matrix4Xd c;
+
+  explicit Local(const Component& component) {
+    const double w = component.b - component.a;
+    t = component.a + (w * component.x.array());
+    t[0] = component.a;
+    t[t.size() - 1] = component.b;
+    c = PchipCubics(component.x, component.y);
+    c = Eigen::Vector4d(1, 1 / w, 1 / (w * w), 1 / (w * w * w)).asDiagonal() * c;
+  }
+
+  bool Covers(double s) const { return t[0] <= s && s <= t[t.size() - 1]; }
+
+  // The cubic around s (inside the interval), about the origin s0.
+  Eigen::Vector4d About(double s, double s0) const {
+    const auto right = std::upper_bound(t.begin(), t.end(), s);
+    const Eigen::Index k = std::min<Eigen::Index>(right - t.begin(), c.cols()) - 1;
+    return Shift(c.col(k), s0 - t[k]);
+  }
+};
+
+// Combines the cubics' samples at one point: their sum, or the largest.
+inline Sample CombineSamples(const std::vector<Sample>& samples, Combine combine) {
+  Sample out;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    if (combine == Combine::kSum) {
+      out.value += samples[i].value;
+      out.slope += samples[i].slope;
+    } else if (i == 0 || samples[i].value > out.value) {
+      out = samples[i];
+    }
+  }
+  return out;
+}
+
+}  // namespace internal
+
+// One channel, ready to evaluate. Immutable after construction.
+class PiecewiseCubic {
+ public:
+  PiecewiseCubic() = default;  // zero everywhere
+
+  PiecewiseCubic(const std::vector<Component>& components, Combine combine) {
+    std::vector<internal::Local> locals(components.begin(), components.end());
+    std::vector<double> breaks;
+    for (const auto& local : locals) breaks.insert(breaks.end(), local.t.begin(), local.t.end());
+    std::sort(breaks.begin(), breaks.end());
+    breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
+    if (breaks.empty()) return;
+
+    std::vector<double> knots;
+    std::vector<Eigen::Vector4d> cubics;
+    const auto add = [&](double left, const Eigen::Vector4d& c) {
+      knots.push_back(left);
+      cubics.push_back(c);
+    };
+    for (size_t i = 0; i + 1 < breaks.size(); ++i) {
+      AddPiece(locals, combine, breaks[i], breaks[i + 1], add);
+    }
+    knots.push_back(breaks.back());
+
+    const Eigen::Index n = cubics.size();
+    knots_ = Eigen::Map<Eigen::VectorXd>(knots.data(), n + 1);
+    c_.resize(4, n);
+    for (Eigen::Index k = 0; k < n; ++k) c_.col(k) = cubics[k];
+    at_knots_.reserve(n + 1);
+    for (const double s : knots) at_knots_.push_back(AtKnot(locals, combine, s));
+    for (Eigen::Index k = 0; k < n; ++k) max_descent_ = std::max(max_descent_, Descent(k));
+  }
+
+  // Value and slope at s; s beyond [0, 1] is held at the end.
+  Sample operator()(double s) const {
+    const Eigen::Index n = c_.cols();
+    if (n == 0) return {};
+    const bool beyond = s < 0 || s > 1;
+    s = std::clamp(s, 0.0, 1.0);
+    if (s < knots_[0] || s > knots_[n]) return {};
+    const Eigen::Index k = Piece(s);
+    Sample out = s == knots_[k] ? at_knots_[k] : internal::Cubic(c_.col(k), s - knots_[k]);
+    if (beyond) out.slope = 0;
+    return out;
+  }
+
+  // Steepest descent max(-dF/ds, 0) met anywhere on the channel: its largest stiffness.
+  double MaxDescent() const { return max_descent_; }
+
+  // The same over the pieces that touch [lo, hi].
+  double MaxDescent(double lo, double hi) const {
+    const Eigen::Index n = c_.cols();
+    double out = 0;
+    if (n == 0 || hi < knots_[0] || lo > knots_[n]) return out;
+    for (Eigen::Index k = lo > knots_[0] ? std::min(Piece(lo), n - 1) : 0; k < n && knots_[k] <= hi;
+         ++k) {
+      out = std::max(out, Descent(k));
+    }
+    return out;
+  }
+
+  const Eigen::VectorXd& knots() const { return knots_; }
+  const Eigen::Matrix4Xd& coefficients() const { return c_; }
+
+ private:
+  // Index of the last knot at or before s, for s within the knots.
+  Eigen::Index Piece(double s) const {
+    Eigen::Index lo = 0, hi = c_.cols() + 1;
+    while (hi - lo > 1) {
+      const Eigen::Index mid = (lo + hi) / 2;
+      (knots_[mid] <= s ? lo : hi) = mid;
+    }
+    return lo;
+  }
+
+  // Largest -dF/ds on piece k (or 0): a parabola, so at an end or at its vertex.
+  double Descent(Eigen::Index k) const {
+    const double w = knots_[k + 1] - knots_[k];
+    const Eigen::Vector4d c = c_.col(k);
+    double out = std::max({0.0, -c[1], -internal::Cubic(c, w).slope});
+    const double vertex = -c[2] / (3 * c[3]);
+    if (vertex > 0 && vertex < w) out = std::max(out, -internal::Cubic(c, vertex).slope);
+    return out;
+  }
+
+  static Sample AtKnot(const std::vector<internal::Local>& locals, Combine combine, double s) {
+    std::vector<Sample> samples;
+    for (const auto& local : locals) {
+      if (local.Covers(s)) samples.push_back(internal::Cubic(local.About(s, s), 0));
+    }
+    return internal::CombineSamples(samples, combine);
+  }
+
+  // Emits the cubics of the open interval (left, right), on which no component starts or ends.
+  template <typename Add>
+  static void AddPiece(const std::vector<internal::Local>& locals, Combine combine, double left,
+                       double right, const Add& add) {
+    const double w = right - left, middle = left + 0.5 * w;
+    std::vector<Eigen::Vector4d> active;
+    for (const auto& local : locals) {
+      if (local.Covers(middle)) active.push_back(local.About(middle, left));
+    }
+    if (combine == Combine::kSum || active.size() < 2) {
+      Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+      for (const auto& c : active) sum += c;
+      add(left, sum);
+      return;
+    }
+    std::vector<double> cuts = {0, w};
+    for (size_t i = 0; i < active.size(); ++i) {
+      for (size_t j = 0; j < i; ++j) {
+        const auto roots = internal::Roots(active[i] - active[j], w);
+        cuts.insert(cuts.end(), roots.begin(), roots.end());
+      }
+    }
+    std::sort(cuts.begin(), cuts.end());
+    double last = -1;
+    for (size_t k = 0; k + 1 < cuts.size(); ++k) {
+      const double from = left + cuts[k], to = left + cuts[k + 1];
+      if (!(to > from) || from <= last) continue;  // two crossings within rounding
+      const double t = 0.5 * (cuts[k] + cuts[k + 1]);
+      const auto top = std::max_element(
+          active.begin(), active.end(), [t](const Eigen::Vector4d& p, const Eigen::Vector4d& q) {
+            return internal::Cubic(p, t).value < internal::Cubic(q, t).value;
+          });
+      add(from, internal::Shift(*top, cuts[k]));
+      last = from;
+    }
+  }
+
+  Eigen::VectorXd knots_;         // n + 1, increasing
+  Eigen::Matrix4Xd c_;            // coefficients about the left knot of each piece
+  std::vector<Sample> at_knots_;  // exact values at the knots, where closed intervals may meet
+  double max_descent_ = 0;
+};
+
+}  // namespace joda
+
+#endif  // JODA_FIELD_H_

@@ -1,0 +1,242 @@
+#include "joint_dynamics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <stdexcept>
+#include <utility>
+
+#include "config.h"
+
+namespace joda {
+namespace {
+
+// Stiffest spring that stays explicit, as h^2 K / inertia (symplectic Euler is stable below 4).
+// What is stiffer goes implicitly into the damping row; what is softer behaves as MuJoCo's own.
+constexpr double kExplicitStiffness = 1;
+
+// A joint held by dry friction creeps by at most this fraction of its range per second.
+constexpr double kCreep = 1e-6 / 60;
+
+// Smallest impedance ratio of the friction row, D times its inverse inertia: MuJoCo's solimp limit.
+constexpr double kStiffRow = 0.9999 / (1 - 0.9999);
+
+// "No bound" for the damping row's force.
+constexpr double kUnbounded = 1e10;
+
+// The fixed tendon along the joint alone whose friction row is free for the damping, -1: none.
+int FindTendon(const mjModel* m, int joint) {
+  for (int t = 0; t < m->ntendon; ++t) {
+    const int wrap = m->tendon_adr[t];
+    const char* name = mj_id2name(m, mjOBJ_TENDON, t);
+    if (m->tendon_num[t] == 1 && m->wrap_type[wrap] == mjWRAP_JOINT &&
+        m->wrap_objid[wrap] == joint && m->wrap_prm[wrap] == 1 && m->tendon_frictionloss[t] > 0 &&
+        name && std::string(name).find("joda_damping") != std::string::npos) {
+      return t;
+    }
+  }
+  return -1;
+}
+
+int CountPositive(const mjtNum* values, int n) {
+  return static_cast<int>(std::count_if(values, values + n, [](mjtNum x) { return x > 0; }));
+}
+
+// Row of this step's constraints with the given type and object, -1: none. `expected` is tried
+// first; otherwise bisection, as friction rows come dofs first, then tendons, each in order.
+int FindRow(const mjData* d, int expected, int type, int id) {
+  const auto at = [d](int row) { return std::make_pair(d->efc_type[row], d->efc_id[row]); };
+  const auto wanted = std::make_pair(type, id);
+  const int first = d->ne, last = d->ne + d->nf;
+  if (first + expected < last && at(first + expected) == wanted) return first + expected;
+  int lo = first, hi = last;
+  while (lo < hi) {
+    const int mid = (lo + hi) / 2;
+    if (at(mid) < wanted) {
+      lo = mid + 1;
+    } else {
+      hi = mid;
+    }
+  }
+  return lo < last && at(lo) == wanted ? lo : -1;
+}
+
+// Makes the row resist the velocity at the end of the step: force = -D (a + v / h), within +-bound.
+void SetRow(const mjModel* m, mjData* d, int row, double stiffness, double bound) {
+  const double D = std::max(stiffness, mjMINVAL), R = 1 / D;
+  if (mj_isDual(m)) {  // the dual solvers see R on the diagonal of A + R
+    mjtNum* diagonal = d->efc_AR + static_cast<std::ptrdiff_t>(row) * (d->nefc + 1);
+    if (mj_isSparse(m)) {
+      const int* colind = d->efc_AR_colind + d->efc_AR_rowadr[row];
+      const int* found = std::find(colind, colind + d->efc_AR_rownnz[row], row);
+      diagonal = d->efc_AR + (found - d->efc_AR_colind);
+    }
+    *diagonal += R - d->efc_R[row];
+  }
+  d->efc_D[row] = D;
+  d->efc_R[row] = R;
+  d->efc_frictionloss[row] = bound;
+  d->efc_KBIP[4 * row] = 0;
+  d->efc_KBIP[4 * row + 1] = 1 / m->opt.timestep;
+  if (d->nisland > 0) {
+    const int i = d->map_efc2iefc[row];
+    d->iefc_D[i] = D;
+    d->iefc_R[i] = R;
+    d->iefc_frictionloss[i] = bound;
+  }
+}
+
+// Part of the spring that must be implicit for stability (see kExplicitStiffness), from the
+// steepest place that the joint may reach within this step.
+double ImplicitStiffness(const Profile& p, double s, double v, double force, double h,
+                         double inverse_inertia) {
+  const double per_range = 1 / (p.hi - p.lo);
+  const double mobility = h * h * inverse_inertia;  // displacement in a step, per force
+  if (!(mobility * p.conservative.MaxDescent() * per_range > kExplicitStiffness)) return 0;
+  const double reach = (h * std::abs(v) + mobility * std::abs(force)) * per_range;
+  const double stiffness = p.conservative.MaxDescent(s - reach, s + reach) * per_range;
+  return std::max(0.0, stiffness - kExplicitStiffness / mobility);
+}
+
+// Whether the solver uses the damping row as it is set here: the discrete integrator makes the rows
+// anew behind the plugin, and noslip drops their compliance, which would lock the joint.
+bool KeepsRows(const mjModel* m) {
+  return m->opt.integrator != mjINT_DISCRETE && m->opt.noslip_iterations == 0;
+}
+
+}  // namespace
+
+JointDynamics::JointDynamics(const mjModel* m, int instance) {
+  for (JointConfig& config : ReadConfig(m, instance)) {
+    Joint joint;
+    joint.id = config.joint;
+    joint.body = m->jnt_bodyid[joint.id];
+    joint.dof = m->jnt_dofadr[joint.id];
+    joint.qpos = m->jnt_qposadr[joint.id];
+    joint.tendon = FindTendon(m, joint.id);
+    joint.friction_row = CountPositive(m->dof_frictionloss, joint.dof);
+    joint.damping_row = CountPositive(m->dof_frictionloss, m->nv) +
+                        CountPositive(m->tendon_frictionloss, std::max(joint.tendon, 0));
+    joint.profile = std::move(config.profile);
+    joints_.push_back(std::move(joint));
+  }
+}
+
+void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
+  for (Joint& mine : joints_) {
+    if (mine.id != joint) continue;
+    CheckFriction(m, joint, profile);
+    mine.profile = std::move(profile);
+    return;
+  }
+  throw std::invalid_argument(JointName(m, joint) +
+                              " carries no profile; attach one first");
+}
+
+void JointDynamics::Compute(const mjModel* m, mjData* d) const {
+  for (const Joint& joint : joints_) {
+    if (d->body_awake[joint.body] != mjS_ASLEEP) ComputeJoint(m, d, joint);
+  }
+}
+
+void JointDynamics::ComputeJoint(const mjModel* m, mjData* d, const Joint& joint) {
+  const Profile& p = joint.profile;
+  const double h = m->opt.timestep, v = d->qvel[joint.dof];
+  const double s = (d->qpos[joint.qpos] - p.lo) / (p.hi - p.lo);
+  const double inverse_inertia = m->dof_invweight0[joint.dof];
+
+  double force = 0, stiffness = 0, damping = 0;
+  if (!(m->opt.disableflags & mjDSBL_SPRING)) {
+    force = p.conservative(s).value;
+    stiffness = ImplicitStiffness(p, s, v, force, h, inverse_inertia);
+  }
+  if (!(m->opt.disableflags & mjDSBL_DAMPER)) damping = p.damping(s).value;
+  double drag = damping + h * stiffness;
+  double friction = p.friction(s).value;
+
+  const int friction_row = FindRow(d, joint.friction_row, mjCNSTR_FRICTION_DOF, joint.dof);
+  if (friction_row >= 0) {
+    friction += m->dof_frictionloss[joint.dof];
+    const double creep = kCreep * (p.hi - p.lo);
+    SetRow(m, d, friction_row, std::max(kStiffRow / inverse_inertia, friction * h / creep),
+           friction);
+    friction = 0;
+  } else if (m->opt.disableflags & mjDSBL_FRICTIONLOSS) {
+    friction = 0;
+  }
+  const int damping_row =
+      joint.tendon < 0 || !KeepsRows(m)
+          ? -1
+          : FindRow(d, joint.damping_row, mjCNSTR_FRICTION_TENDON, joint.tendon);
+  if (damping_row >= 0) {
+    SetRow(m, d, damping_row, h * drag, kUnbounded);
+    drag = 0;
+  } else {
+    force /= 1 + h * h * stiffness * inverse_inertia;
+  }
+
+  // what has no row becomes a force that at most stops the joint within the step
+  if (friction > 0 || drag > 0) {
+    const double stop = std::abs(v) / (h * inverse_inertia);
+    const double resistance = friction + drag * std::abs(v) / (1 + h * drag * inverse_inertia);
+    force -= std::copysign(std::min(resistance, stop), v);
+  }
+  d->qfrc_passive[joint.dof] += force;
+}
+
+void JointDynamics::Register() {
+  static std::vector<const char*> attributes;
+  for (const std::string& name : AttributeNames()) attributes.push_back(name.c_str());
+
+  mjpPlugin plugin;
+  mjp_defaultPlugin(&plugin);
+  plugin.name = "joda.joint_dynamics";
+  plugin.capabilityflags = mjPLUGIN_PASSIVE;
+  plugin.nattribute = static_cast<int>(attributes.size());
+  plugin.attributes = attributes.data();
+  plugin.nstate = +[](const mjModel*, int) { return 0; };
+  plugin.init = +[](const mjModel* m, mjData* d, int instance) {
+    try {
+      d->plugin_data[instance] = reinterpret_cast<uintptr_t>(new JointDynamics(m, instance));
+      return 0;
+    } catch (const std::exception& error) {
+      mju_warning("joda.joint_dynamics: instance '%s': %s",
+                  m->names + m->name_pluginadr[instance], error.what());
+      return -1;
+    }
+  };
+  plugin.destroy = +[](mjData* d, int instance) {
+    delete reinterpret_cast<JointDynamics*>(d->plugin_data[instance]);
+    d->plugin_data[instance] = 0;
+  };
+  plugin.copy = +[](mjData* dest, const mjModel*, const mjData* src, int instance) {
+    *reinterpret_cast<JointDynamics*>(dest->plugin_data[instance]) =
+        *reinterpret_cast<const JointDynamics*>(src->plugin_data[instance]);
+  };
+  plugin.reset = +[](const mjModel*, mjtNum*, void*, int) {};
+  plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
+    reinterpret_cast<const JointDynamics*>(d->plugin_data[instance])->Compute(m, d);
+  };
+  mjp_registerPlugin(&plugin);
+}
+
+}  // namespace joda
+
+extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
+                                const char* const texts[6], char* error, int error_size) {
+  try {
+    const int instance = m->body_plugin[m->jnt_bodyid[joint]];
+    int slot = -1;
+    mjp_getPlugin("joda.joint_dynamics", &slot);
+    if (instance < 0 || m->plugin[instance] != slot) {
+      throw std::invalid_argument("its body carries no joda.joint_dynamics; attach a profile first");
+    }
+    reinterpret_cast<joda::JointDynamics*>(d->plugin_data[instance])
+        ->SetProfile(m, joint, joda::ParseProfile("", lo, hi, texts));
+    return 0;
+  } catch (const std::exception& exception) {
+    std::snprintf(error, error_size, "%s", exception.what());
+    return -1;
+  }
+}

@@ -1,0 +1,56 @@
+// MuJoCo engine plugin "joda.joint_dynamics": position-dependent joint dynamics inside the step.
+//
+// Per joint three channels over its position: conservative force F(s), dry friction f_max(s) and
+// damping C(s). F is a passive force; friction and damping are rows of MuJoCo's convex solver, so
+// they are coupled with contacts and limits and stable at any timestep. See docs/physics.md.
+//
+// The plugin never writes to mjModel and keeps no state: Compute is a function of mjModel and mjData.
+#ifndef JODA_JOINT_DYNAMICS_H_
+#define JODA_JOINT_DYNAMICS_H_
+
+#include <mujoco/mujoco.h>
+
+#include <vector>
+
+#include "config.h"
+
+namespace joda {
+
+class JointDynamics {
+ public:
+  // Reads the configuration of the plugin instance; throws std::invalid_argument, one sentence.
+  JointDynamics(const mjModel* m, int instance);
+
+  // Adds the forces of all its joints to the step being computed.
+  void Compute(const mjModel* m, mjData* d) const;
+
+  // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint.
+  void SetProfile(const mjModel* m, int joint, Profile profile);
+
+  static void Register();
+
+ private:
+  struct Joint {
+    int id;            // joint
+    int dof;           // its degree of freedom
+    int qpos;          // its place in qpos
+    int body;          // the body it moves
+    int tendon;        // fixed tendon whose friction row carries the damping, -1: none
+    int friction_row;  // expected offsets of the two rows behind the equality rows
+    int damping_row;
+    Profile profile;
+  };
+
+  static void ComputeJoint(const mjModel* m, mjData* d, const Joint& joint);
+
+  std::vector<Joint> joints_;
+};
+
+}  // namespace joda
+
+// Replaces the profile of `joint` in `d` only; the texts are as in the attributes. Returns 0, or -1
+// with one sentence in `error`.
+extern "C" MJAPI int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
+                                const char* const texts[6], char* error, int error_size);
+
+#endif  // JODA_JOINT_DYNAMICS_H_

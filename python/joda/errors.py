@@ -1,0 +1,8 @@
+"""The one exception for a user's mistake: a sentence that says what is wrong and what would be right."""
+
+
+class JodaError(ValueError):
+    """A user's mistake, in one sentence that names the file, line or key and the remedy.
+
+    The command line prints it and exits with status 2.
+    """

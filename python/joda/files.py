@@ -1,0 +1,50 @@
+"""Reading and writing whole files: atomic, never half, never over a user's file unasked."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from joda.errors import JodaError
+
+
+def read_text(path: Path) -> str:
+    """Text of a UTF-8 file; raises JodaError if it is missing, unreadable or not text."""
+    try:
+        return path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise JodaError(f"{path}: not a UTF-8 text file (byte {error.start}).") from None
+    except OSError as error:
+        raise JodaError(f"{path}: cannot be read ({error.strerror}).") from None
+
+
+def check_target(path: Path, force: bool) -> None:
+    """Raises JodaError if `path` exists and `force` is off, or its folder is missing."""
+    if path.exists() and not force:
+        raise JodaError(f"{path}: exists already; choose another name or add --force.")
+    if not path.parent.is_dir():
+        raise JodaError(f"{path}: the folder {path.parent} does not exist; create it first.")
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Writes the whole file or nothing; raises JodaError if the folder does not allow it."""
+    try:
+        descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except OSError as error:
+        raise JodaError(f"{path}: cannot be written ({error.strerror}).") from None
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, path)
+    except BaseException as error:
+        Path(temporary).unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise JodaError(f"{path}: cannot be written ({error.strerror}).") from None
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """As write_bytes, for UTF-8 text."""
+    write_bytes(path, text.encode("utf-8"))
