@@ -136,6 +136,14 @@ void CheckFriction(const mjModel* m, int joint, const Profile& profile) {
                               "frictionloss=\"1e-12\" to the joint");
 }
 
+int CountJoints(const mjModel* m, int instance) {
+  int count = IsConfigured(m, instance, "");
+  for (int place = 0; place < kMaxJoints; ++place) {
+    count += IsConfigured(m, instance, std::to_string(place) + ".");
+  }
+  return count;
+}
+
 std::vector<JointConfig> ReadConfig(const mjModel* m, int instance) {
   const int body = FindBody(m, instance);
   std::vector<JointConfig> out;

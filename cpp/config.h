@@ -32,6 +32,9 @@ struct JointConfig {
 // Every attribute that an instance may have, in all spellings.
 const std::vector<std::string>& AttributeNames();
 
+// How many joints the instance is configured for; usable before the model is complete.
+int CountJoints(const mjModel* m, int instance);
+
 // The joints that the instance serves; throws std::invalid_argument, one sentence.
 std::vector<JointConfig> ReadConfig(const mjModel* m, int instance);
 

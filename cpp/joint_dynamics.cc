@@ -16,11 +16,12 @@ namespace {
 // What is stiffer goes implicitly into the damping row; what is softer behaves as MuJoCo's own.
 constexpr double kExplicitStiffness = 1;
 
-// A joint held by dry friction creeps by at most this fraction of its range per second.
-constexpr double kCreep = 1e-6 / 60;
+// Largest part of the range through which the field alone may move the joint in one step.
+constexpr double kStride = 0.25;
 
-// Smallest impedance ratio of the friction row, D times its inverse inertia: MuJoCo's solimp limit.
-constexpr double kStiffRow = 0.9999 / (1 - 0.9999);
+// The friction row's D over the joint's inertia. Larger is stiffer, but the solver's line search (50
+// evaluations) must still find the narrow zone in which the joint sticks.
+constexpr double kStiffRow = 1e4;
 
 // "No bound" for the damping row's force.
 constexpr double kUnbounded = 1e10;
@@ -62,8 +63,9 @@ int FindRow(const mjData* d, int expected, int type, int id) {
   return lo < last && at(lo) == wanted ? lo : -1;
 }
 
-// Makes the row resist the velocity at the end of the step: force = -D (a + v / h), within +-bound.
-void SetRow(const mjModel* m, mjData* d, int row, double stiffness, double bound) {
+// Makes the row resist the velocity at the end of the step: force = offset - D (a + v / h), within
+// +-bound.
+void SetRow(const mjModel* m, mjData* d, int row, double stiffness, double bound, double offset) {
   const double D = std::max(stiffness, mjMINVAL), R = 1 / D;
   if (mj_isDual(m)) {  // the dual solvers see R on the diagonal of A + R
     mjtNum* diagonal = d->efc_AR + static_cast<std::ptrdiff_t>(row) * (d->nefc + 1);
@@ -77,8 +79,12 @@ void SetRow(const mjModel* m, mjData* d, int row, double stiffness, double bound
   d->efc_D[row] = D;
   d->efc_R[row] = R;
   d->efc_frictionloss[row] = bound;
-  d->efc_KBIP[4 * row] = 0;
-  d->efc_KBIP[4 * row + 1] = 1 / m->opt.timestep;
+  // the engine computes the reference a = -B v - K I pos from these right after the passive forces
+  d->efc_pos[row] = -offset * R;
+  mjtNum* KBIP = d->efc_KBIP + 4 * row;
+  KBIP[0] = 1;
+  KBIP[1] = 1 / m->opt.timestep;
+  KBIP[2] = 1;
   if (d->nisland > 0) {
     const int i = d->map_efc2iefc[row];
     d->iefc_D[i] = D;
@@ -87,16 +93,20 @@ void SetRow(const mjModel* m, mjData* d, int row, double stiffness, double bound
   }
 }
 
-// Part of the spring that must be implicit for stability (see kExplicitStiffness), from the
-// steepest place that the joint may reach within this step.
+// Part of the field that must act implicitly for stability, as a stiffness: what is stiffer than
+// kExplicitStiffness at the steepest place that the joint may reach within this step, or would move
+// it by more than a fraction of its range (kStride).
 double ImplicitStiffness(const Profile& p, double s, double v, double force, double h,
                          double inverse_inertia) {
   const double per_range = 1 / (p.hi - p.lo);
   const double mobility = h * h * inverse_inertia;  // displacement in a step, per force
-  if (!(mobility * p.conservative.MaxDescent() * per_range > kExplicitStiffness)) return 0;
-  const double reach = (h * std::abs(v) + mobility * std::abs(force)) * per_range;
-  const double stiffness = p.conservative.MaxDescent(s - reach, s + reach) * per_range;
-  return std::max(0.0, stiffness - kExplicitStiffness / mobility);
+  const double soft = kExplicitStiffness / mobility;
+  double stiffness = std::abs(force) * per_range / kStride;
+  if (p.conservative.MaxDescent() * per_range > soft) {
+    const double reach = (h * std::abs(v) + mobility * std::abs(force)) * per_range;
+    stiffness = std::max(stiffness, p.conservative.MaxDescent(s - reach, s + reach) * per_range);
+  }
+  return std::max(0.0, stiffness - soft);
 }
 
 // Whether the solver uses the damping row as it is set here: the discrete integrator makes the rows
@@ -134,13 +144,25 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
                               " carries no profile; attach one first");
 }
 
-void JointDynamics::Compute(const mjModel* m, mjData* d) const {
-  for (const Joint& joint : joints_) {
-    if (d->body_awake[joint.body] != mjS_ASLEEP) ComputeJoint(m, d, joint);
+void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) const {
+  const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+  for (size_t k = 0; k < joints_.size(); ++k) {
+    if (d->body_awake[joints_[k].body] != mjS_ASLEEP) ComputeJoint(m, d, joints_[k], state + k);
   }
 }
 
-void JointDynamics::ComputeJoint(const mjModel* m, mjData* d, const Joint& joint) {
+void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
+  mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+  for (size_t k = 0; k < joints_.size(); ++k) {
+    const Joint& joint = joints_[k];
+    if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
+    const int row = FindRow(d, joint.friction_row, mjCNSTR_FRICTION_DOF, joint.dof);
+    state[k] = row < 0 ? 0 : d->efc_force[row];
+  }
+}
+
+void JointDynamics::ComputeJoint(const mjModel* m, mjData* d, const Joint& joint,
+                                 const mjtNum* state) {
   const Profile& p = joint.profile;
   const double h = m->opt.timestep, v = d->qvel[joint.dof];
   const double s = (d->qpos[joint.qpos] - p.lo) / (p.hi - p.lo);
@@ -158,9 +180,8 @@ void JointDynamics::ComputeJoint(const mjModel* m, mjData* d, const Joint& joint
   const int friction_row = FindRow(d, joint.friction_row, mjCNSTR_FRICTION_DOF, joint.dof);
   if (friction_row >= 0) {
     friction += m->dof_frictionloss[joint.dof];
-    const double creep = kCreep * (p.hi - p.lo);
-    SetRow(m, d, friction_row, std::max(kStiffRow / inverse_inertia, friction * h / creep),
-           friction);
+    const double held = KeepsRows(m) ? std::clamp(*state, -friction, friction) : 0;
+    SetRow(m, d, friction_row, kStiffRow / inverse_inertia, friction, held);
     friction = 0;
   } else if (m->opt.disableflags & mjDSBL_FRICTIONLOSS) {
     friction = 0;
@@ -170,7 +191,7 @@ void JointDynamics::ComputeJoint(const mjModel* m, mjData* d, const Joint& joint
           ? -1
           : FindRow(d, joint.damping_row, mjCNSTR_FRICTION_TENDON, joint.tendon);
   if (damping_row >= 0) {
-    SetRow(m, d, damping_row, h * drag, kUnbounded);
+    SetRow(m, d, damping_row, h * drag, kUnbounded, 0);
     drag = 0;
   } else {
     force /= 1 + h * h * stiffness * inverse_inertia;
@@ -195,7 +216,7 @@ void JointDynamics::Register() {
   plugin.capabilityflags = mjPLUGIN_PASSIVE;
   plugin.nattribute = static_cast<int>(attributes.size());
   plugin.attributes = attributes.data();
-  plugin.nstate = +[](const mjModel*, int) { return 0; };
+  plugin.nstate = +[](const mjModel* m, int instance) { return CountJoints(m, instance); };
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
     try {
       d->plugin_data[instance] = reinterpret_cast<uintptr_t>(new JointDynamics(m, instance));
@@ -214,9 +235,14 @@ void JointDynamics::Register() {
     *reinterpret_cast<JointDynamics*>(dest->plugin_data[instance]) =
         *reinterpret_cast<const JointDynamics*>(src->plugin_data[instance]);
   };
-  plugin.reset = +[](const mjModel*, mjtNum*, void*, int) {};
+  plugin.reset = +[](const mjModel* m, mjtNum* state, void*, int instance) {
+    std::fill_n(state, m->plugin_statenum[instance], 0);
+  };
   plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
-    reinterpret_cast<const JointDynamics*>(d->plugin_data[instance])->Compute(m, d);
+    reinterpret_cast<const JointDynamics*>(d->plugin_data[instance])->Compute(m, d, instance);
+  };
+  plugin.advance = +[](const mjModel* m, mjData* d, int instance) {
+    reinterpret_cast<const JointDynamics*>(d->plugin_data[instance])->Advance(m, d, instance);
   };
   mjp_registerPlugin(&plugin);
 }

@@ -4,7 +4,7 @@
 // damping C(s). F is a passive force; friction and damping are rows of MuJoCo's convex solver, so
 // they are coupled with contacts and limits and stable at any timestep. See docs/physics.md.
 //
-// The plugin never writes to mjModel and keeps no state: Compute is a function of mjModel and mjData.
+// The plugin never writes to mjModel, and all its state is in plugin_state: any thread, any mjData.
 #ifndef JODA_JOINT_DYNAMICS_H_
 #define JODA_JOINT_DYNAMICS_H_
 
@@ -22,7 +22,11 @@ class JointDynamics {
   JointDynamics(const mjModel* m, int instance);
 
   // Adds the forces of all its joints to the step being computed.
-  void Compute(const mjModel* m, mjData* d) const;
+  void Compute(const mjModel* m, mjData* d, int instance) const;
+
+  // Remembers the dry friction of the step just taken, one number per joint in plugin_state: the
+  // next step's friction continues from it, so that a held joint does not creep.
+  void Advance(const mjModel* m, mjData* d, int instance) const;
 
   // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint.
   void SetProfile(const mjModel* m, int joint, Profile profile);
@@ -41,7 +45,7 @@ class JointDynamics {
     Profile profile;
   };
 
-  static void ComputeJoint(const mjModel* m, mjData* d, const Joint& joint);
+  static void ComputeJoint(const mjModel* m, mjData* d, const Joint& joint, const mjtNum* state);
 
   std::vector<Joint> joints_;
 };
