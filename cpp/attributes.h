@@ -9,6 +9,7 @@
 #define JODA_ATTRIBUTES_H_
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
@@ -21,6 +22,7 @@
 namespace joda {
 
 inline constexpr double kMinWidth = 1e-9;  // narrowest interval or gap between control points
+inline constexpr double kMaxValue = 1e15;  // largest |y|; no coefficient of a cubic can overflow
 
 namespace internal {
 
@@ -41,9 +43,11 @@ inline std::vector<std::string_view> Split(std::string_view text, char separator
   }
 }
 
+// The text in quotes, cut after some 40 bytes but never within a UTF-8 character.
 inline std::string Quote(std::string_view text) {
-  std::string out = "\"" + std::string(text.substr(0, 40));
-  return out + (text.size() > 40 ? "...\"" : "\"");
+  size_t end = std::min<size_t>(text.size(), 40);
+  while (end > 0 && end < text.size() && (text[end] & 0xC0) == 0x80) --end;
+  return "\"" + std::string(text.substr(0, end)) + (end < text.size() ? "...\"" : "\"");
 }
 
 }  // namespace internal
@@ -81,9 +85,11 @@ inline void Validate(const Component& c, bool nonnegative) {
   const Eigen::Index n = c.x.size();
   if (c.x[0] != 0 || c.x[n - 1] != 1) fail("x must begin at 0 and end at 1");
   for (Eigen::Index k = 0; k + 1 < n; ++k) {
-    if (!(c.x[k + 1] - c.x[k] >= kMinWidth)) fail("x must increase, by 1e-9 at least");
+    if (!((c.x[k + 1] - c.x[k]) * (c.b - c.a) >= kMinWidth)) {
+      fail("x must increase, by at least 1e-9 of the joint's range");
+    }
   }
-  if (!c.x.allFinite() || !c.y.allFinite()) fail("every number must be finite");
+  if (!(c.y.cwiseAbs().maxCoeff() <= kMaxValue)) fail("y must lie between -1e15 and 1e15");
   if (nonnegative && c.y.minCoeff() < 0) fail("values of friction and damping must not be negative");
 }
 

@@ -58,19 +58,21 @@ inline std::vector<double> TurningPoints(const Eigen::Vector4d& c, double w) {
   return out;
 }
 
-// Interior sign changes of the cubic on (0, w), to rounding: bisection between turning points.
+// Interior sign changes of the cubic on (0, w), to rounding: bisection between turning points. A
+// turning point at zero is among them, as the cubic may cross with a level tangent.
 inline std::vector<double> Roots(const Eigen::Vector4d& c, double w) {
   std::vector<double> ends = TurningPoints(c, w), out;
   ends.insert(ends.begin(), 0);
   ends.push_back(w);
   for (size_t i = 0; i + 1 < ends.size(); ++i) {
     double lo = ends[i], hi = ends[i + 1];
-    const double sign = Cubic(c, lo).value;
-    if (sign * Cubic(c, hi).value >= 0) continue;
+    const double sign = Sign(Cubic(c, lo).value);
+    if (sign == 0 && i > 0) out.push_back(lo);
+    if (sign * Sign(Cubic(c, hi).value) >= 0) continue;
     for (int k = 0; k < 100 && lo < hi; ++k) {
       const double mid = 0.5 * (lo + hi);
       if (mid == lo || mid == hi) break;
-      (sign * Cubic(c, mid).value > 0 ? lo : hi) = mid;
+      (sign == Sign(Cubic(c, mid).value) ? lo : hi) = mid;
     }
     out.push_back(hi);
   }

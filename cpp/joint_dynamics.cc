@@ -23,18 +23,13 @@ constexpr double kStride = 0.25;
 // evaluations) must still find the narrow zone in which the joint sticks.
 constexpr double kStiffRow = 1e4;
 
-// "No bound" for the damping row's force.
-constexpr double kUnbounded = 1e10;
-
-// The fixed tendon along the joint alone whose friction row is free for the damping, -1: none.
-int FindTendon(const mjModel* m, int joint) {
-  for (int t = 0; t < m->ntendon; ++t) {
-    const int wrap = m->tendon_adr[t];
-    const char* name = mj_id2name(m, mjOBJ_TENDON, t);
-    if (m->tendon_num[t] == 1 && m->wrap_type[wrap] == mjWRAP_JOINT &&
-        m->wrap_objid[wrap] == joint && m->wrap_prm[wrap] == 1 && m->tendon_frictionloss[t] > 0 &&
-        name && std::string(name).find("joda_damping") != std::string::npos) {
-      return t;
+// The equality constraint on the joint alone that is there to carry the damping, -1: none.
+int FindEquality(const mjModel* m, int joint) {
+  for (int e = 0; e < m->neq; ++e) {
+    const char* name = mj_id2name(m, mjOBJ_EQUALITY, e);
+    if (m->eq_type[e] == mjEQ_JOINT && m->eq_obj1id[e] == joint && m->eq_obj2id[e] < 0 && name &&
+        std::string(name).find("joda_damping") != std::string::npos) {
+      return e;
     }
   }
   return -1;
@@ -44,12 +39,11 @@ int CountPositive(const mjtNum* values, int n) {
   return static_cast<int>(std::count_if(values, values + n, [](mjtNum x) { return x > 0; }));
 }
 
-// Row of this step's constraints with the given type and object, -1: none. `expected` is tried
-// first; otherwise bisection, as friction rows come dofs first, then tendons, each in order.
-int FindRow(const mjData* d, int expected, int type, int id) {
+// Row among [first, last) of this step's constraints that belongs to the object, -1: none. Rows
+// come in the order of their objects. `expected` is tried first, then bisection.
+int FindRow(const mjData* d, int first, int last, int expected, int type, int id) {
   const auto at = [d](int row) { return std::make_pair(d->efc_type[row], d->efc_id[row]); };
   const auto wanted = std::make_pair(type, id);
-  const int first = d->ne, last = d->ne + d->nf;
   if (first + expected < last && at(first + expected) == wanted) return first + expected;
   int lo = first, hi = last;
   while (lo < hi) {
@@ -61,6 +55,15 @@ int FindRow(const mjData* d, int expected, int type, int id) {
     }
   }
   return lo < last && at(lo) == wanted ? lo : -1;
+}
+
+int FindFrictionRow(const mjData* d, int expected, int dof) {
+  return FindRow(d, d->ne, d->ne + d->nf, expected, mjCNSTR_FRICTION_DOF, dof);
+}
+
+int FindDampingRow(const mjData* d, int equality) {
+  if (equality < 0) return -1;
+  return FindRow(d, 0, d->ne, equality, mjCNSTR_EQUALITY, equality);
 }
 
 // Makes the row resist the velocity at the end of the step: force = offset - D (a + v / h), within
@@ -124,10 +127,8 @@ JointDynamics::JointDynamics(const mjModel* m, int instance) {
     joint.body = m->jnt_bodyid[joint.id];
     joint.dof = m->jnt_dofadr[joint.id];
     joint.qpos = m->jnt_qposadr[joint.id];
-    joint.tendon = FindTendon(m, joint.id);
+    joint.equality = FindEquality(m, joint.id);
     joint.friction_row = CountPositive(m->dof_frictionloss, joint.dof);
-    joint.damping_row = CountPositive(m->dof_frictionloss, m->nv) +
-                        CountPositive(m->tendon_frictionloss, std::max(joint.tendon, 0));
     joint.profile = std::move(config.profile);
     joints_.push_back(std::move(joint));
   }
@@ -156,7 +157,7 @@ void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
   for (size_t k = 0; k < joints_.size(); ++k) {
     const Joint& joint = joints_[k];
     if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
-    const int row = FindRow(d, joint.friction_row, mjCNSTR_FRICTION_DOF, joint.dof);
+    const int row = FindFrictionRow(d, joint.friction_row, joint.dof);
     state[k] = row < 0 ? 0 : d->efc_force[row];
   }
 }
@@ -177,7 +178,7 @@ void JointDynamics::ComputeJoint(const mjModel* m, mjData* d, const Joint& joint
   double drag = damping + h * stiffness;
   double friction = p.friction(s).value;
 
-  const int friction_row = FindRow(d, joint.friction_row, mjCNSTR_FRICTION_DOF, joint.dof);
+  const int friction_row = FindFrictionRow(d, joint.friction_row, joint.dof);
   if (friction_row >= 0) {
     friction += m->dof_frictionloss[joint.dof];
     const double held = KeepsRows(m) ? std::clamp(*state, -friction, friction) : 0;
@@ -186,12 +187,9 @@ void JointDynamics::ComputeJoint(const mjModel* m, mjData* d, const Joint& joint
   } else if (m->opt.disableflags & mjDSBL_FRICTIONLOSS) {
     friction = 0;
   }
-  const int damping_row =
-      joint.tendon < 0 || !KeepsRows(m)
-          ? -1
-          : FindRow(d, joint.damping_row, mjCNSTR_FRICTION_TENDON, joint.tendon);
+  const int damping_row = KeepsRows(m) ? FindDampingRow(d, joint.equality) : -1;
   if (damping_row >= 0) {
-    SetRow(m, d, damping_row, h * drag, kUnbounded, 0);
+    SetRow(m, d, damping_row, h * drag, 0, 0);
     drag = 0;
   } else {
     force /= 1 + h * h * stiffness * inverse_inertia;

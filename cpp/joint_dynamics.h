@@ -39,9 +39,8 @@ class JointDynamics {
     int dof;           // its degree of freedom
     int qpos;          // its place in qpos
     int body;          // the body it moves
-    int tendon;        // fixed tendon whose friction row carries the damping, -1: none
-    int friction_row;  // expected offsets of the two rows behind the equality rows
-    int damping_row;
+    int equality;      // equality constraint whose row carries the damping, -1: none
+    int friction_row;  // expected place of its friction row among the friction rows
     Profile profile;
   };
 

@@ -6,12 +6,12 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import mujoco
-
 from joda._build import MUJOCO_VERSION
 from joda.errors import JodaError
 
 if TYPE_CHECKING:
+    import mujoco
+
     from joda.profile import Profile
 
 PLUGIN = "joda.joint_dynamics"
@@ -32,6 +32,8 @@ def plugin_path() -> Path:
 
 def load() -> None:
     """Loads the plugin, once; raises JodaError if it was built for another MuJoCo."""
+    import mujoco  # loads the plugin by itself, through the entry point, if it is imported first here
+
     global _loaded
     if _loaded:
         return
@@ -45,7 +47,7 @@ def load() -> None:
 
 
 def set_profile(
-    model: mujoco.MjModel, data: mujoco.MjData, joint: int | str, profile: "Profile"
+    model: "mujoco.MjModel", data: "mujoco.MjData", joint: int | str, profile: "Profile"
 ) -> None:
     """Replaces the profile of a joint in one mjData; neither the model nor other data change.
 

@@ -12,7 +12,8 @@ The same numbers travel as text in the plugin's MJCF attributes (`Profile.attrib
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -23,6 +24,8 @@ from joda.files import read_text
 
 MIN_WIDTH = 1e-9
 """Narrowest interval, and narrowest gap between control points, in normalised position."""
+MAX_VALUE = 1e15
+"""Largest magnitude of a control point's value; no coefficient of a cubic can overflow."""
 
 CHANNELS = ("conservative", "friction", "damping")
 ATTRIBUTES = ("range", *(f"{name}{part}" for name in CHANNELS for part in ("", "_combine")))
@@ -63,13 +66,16 @@ class Component(_Frozen):
             )
         if self.x[0] != 0 or self.x[-1] != 1:
             raise ValueError("x must begin at 0 and end at 1")
-        if any(not right - left >= MIN_WIDTH for left, right in zip(self.x, self.x[1:], strict=False)):
-            raise ValueError("x must increase, by 1e-9 at least")
+        gaps = ((right - left) * (b - a) for left, right in pairwise(self.x))
+        if any(not gap >= MIN_WIDTH for gap in gaps):
+            raise ValueError("x must increase, by at least 1e-9 of the joint's range")
+        if max(map(abs, self.y)) > MAX_VALUE:
+            raise ValueError("y must lie between -1e15 and 1e15")
         return self
 
     def text(self) -> str:
         """The component as in the plugin's attributes."""
-        numbers = [" ".join(map(repr, part)) for part in (self.interval, self.x, self.y)]
+        numbers = [_numbers(part) for part in (self.interval, self.x, self.y)]
         return (f"{self.label.strip()}: " if self.label.strip() else "") + " | ".join(numbers)
 
 
@@ -164,7 +170,7 @@ class Profile(_Frozen):
 
     def attributes(self) -> dict[str, str]:
         """The plugin's attributes for the joint, key to text; empty channels are left out."""
-        out = {"range": " ".join(map(repr, self.joint.range))}
+        out = {"range": _numbers(self.joint.range)}
         for name in CHANNELS:
             channel: Channel = getattr(self.channels, name)
             if channel.components:
@@ -179,7 +185,7 @@ class Profile(_Frozen):
         channels = {
             name: {
                 "combine": attributes.get(f"{name}_combine") or "sum",
-                "components": _parse(attributes.get(name, "")),
+                "components": _parse(f"joint '{joint.name}': {name}", attributes.get(name, "")),
             }
             for name in CHANNELS
         }
@@ -193,7 +199,7 @@ def describe(error: ValidationError) -> str:
     """The first thing wrong with a file, as one sentence: key, what, what would be right."""
     first = error.errors(include_url=False)[0]
     key = re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, first["loc"])))
-    what = first["msg"].removeprefix("Value error, ")
+    what = first["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
     if first["type"] == "extra_forbidden":
         what = "unknown key; remove it or mend its spelling"
     elif first["type"] == "missing":
@@ -204,13 +210,28 @@ def describe(error: ValidationError) -> str:
         what = f"this version of joda reads schema_version 1, the file has {first['input']!r}"
     elif first["type"] == "string_pattern_mismatch":
         what = "must not hold ';', '|' or line breaks"
+    elif first["type"] == "json_invalid":
+        what = what.replace("Invalid JSON: ", "not JSON (") + ")"
+    elif first["type"] == "float_parsing":
+        what = f"must be a number, not {first['input']!r}"
+    elif first["type"] == "too_long":
+        count = first["ctx"]
+        what = f"must have {count['max_length']} numbers, not {count['actual_length']}"
     return f"{key}: {what}." if key else f"{what}."
 
 
-def _parse(text: str) -> list[dict[str, Any]]:
+def _numbers(values: Iterable[float]) -> str:
+    """Numbers that read back exactly, 1 rather than 1.0."""
+    return " ".join(repr(value).removesuffix(".0") for value in values)
+
+
+def _parse(where: str, text: str) -> list[dict[str, Any]]:
     """Components from an attribute's text; the inverse of Channel.text."""
     components = []
     for piece in filter(str.strip, text.split(";")):
+        if piece.count("|") != 2:
+            form = '"label: a b | x ... | y ..."'
+            raise JodaError(f'{where}: expected {form}, got "{piece.strip()}".')
         head, x, y = piece.split("|")
         label, _, interval = head.rpartition(":")
         components.append(

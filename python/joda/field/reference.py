@@ -29,7 +29,8 @@ def pchip_slopes(x: Array, y: Array) -> Array:
     w2 = h[1:] + 2 * h[:-1]
     monotone = np.sign(m[1:]) * np.sign(m[:-1]) > 0
     left, right = np.where(monotone, m[:-1], 1.0), np.where(monotone, m[1:], 1.0)
-    inside = np.where(monotone, (w1 + w2) / (w1 / left + w2 / right), 0.0)
+    with np.errstate(over="ignore"):  # next to a slope of nearly 0 the mean is 0
+        inside = np.where(monotone, (w1 + w2) / (w1 / left + w2 / right), 0.0)
     return np.concatenate(
         ([_end_slope(h[0], h[1], m[0], m[1])], inside, [_end_slope(h[-1], h[-2], m[-1], m[-2])])
     )

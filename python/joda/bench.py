@@ -1,0 +1,214 @@
+"""What a profile costs per step: ratios between models that are stepped in turns, in one run.
+
+The machine's speed cancels out of a ratio and its noise mostly does: every round steps each model
+once, and the median over the rounds of the ratio within a round is reported.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from joda.errors import JodaError
+from joda.field import evaluate
+from joda.plugin import PLUGIN
+from joda.profile import Channel, Channels, Component, Joint, Profile, Resistance
+from joda.scene import read_profiles
+
+ROUNDS = 31
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    Attributes:
+        what: what is compared with what.
+        ratio: the ratio, median over the rounds.
+        spread: half the distance between its quartiles.
+        bar: the project's own requirement, as text; empty if there is none.
+        microseconds: time per step of the two models, on this machine.
+    """
+
+    what: str
+    ratio: float
+    spread: float
+    bar: str
+    microseconds: tuple[float, float]
+
+    def json(self) -> dict[str, Any]:
+        """The row as a JSON object."""
+        return asdict(self)
+
+
+def bench(
+    scene: str | Path | None = None, *, progress: Callable[[str], None] = lambda what: None
+) -> list[Row]:
+    """Measures the cost of profiles.
+
+    Args:
+        scene: a scene that carries profiles; without one, a hinge and rows of 10 and 200 hinges.
+        progress: told what is being measured.
+
+    Returns:
+        the table's rows.
+
+    Raises:
+        JodaError: the scene cannot be loaded or carries no profile.
+    """
+    if scene is not None:
+        return _bench_scene(Path(scene), progress)
+    rows = []
+    progress("one hinge")
+    plain, native, ours = (hinges(1, kind) for kind in ("plain", "native", "joda"))
+    times = _measure([(plain, None), (native, None), (ours, None), (plain, _callback(ours))])
+    rows.append(_row("hinge, three channels / native elements", times[2], times[1], "<= 1.10"))
+    added = _row("Python callback's addition / the plugin's", times[3] - times[0], times[2] - times[0], ">= 10")
+    rows.append(added)
+    progress("10 and 200 hinges")
+    few, many = hinges(10, "joda"), hinges(200, "joda")
+    few_native, many_native = hinges(10, "native"), hinges(200, "native")
+    times = _measure([(few, None), (many, None), (few_native, None), (many_native, None)])
+    rows.append(_row("step per joint, 200 joints / 10 joints", times[1] / 200, times[0] / 10, "<= 1.2"))
+    rows.append(_row("10 hinges, three channels / native elements", times[0], times[2], ""))
+    rows.append(_row("200 hinges, three channels / native elements", times[1], times[3], ""))
+    return rows
+
+
+def hinges(count: int, kind: str) -> mujoco.MjModel:
+    """Doors side by side: "plain", with "native" spring, damping and friction, or with profiles."""
+    native = 'stiffness="0.5" damping="0.2" frictionloss="0.1"' if kind == "native" else ""
+    native = 'frictionloss="1e-12"' if kind == "joda" else native
+    bodies, instances, tendons = [], [], []
+    config = "".join(f'<config key="{k}" value="{v}"/>' for k, v in _three_channels().attributes().items())
+    for k in range(count):
+        reference = f'<plugin instance="p{k}"/>' if kind == "joda" else ""
+        bodies.append(
+            f'<body pos="{k} 0 0"><joint name="j{k}" axis="0 0 1" range="0 1.5" limited="true" {native}/>'
+            f'<geom type="box" size=".2 .01 .2" pos=".2 0 0" mass="1"/>{reference}</body>'
+        )
+        instances.append(f'<instance name="p{k}">{config}</instance>')
+        tendons.append(f'<joint name="joda_damping_j{k}" joint1="j{k}" solref="-1e-12 -1e-12" solimp="1e-4 1e-4"/>')
+    extension = f'<extension><plugin plugin="{PLUGIN}">{"".join(instances)}</plugin></extension>'
+    extra = (extension, f"<equality>{''.join(tendons)}</equality>") if kind == "joda" else ("", "")
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><compiler angle="radian"/><option><flag contact="disable"/></option>{extra[0]}'
+        f"<worldbody>{''.join(bodies)}</worldbody>{extra[1]}</mujoco>"
+    )
+
+
+def _three_channels() -> Profile:
+    """A door with a latch, hinge friction and a soft end: 8 components in all."""
+
+    def part(a: float, b: float, x: tuple[float, ...], y: tuple[float, ...]) -> Component:
+        return Component(interval=(a, b), x=x, y=y)
+
+    latch = part(0, 0.06, (0, 0.3, 0.6, 1), (-2, -2.5, 0.4, 0))
+    spring = part(0, 1, (0, 1), (-0.1, -0.5))
+    detent = part(0.6, 0.8, (0, 0.25, 0.5, 0.75, 1), (0, 0.5, 0, -0.5, 0))
+    whole = part(0, 1, (0, 1), (0.1, 0.1))
+    return Profile(
+        joint=Joint(name="j", type="hinge", range=(0, 1.5), unit="rad"),
+        channels=Channels(
+            conservative=Channel(components=(latch, spring, detent)),
+            friction=Resistance(components=(whole, part(0.4, 0.6, (0, 0.5, 1), (0, 0.2, 0)))),
+            damping=Resistance(
+                components=(whole, part(0.8, 1, (0, 1), (0, 2)), part(0, 0.1, (0, 1), (0.5, 0)))
+            ),
+        ),
+    )
+
+
+def _callback(model: mujoco.MjModel) -> Callable[[mujoco.MjModel, mujoco.MjData], None]:
+    """What a user would write in Python for the hinge of `model`."""
+    channels = _three_channels().channels
+
+    def tabulate(channel: Channel) -> Any:
+        grid = np.linspace(0, 1, 513)
+        return grid, evaluate(channel, grid)[0]
+
+    tables = [tabulate(c) for c in (channels.conservative, channels.friction, channels.damping)]
+    lo, hi = model.jnt_range[0]
+
+    def passive(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        s, v = (data.qpos[0] - lo) / (hi - lo), data.qvel[0]
+        force, friction, damping = (np.interp(s, *table) for table in tables)
+        data.qfrc_passive[0] += force - friction * np.tanh(v / 1e-3) - damping * v
+
+    return passive
+
+
+def _bench_scene(path: Path, progress: Callable[[str], None]) -> list[Row]:
+    profiles = read_profiles(path)
+    if not profiles:
+        raise JodaError(f"{path}: carries no profile; attach one first with: joda attach")
+    progress(f"{path.name}, {len(profiles)} profiles")
+    ours = mujoco.MjModel.from_xml_path(str(path))
+    native, plain = _without_plugin(path, profiles, True), _without_plugin(path, profiles, False)
+    times = _measure([(plain, None), (native, None), (ours, None)])
+    what = f"{path.name}, {len(profiles)} profiles"
+    return [
+        _row(f"{what} / native elements", times[2], times[1], "<= 1.05 for the kitchen"),
+        _row(f"{what} / none", times[2], times[0], ""),
+    ]
+
+
+def _without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> mujoco.MjModel:
+    """The scene without the plugin, with native elements of the same mean strength or none."""
+    spec = mujoco.MjSpec.from_file(str(path))
+    for body in spec.bodies:
+        body.plugin.active = False
+    for plugin in list(spec.plugins):
+        if plugin.plugin_name == PLUGIN:
+            spec.delete(plugin)
+    for tendon in list(spec.tendons):
+        if tendon.name.startswith("joda_damping_"):
+            spec.delete(tendon)
+    grid = np.linspace(0, 1, 101)
+    for name, profile in profiles.items():
+        joint, channels = spec.joint(name), profile.channels
+        mean = [float(np.mean(evaluate(c, grid)[0])) for c in (channels.friction, channels.damping)]
+        joint.frictionloss, damping = mean if native else (0.0, 0.0)
+        joint.damping[0] = damping
+        joint.stiffness[0] = 0.01 if native else 0.0
+    return spec.compile()
+
+
+def _measure(models: list[tuple[mujoco.MjModel, Any]]) -> np.ndarray:
+    """Seconds per step, shape (models, rounds): free swings from the middle of the range."""
+    steps = [_steps(model, callback) for model, callback in models]
+    times = np.empty((len(models), ROUNDS))
+    for k in range(ROUNDS):
+        for i, (model, callback) in enumerate(models):
+            times[i, k] = _time(model, callback, steps[i])
+    return times
+
+
+def _steps(model: mujoco.MjModel, callback: Any) -> int:
+    """How many steps take about 20 ms."""
+    return max(50, int(50 * 0.02 / (50 * _time(model, callback, 50))))
+
+
+def _time(model: mujoco.MjModel, callback: Any, steps: int) -> float:
+    data = mujoco.MjData(model)
+    limited = np.asarray(model.jnt_limited, bool) & (np.asarray(model.jnt_type) >= 2)
+    data.qpos[model.jnt_qposadr[limited]] = model.jnt_range[limited].mean(axis=1)
+    data.qvel[:] = 0.5
+    mujoco.set_mjcb_passive(callback)
+    try:
+        start = time.perf_counter()
+        mujoco.mj_step(model, data, steps)
+        return (time.perf_counter() - start) / steps
+    finally:
+        mujoco.set_mjcb_passive(None)
+
+
+def _row(what: str, ours: np.ndarray, other: np.ndarray, bar: str) -> Row:
+    ratios = ours / other
+    low, middle, high = np.percentile(ratios, (25, 50, 75))
+    times = (1e6 * float(np.median(ours)), 1e6 * float(np.median(other)))
+    return Row(what, float(middle), float(high - low) / 2, bar, times)

@@ -1,0 +1,238 @@
+"""A profile's file and text: the way there and back, and the sentence for each mistake."""
+
+import json
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from joda import _core
+from joda.errors import JodaError
+from joda.profile import CHANNELS, Component, Joint, Profile
+
+HINGE = Joint(name="door", type="hinge", range=(-0.5, 1.5), unit="rad")
+
+# --- there and back
+
+labels = st.text(st.characters(exclude_categories=("C",), exclude_characters=";|[")).map(str.strip)
+marks = st.lists(st.floats(0, 1), min_size=2, max_size=6, unique=True).map(sorted)
+
+
+def wide(numbers) -> bool:
+    return all(right - left > 1e-4 for left, right in pairwise(numbers))
+
+
+@st.composite
+def components(draw, values) -> Component:
+    interval = draw(marks.filter(wide))[:2]
+    x = (0.0, *draw(marks.filter(lambda inside: wide([0, *inside, 1]))), 1.0)
+    y = draw(st.lists(values, min_size=len(x), max_size=len(x)))
+    return Component(label=draw(labels), interval=tuple(interval), x=x, y=tuple(y))
+
+
+@st.composite
+def profiles(draw) -> Profile:
+    channels = {}
+    for name in CHANNELS:
+        values = st.floats(-1e15 if name == "conservative" else 0, 1e15)
+        listed = draw(st.lists(components(values), max_size=3))
+        channels[name] = {
+            "combine": draw(st.sampled_from(("sum", "max"))),
+            "components": [component.model_dump() for component in listed],
+        }
+    return Profile.model_validate({"joint": HINGE.model_dump(), "channels": channels})
+
+
+@settings(deadline=None)
+@given(profiles())
+def test_a_profile_survives_the_plugins_attributes(profile):
+    assert Profile.from_attributes(HINGE, profile.attributes()) == profile
+
+
+@settings(deadline=None)
+@given(profiles())
+def test_the_plugin_reads_what_a_profile_writes(profile):
+    for name in CHANNELS:
+        channel = getattr(profile.channels, name)
+        merged = _core.Channel(channel.text(), channel.combine, name != "conservative")
+        ends = {end for component in channel.components for end in component.interval}
+        assert ends <= set(merged.knots)
+
+
+@settings(deadline=None)
+@given(profiles())
+def test_a_profile_survives_its_file(profile):
+    text = profile.to_json()
+    assert Profile.model_validate_json(text) == profile
+    assert json.loads(text) == profile.model_dump(mode="json")
+
+
+# --- mistakes in the file
+
+CONSERVATIVE, FRICTION = "channels.conservative.components.0", "channels.friction.components.0"
+WHERE = "channels.conservative.components[0]"
+REMOVED = object()
+
+MISTAKES = {
+    "colour: unknown key; remove it or mend its spelling.": {"colour": 1},
+    f"{WHERE}.Y: unknown key; remove it or mend its spelling.": {f"{CONSERVATIVE}.Y": [1, 2]},
+    "joint: missing; add it.": {"joint": REMOVED},
+    f"{WHERE}.y: missing; add it.": {f"{CONSERVATIVE}.y": REMOVED},
+    f"{WHERE}.y[1]: must be a finite number.": {f"{CONSERVATIVE}.y": [1, float("nan")]},
+    f"{WHERE}.y[0]: must be a number, not 'one'.": {f"{CONSERVATIVE}.y": ["one", 1]},
+    f"{WHERE}: y must lie between -1e15 and 1e15.": {f"{CONSERVATIVE}.y": [1, -2e15]},
+    f"{WHERE}: x has 2 numbers and y has 3; they must be equally many.": {
+        f"{CONSERVATIVE}.y": [1, 2, 3]
+    },
+    f"{WHERE}: at least two control points are needed.": {f"{CONSERVATIVE}.x": [0]},
+    f"{WHERE}: x must begin at 0 and end at 1.": {f"{CONSERVATIVE}.x": [0, 0.9]},
+    f"{WHERE}: x must increase, by at least 1e-9 of the joint's range.": {
+        f"{CONSERVATIVE}.x": [0, 0.5, 0.5, 1],
+        f"{CONSERVATIVE}.y": [0, 0, 0, 0],
+    },
+    f"{WHERE}: interval must satisfy 0 <= a < b <= 1, in normalised joint position.": {
+        f"{CONSERVATIVE}.interval": [0.5, 1.5]
+    },
+    f"{WHERE}: interval is narrower than 1e-9 of the range.": {
+        f"{CONSERVATIVE}.interval": [0.5, 0.50000000001]
+    },
+    f"{WHERE}.interval: must have 2 numbers, not 3.": {f"{CONSERVATIVE}.interval": [0, 0.5, 1]},
+    f"{WHERE}.label: must not hold ';', '|' or line breaks.": {f"{CONSERVATIVE}.label": "a;b"},
+    "channels.friction: components[0].y is negative; friction and damping must not be.": {
+        f"{FRICTION}.y": [-1, 1]
+    },
+    "channels.friction.combine: must be 'sum' or 'max'.": {"channels.friction.combine": "min"},
+    "joint: unit must be rad for a hinge and m for a slide.": {"joint.unit": "m"},
+    "joint.unit: must be 'rad' or 'm'.": {"joint.unit": "deg"},
+    "joint: range must be two increasing numbers.": {"joint.range": [1, 1]},
+    "schema_version: this version of joda reads schema_version 1, the file has 2.": {
+        "schema_version": 2
+    },
+    "effects: effects beyond the three channels are not supported by this version; "
+    "leave it empty.": {"effects": [{}]},
+}
+
+
+def document(edits: dict) -> str:
+    """A valid composed.json after the edits, dotted key to value."""
+    component = {"label": "latch", "interval": [0, 1], "x": [0, 1], "y": [1, 2]}
+    channels = {
+        name: {"combine": "sum", "components": [dict(component)]}
+        for name in ("conservative", "friction")
+    }
+    out = {"schema_version": 1, "joint": HINGE.model_dump(mode="json"), "channels": channels}
+    for key, value in edits.items():
+        *folders, last = (int(part) if part.isdigit() else part for part in key.split("."))
+        place = out
+        for folder in folders:
+            place = place[folder]
+        if value is REMOVED:
+            del place[last]
+        else:
+            place[last] = value
+    return json.dumps(out)
+
+
+def read_error(path) -> str:
+    with pytest.raises(JodaError) as caught:
+        Profile.read(path)
+    return str(caught.value)
+
+
+def test_a_valid_file_is_read(tmp_path):
+    path = tmp_path / "composed.json"
+    path.write_text(document({}))
+    assert Profile.read(path).channels.friction.components[0].label == "latch"
+
+
+@pytest.mark.parametrize(("sentence", "edits"), MISTAKES.items())
+def test_each_mistake_in_a_file_has_its_sentence(tmp_path, sentence, edits):
+    path = tmp_path / "composed.json"
+    path.write_text(document(edits))
+    assert read_error(path) == f"{path}: {sentence}"
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"{joint: 1}", "not JSON (key must be a string at line 1 column 2)."),
+        (b"", "not JSON (EOF while parsing a value at line 1 column 0)."),
+        (b"[]", "must be an object."),
+        (b'{"a": "\xff"}', "not a UTF-8 text file (byte 7)."),
+    ],
+)
+def test_what_is_no_json_document_has_its_sentence(tmp_path, content, sentence):
+    path = tmp_path / "composed.json"
+    path.write_bytes(content)
+    assert read_error(path) == f"{path}: {sentence}"
+
+
+def test_a_missing_file_has_its_sentence(tmp_path):
+    path = tmp_path / "composed.json"
+    assert read_error(path) == f"{path}: cannot be read (No such file or directory)."
+
+
+# --- mistakes in the plugin's attributes: the reader in Python, then the plugin's own
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("0 1", 'conservative: expected "label: a b | x ... | y ...", got "0 1".'),
+        ("0 | 0 1 | 1 1", f"{WHERE}.interval[1]: missing; add it."),
+        ("0 1 | 0 1 | 1 one", f"{WHERE}.y[1]: must be a number, not 'one'."),
+        ("0 1 | 0 1 | 1 nan", f"{WHERE}.y[1]: must be a finite number."),
+    ],
+)
+def test_each_mistake_in_attributes_has_its_sentence(text, sentence):
+    with pytest.raises(JodaError) as caught:
+        Profile.from_attributes(HINGE, {"conservative": text})
+    assert str(caught.value) == f"joint 'door': {sentence}"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            "a: 0 1 | 0 1",
+            'component 1 "a": expected "label: a b | x ... | y ...", got "a: 0 1 | 0 1"',
+        ),
+        (
+            "é" * 30,
+            f'component 1: expected "label: a b | x ... | y ...", got "{"é" * 20}..."',
+        ),
+        (
+            "0 | 0 1 | 1 1",
+            "component 1: expected the two numbers of the interval before the first |",
+        ),
+        ("0 1 | 0 1 | 1 1; b: 0 1 | 0 1 | 1 one", 'component 2 "b": "one" is not a finite number'),
+        ("0 1 | 0 1 | 1 nan", 'component 1: "nan" is not a finite number'),
+        (
+            "0.5 1.5 | 0 1 | 1 1",
+            "component 1: the interval must satisfy 0 <= a < b <= 1, in normalised joint position",
+        ),
+        (
+            "0.5 0.50000000001 | 0 1 | 1 1",
+            "component 1: the interval is narrower than 1e-9 of the range",
+        ),
+        ("0 1 | 0 | 1", "component 1: at least two control points are needed"),
+        ("0 1 | 0 1 | 1", "component 1: x has 2 numbers and y has 1; they must be equally many"),
+        ("0 1 | 0 0.9 | 1 1", "component 1: x must begin at 0 and end at 1"),
+        (
+            "0 1 | 0 0.5 0.5 1 | 1 1 1 1",
+            "component 1: x must increase, by at least 1e-9 of the joint's range",
+        ),
+        ("0 1 | 0 1 | 1 2e15", "component 1: y must lie between -1e15 and 1e15"),
+        ("0 1 | 0 1 | 1 -1", "component 1: values of friction and damping must not be negative"),
+    ],
+)
+def test_each_mistake_has_its_sentence_in_the_plugin(text, sentence):
+    with pytest.raises(ValueError) as caught:
+        _core.Channel(text, nonnegative=True)
+    assert str(caught.value) == sentence
+
+
+def test_the_plugin_combines_by_sum_or_max():
+    with pytest.raises(ValueError, match=r'^must be "sum" or "max", got "min"$'):
+        _core.Channel("", "min")
