@@ -121,7 +121,7 @@ Profile ParseProfile(const std::string& prefix, double lo, double hi, const char
   const char* const* keys = kKeys.data() + 1;
   Profile profile;
   profile.lo = lo;
-  profile.hi = hi;
+  profile.per_range = 1 / (hi - lo);
   profile.conservative = ParseNamed(prefix, keys, texts, false);
   profile.friction = ParseNamed(prefix, keys + 2, texts + 2, true);
   profile.damping = ParseNamed(prefix, keys + 4, texts + 4, true);

@@ -18,7 +18,8 @@ namespace joda {
 
 // The three channels of one joint.
 struct Profile {
-  double lo = 0, hi = 1;        // joint position at s = 0 and s = 1 (rad or m)
+  double lo = 0;                // joint position at s = 0 (rad or m)
+  double per_range = 1;         // ds/dq = 1 / (position at s = 1 - lo)
   PiecewiseCubic conservative;  // N m or N
   PiecewiseCubic friction;      // N m or N
   PiecewiseCubic damping;       // N m s/rad or N s/m

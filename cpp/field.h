@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -148,6 +149,7 @@ class PiecewiseCubic {
     c_.resize(4, n);
     for (Eigen::Index k = 0; k < n; ++k) c_.col(k) = cubics[k];
     at_knots_.reserve(n + 1);
+    FillBuckets();
     for (const double s : knots) at_knots_.push_back(AtKnot(locals, combine, s));
     for (Eigen::Index k = 0; k < n; ++k) max_descent_ = std::max(max_descent_, Descent(k));
   }
@@ -158,7 +160,7 @@ class PiecewiseCubic {
     if (n == 0) return {};
     const bool beyond = s < 0 || s > 1;
     s = std::clamp(s, 0.0, 1.0);
-    if (s < knots_[0] || s > knots_[n]) return {};
+    if (!(knots_[0] <= s && s <= knots_[n])) return {};  // also where s is not a number
     const Eigen::Index k = Piece(s);
     Sample out = s == knots_[k] ? at_knots_[k] : internal::Cubic(c_.col(k), s - knots_[k]);
     if (beyond) out.slope = 0;
@@ -184,14 +186,23 @@ class PiecewiseCubic {
   const Eigen::Matrix4Xd& coefficients() const { return c_; }
 
  private:
-  // Index of the last knot at or before s, for s within the knots.
+  static constexpr size_t kBuckets = 32;
+
+  // Index of the last knot at or before s, for s within the knots: from the bucket of s onwards.
   Eigen::Index Piece(double s) const {
-    Eigen::Index lo = 0, hi = c_.cols() + 1;
-    while (hi - lo > 1) {
-      const Eigen::Index mid = (lo + hi) / 2;
-      (knots_[mid] <= s ? lo : hi) = mid;
+    Eigen::Index k = buckets_[static_cast<size_t>(s * kBuckets)];
+    while (k < c_.cols() && knots_[k + 1] <= s) ++k;
+    return k;
+  }
+
+  // First guesses for Piece: the last knot at or before the left edge of each bucket of [0, 1].
+  void FillBuckets() {
+    Eigen::Index k = 0;
+    for (size_t i = 0; i <= kBuckets; ++i) {
+      const double s = static_cast<double>(i) / kBuckets;
+      while (k < c_.cols() && knots_[k + 1] <= s) ++k;
+      buckets_[i] = static_cast<int>(k);
     }
-    return lo;
   }
 
   // Largest -dF/ds on piece k (or 0): a parabola, so at an end or at its vertex.
@@ -251,6 +262,7 @@ class PiecewiseCubic {
 
   Eigen::VectorXd knots_;         // n + 1, increasing
   Eigen::Matrix4Xd c_;            // coefficients about the left knot of each piece
+  std::array<int, kBuckets + 1> buckets_{};
   std::vector<Sample> at_knots_;  // exact values at the knots, where closed intervals may meet
   double max_descent_ = 0;
 };

@@ -42,37 +42,44 @@ int CountPositive(const mjtNum* values, int n) {
 // Row among [first, last) of this step's constraints that belongs to the object, -1: none. Rows
 // come in the order of their objects. `expected` is tried first, then bisection.
 int FindRow(const mjData* d, int first, int last, int expected, int type, int id) {
-  const auto at = [d](int row) { return std::make_pair(d->efc_type[row], d->efc_id[row]); };
-  const auto wanted = std::make_pair(type, id);
-  if (first + expected < last && at(first + expected) == wanted) return first + expected;
-  int lo = first, hi = last;
+  int lo = first, hi = last, row = first + expected;
+  if (row >= last) row = (lo + hi) / 2;
   while (lo < hi) {
-    const int mid = (lo + hi) / 2;
-    if (at(mid) < wanted) {
-      lo = mid + 1;
-    } else {
-      hi = mid;
-    }
+    if (d->efc_type[row] == type && d->efc_id[row] == id) return row;
+    const bool before = d->efc_type[row] < type || (d->efc_type[row] == type && d->efc_id[row] < id);
+    (before ? lo : hi) = before ? row + 1 : row;
+    row = (lo + hi) / 2;
   }
-  return lo < last && at(lo) == wanted ? lo : -1;
+  return -1;
 }
 
-int FindFrictionRow(const mjData* d, int expected, int dof) {
-  return FindRow(d, d->ne, d->ne + d->nf, expected, mjCNSTR_FRICTION_DOF, dof);
-}
+// What of the step is the same for all joints.
+struct Step {
+  double h, per_h;
+  bool spring, damper, friction;  // not disabled
+  bool keeps_rows;                // the solver will use the rows as they are set here
+  bool dual, sparse;
 
-int FindDampingRow(const mjData* d, int equality) {
-  if (equality < 0) return -1;
-  return FindRow(d, 0, d->ne, equality, mjCNSTR_EQUALITY, equality);
-}
+  explicit Step(const mjModel* m)
+      : h(m->opt.timestep),
+        per_h(1 / h),
+        spring(!(m->opt.disableflags & mjDSBL_SPRING)),
+        damper(!(m->opt.disableflags & mjDSBL_DAMPER)),
+        friction(!(m->opt.disableflags & mjDSBL_FRICTIONLOSS)),
+        // the discrete integrator makes the rows anew behind the plugin, and noslip drops the
+        // compliance of friction rows
+        keeps_rows(m->opt.integrator != mjINT_DISCRETE && m->opt.noslip_iterations == 0),
+        dual(m->opt.solver == mjSOL_PGS || m->opt.noslip_iterations > 0),
+        sparse(dual && mj_isSparse(m)) {}
+};
 
 // Makes the row resist the velocity at the end of the step: force = offset - D (a + v / h), within
 // +-bound.
-void SetRow(const mjModel* m, mjData* d, int row, double stiffness, double bound, double offset) {
-  const double D = std::max(stiffness, mjMINVAL), R = 1 / D;
-  if (mj_isDual(m)) {  // the dual solvers see R on the diagonal of A + R
+void SetRow(const Step& step, mjData* d, int row, double D, double bound, double offset) {
+  const double R = 1 / D;
+  if (step.dual) {  // the dual solvers see R on the diagonal of A + R
     mjtNum* diagonal = d->efc_AR + static_cast<std::ptrdiff_t>(row) * (d->nefc + 1);
-    if (mj_isSparse(m)) {
+    if (step.sparse) {
       const int* colind = d->efc_AR_colind + d->efc_AR_rowadr[row];
       const int* found = std::find(colind, colind + d->efc_AR_rownnz[row], row);
       diagonal = d->efc_AR + (found - d->efc_AR_colind);
@@ -86,7 +93,7 @@ void SetRow(const mjModel* m, mjData* d, int row, double stiffness, double bound
   d->efc_pos[row] = -offset * R;
   mjtNum* KBIP = d->efc_KBIP + 4 * row;
   KBIP[0] = 1;
-  KBIP[1] = 1 / m->opt.timestep;
+  KBIP[1] = step.per_h;
   KBIP[2] = 1;
   if (d->nisland > 0) {
     const int i = d->map_efc2iefc[row];
@@ -100,25 +107,27 @@ void SetRow(const mjModel* m, mjData* d, int row, double stiffness, double bound
 // kExplicitStiffness at the steepest place that the joint may reach within this step, or would move
 // it by more than a fraction of its range (kStride).
 double ImplicitStiffness(const Profile& p, double s, double v, double force, double h,
-                         double inverse_inertia) {
-  const double per_range = 1 / (p.hi - p.lo);
-  const double mobility = h * h * inverse_inertia;  // displacement in a step, per force
-  const double soft = kExplicitStiffness / mobility;
-  double stiffness = std::abs(force) * per_range / kStride;
-  if (p.conservative.MaxDescent() * per_range > soft) {
-    const double reach = (h * std::abs(v) + mobility * std::abs(force)) * per_range;
-    stiffness = std::max(stiffness, p.conservative.MaxDescent(s - reach, s + reach) * per_range);
+                         double inertia) {
+  const double soft = kExplicitStiffness * inertia / (h * h);
+  double stiffness = std::abs(force) * p.per_range / kStride;
+  if (p.conservative.MaxDescent() * p.per_range > soft) {
+    const double reach = (h * std::abs(v) + h * h / inertia * std::abs(force)) * p.per_range;
+    stiffness = std::max(stiffness, p.conservative.MaxDescent(s - reach, s + reach) * p.per_range);
   }
   return std::max(0.0, stiffness - soft);
 }
 
-// Whether the solver uses the damping row as it is set here: the discrete integrator makes the rows
-// anew behind the plugin, and noslip drops their compliance, which would lock the joint.
-bool KeepsRows(const mjModel* m) {
-  return m->opt.integrator != mjINT_DISCRETE && m->opt.noslip_iterations == 0;
+}  // namespace
+
+int JointDynamics::FindFrictionRow(const mjData* d, const Joint& joint) {
+  const int last = d->ne + d->nf;
+  return FindRow(d, d->ne, last, joint.friction_row, mjCNSTR_FRICTION_DOF, joint.dof);
 }
 
-}  // namespace
+int JointDynamics::FindDampingRow(const mjData* d, const Joint& joint) {
+  const int id = joint.equality;
+  return id < 0 ? -1 : FindRow(d, 0, d->ne, id, mjCNSTR_EQUALITY, id);
+}
 
 JointDynamics::JointDynamics(const mjModel* m, int instance) {
   for (JointConfig& config : ReadConfig(m, instance)) {
@@ -146,9 +155,46 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
 }
 
 void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) const {
+  const Step step(m);
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   for (size_t k = 0; k < joints_.size(); ++k) {
-    if (d->body_awake[joints_[k].body] != mjS_ASLEEP) ComputeJoint(m, d, joints_[k], state + k);
+    const Joint& joint = joints_[k];
+    if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
+    const Profile& p = joint.profile;
+    const double h = step.h, inertia = 1 / m->dof_invweight0[joint.dof], v = d->qvel[joint.dof];
+    const double s = (d->qpos[joint.qpos] - p.lo) * p.per_range;
+
+    double force = 0, stiffness = 0, drag = 0, friction = 0;
+    if (step.spring) {
+      force = p.conservative(s).value;
+      stiffness = ImplicitStiffness(p, s, v, force, h, inertia);
+      drag = h * stiffness;
+    }
+    if (step.damper) drag += p.damping(s).value;
+    if (step.friction) friction = p.friction(s).value;
+
+    const int friction_row = FindFrictionRow(d, joint);
+    if (friction_row >= 0) {
+      friction += m->dof_frictionloss[joint.dof];
+      const double held = step.keeps_rows ? std::clamp(state[k], -friction, friction) : 0;
+      SetRow(step, d, friction_row, kStiffRow * inertia, friction, held);
+      friction = 0;
+    }
+    const int damping_row = step.keeps_rows ? FindDampingRow(d, joint) : -1;
+    if (damping_row >= 0) {
+      SetRow(step, d, damping_row, std::max(h * drag, mjMINVAL), 0, 0);
+      drag = 0;
+    } else {
+      force /= 1 + h * h * stiffness / inertia;
+    }
+
+    // what has no row becomes a force that at most stops the joint within the step
+    if (friction > 0 || drag > 0) {
+      const double stop = inertia * std::abs(v) / h;
+      const double resistance = friction + drag * std::abs(v) / (1 + h * drag / inertia);
+      force -= std::copysign(std::min(resistance, stop), v);
+    }
+    d->qfrc_passive[joint.dof] += force;
   }
 }
 
@@ -157,51 +203,9 @@ void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
   for (size_t k = 0; k < joints_.size(); ++k) {
     const Joint& joint = joints_[k];
     if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
-    const int row = FindFrictionRow(d, joint.friction_row, joint.dof);
+    const int row = FindFrictionRow(d, joint);
     state[k] = row < 0 ? 0 : d->efc_force[row];
   }
-}
-
-void JointDynamics::ComputeJoint(const mjModel* m, mjData* d, const Joint& joint,
-                                 const mjtNum* state) {
-  const Profile& p = joint.profile;
-  const double h = m->opt.timestep, v = d->qvel[joint.dof];
-  const double s = (d->qpos[joint.qpos] - p.lo) / (p.hi - p.lo);
-  const double inverse_inertia = m->dof_invweight0[joint.dof];
-
-  double force = 0, stiffness = 0, damping = 0;
-  if (!(m->opt.disableflags & mjDSBL_SPRING)) {
-    force = p.conservative(s).value;
-    stiffness = ImplicitStiffness(p, s, v, force, h, inverse_inertia);
-  }
-  if (!(m->opt.disableflags & mjDSBL_DAMPER)) damping = p.damping(s).value;
-  double drag = damping + h * stiffness;
-  double friction = p.friction(s).value;
-
-  const int friction_row = FindFrictionRow(d, joint.friction_row, joint.dof);
-  if (friction_row >= 0) {
-    friction += m->dof_frictionloss[joint.dof];
-    const double held = KeepsRows(m) ? std::clamp(*state, -friction, friction) : 0;
-    SetRow(m, d, friction_row, kStiffRow / inverse_inertia, friction, held);
-    friction = 0;
-  } else if (m->opt.disableflags & mjDSBL_FRICTIONLOSS) {
-    friction = 0;
-  }
-  const int damping_row = KeepsRows(m) ? FindDampingRow(d, joint.equality) : -1;
-  if (damping_row >= 0) {
-    SetRow(m, d, damping_row, h * drag, 0, 0);
-    drag = 0;
-  } else {
-    force /= 1 + h * h * stiffness * inverse_inertia;
-  }
-
-  // what has no row becomes a force that at most stops the joint within the step
-  if (friction > 0 || drag > 0) {
-    const double stop = std::abs(v) / (h * inverse_inertia);
-    const double resistance = friction + drag * std::abs(v) / (1 + h * drag * inverse_inertia);
-    force -= std::copysign(std::min(resistance, stop), v);
-  }
-  d->qfrc_passive[joint.dof] += force;
 }
 
 void JointDynamics::Register() {

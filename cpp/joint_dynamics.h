@@ -44,7 +44,9 @@ class JointDynamics {
     Profile profile;
   };
 
-  static void ComputeJoint(const mjModel* m, mjData* d, const Joint& joint, const mjtNum* state);
+  // Rows of this step's constraints, -1: none.
+  static int FindFrictionRow(const mjData* d, const Joint& joint);
+  static int FindDampingRow(const mjData* d, const Joint& joint);
 
   std::vector<Joint> joints_;
 };

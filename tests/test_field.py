@@ -96,6 +96,13 @@ def test_implementations_agree_on_random_combinations(combine):
         assert_close(slope_cpp[smooth], slope[smooth], scale=np.abs(slope).max())
 
 
+def test_a_position_that_is_not_a_number_is_covered_by_nothing():
+    channel = Channel(components=(Component(interval=(0, 1), x=(0, 1), y=(1, 3)),))
+    for value, slope in both(channel, [np.nan, np.inf]):
+        np.testing.assert_array_equal(value, [0, 3])
+        np.testing.assert_array_equal(slope, [0, 0])
+
+
 # --- what PCHIP promises
 
 marks = st.lists(st.integers(0, 100), min_size=2, max_size=7, unique=True).map(sorted)

@@ -2,7 +2,8 @@
 
 Per joint that is: a named plugin instance with the profile's numbers, a reference to it in the body
 that the joint moves, a trace of `frictionloss` (it makes the solver row that carries the dry
-friction), and a fixed tendon along the joint (its friction row carries the damping).
+friction), and an equality
+constraint on the joint, inert by itself (the plugin makes its row the damping).
 """
 
 import os
@@ -24,6 +25,9 @@ from joda.scene import plugin_name, prefix
 
 TRACE = "1e-12"
 """A frictionloss (N or N·m) that makes a solver row and is otherwise nothing."""
+
+INERT = 'solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
+"""Makes an equality constraint that does nothing until the plugin sets its row."""
 
 DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
 """Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
@@ -131,11 +135,12 @@ class _Scene:
             if config.pop(front + key, None) and key == "range":
                 self.notes.append(f"{label} carried a profile already; the new one replaces it.")
         config |= {front + key: text for key, text in profile.attributes().items()}
-        if self.spec.tendon(self._tendon(joint)) is None:
-            name = quoteattr(self.names.get(joint, self.model.joint(joint).name))
+        own_name = self.names.get(joint, self.model.joint(joint).name)
+        row = f"joda_damping_{own_name}"
+        if self.spec.equality(row) is None:
             self.source.root.insert_last(
-                f'<tendon>\n  <fixed name={quoteattr(self._tendon(joint))} frictionloss="{TRACE}">\n'
-                f'    <joint joint={name} coef="1"/>\n  </fixed>\n</tendon>'
+                f"<equality>\n  <joint name={quoteattr(row)} joint1={quoteattr(own_name)} "
+                f"{INERT}/>\n</equality>"
             )
 
     def finish(self) -> bytes:
@@ -235,9 +240,6 @@ class _Scene:
             f"({hint.elasticity} elasticity; MuJoCo has one value for both ends)."
         )
         return {"solreflimit": f"{time if time > 0 else 0.02:g} {ratio:g}"}
-
-    def _tendon(self, joint: int) -> str:
-        return f"joda_damping_{self.names.get(joint, self.model.joint(joint).name)}"
 
     def _new_name(self, joint: int) -> str:
         body = self.model.body(self.model.jnt_bodyid[joint]).name or "unnamed"

@@ -20,6 +20,8 @@ from joda.profile import Channel, Channels, Component, Joint, Profile, Resistanc
 from joda.scene import read_profiles
 
 ROUNDS = 31
+SWING = 100  # steps; all joints move meanwhile
+FULL = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 @dataclass(frozen=True)
@@ -180,31 +182,38 @@ def _without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> m
 
 def _measure(models: list[tuple[mujoco.MjModel, Any]]) -> np.ndarray:
     """Seconds per step, shape (models, rounds): free swings from the middle of the range."""
-    steps = [_steps(model, callback) for model, callback in models]
+    repeats = [_repeats(model, callback) for model, callback in models]
     times = np.empty((len(models), ROUNDS))
     for k in range(ROUNDS):
         for i, (model, callback) in enumerate(models):
-            times[i, k] = _time(model, callback, steps[i])
+            times[i, k] = _time(model, callback, repeats[i])
     return times
 
 
-def _steps(model: mujoco.MjModel, callback: Any) -> int:
-    """How many steps take about 20 ms."""
-    return max(50, int(50 * 0.02 / (50 * _time(model, callback, 50))))
+def _repeats(model: mujoco.MjModel, callback: Any) -> int:
+    """How many swings take about 20 ms."""
+    return max(1, int(0.02 / (SWING * _time(model, callback, 1))))
 
 
-def _time(model: mujoco.MjModel, callback: Any, steps: int) -> float:
+def _time(model: mujoco.MjModel, callback: Any, repeats: int) -> float:
+    """Seconds per step of short swings through the middle of the joints' ranges."""
     data = mujoco.MjData(model)
     limited = np.asarray(model.jnt_limited, bool) & (np.asarray(model.jnt_type) >= 2)
     data.qpos[model.jnt_qposadr[limited]] = model.jnt_range[limited].mean(axis=1)
     data.qvel[:] = 0.5
+    start = np.empty(mujoco.mj_stateSize(model, FULL))
+    mujoco.mj_getState(model, data, start, FULL)
     mujoco.set_mjcb_passive(callback)
+    seconds = 0.0
     try:
-        start = time.perf_counter()
-        mujoco.mj_step(model, data, steps)
-        return (time.perf_counter() - start) / steps
+        for _ in range(repeats):
+            mujoco.mj_setState(model, data, start, FULL)
+            begin = time.perf_counter()
+            mujoco.mj_step(model, data, SWING)
+            seconds += time.perf_counter() - begin
     finally:
         mujoco.set_mjcb_passive(None)
+    return seconds / (repeats * SWING)
 
 
 def _row(what: str, ours: np.ndarray, other: np.ndarray, bar: str) -> Row:

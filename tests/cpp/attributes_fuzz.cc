@@ -102,7 +102,7 @@ std::string Text(Random& random) {
 
 // Places where the channel may go wrong: all over, at its knots and right beside them.
 std::vector<double> Places(Random& random, const Eigen::VectorXd& knots) {
-  std::vector<double> out = {-1, 0, 1, 2};
+  std::vector<double> out = {-1, 0, 1, 2, NAN, INFINITY};
   for (int k = 0; k < 30; ++k) out.push_back(3 * Uniform(random) - 1);
   for (Eigen::Index k = 0; k < knots.size(); ++k) {
     for (const double to : {-1.0, 2.0}) out.push_back(std::nextafter(knots[k], to));

@@ -128,6 +128,22 @@ TEST_CASE("beyond the range the end's value is held, with slope 0") {
   CHECK(line(7).slope == 0);
 }
 
+TEST_CASE("no component covers a position that is not a number") {
+  const PiecewiseCubic line({Line(0, 1, 1, 3)}, Combine::kSum);
+  CHECK(line(std::nan("")).value == 0);
+  CHECK(line(INFINITY).value == 3);
+  CHECK(line.MaxDescent(std::nan(""), std::nan("")) == 0);
+}
+
+TEST_CASE("all three crossings of two cubics are found") {
+  // 100 (t - 0.1) (t - 0.5) (t - 0.6)
+  const auto roots = internal::Roots(100 * Eigen::Vector4d(-0.03, 0.41, -1.2, 1), 1);
+  REQUIRE(roots.size() == 3);
+  CHECK(roots[0] == doctest::Approx(0.1).epsilon(1e-12));
+  CHECK(roots[1] == doctest::Approx(0.5).epsilon(1e-12));
+  CHECK(roots[2] == doctest::Approx(0.6).epsilon(1e-12));
+}
+
 TEST_CASE("the largest descent is met at the vertex of a cubic's slope") {
   // the smooth step from 1 to 0 has its steepest slope, -1.5, in the middle
   const Component step = {"", 0, 1, Eigen::Vector4d(0, 0.25, 0.75, 1), Eigen::Vector4d(1, 1, 0, 0)};
