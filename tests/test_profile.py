@@ -1,7 +1,7 @@
 """A profile's file and text: the way there and back, and the sentence for each mistake."""
 
 import json
-from itertools import pairwise
+from itertools import accumulate
 
 import pytest
 from hypothesis import given, settings
@@ -16,19 +16,20 @@ HINGE = Joint(name="door", type="hinge", range=(-0.5, 1.5), unit="rad")
 # --- there and back
 
 labels = st.text(st.characters(exclude_categories=("C",), exclude_characters=";|[")).map(str.strip)
-marks = st.lists(st.floats(0, 1), min_size=2, max_size=6, unique=True).map(sorted)
+gaps = st.lists(st.floats(0.01, 1), min_size=1, max_size=6)
 
 
-def wide(numbers) -> bool:
-    return all(right - left > 1e-4 for left, right in pairwise(numbers))
+def places(gaps) -> tuple:
+    """Increasing numbers from 0 to 1 with gaps in these proportions."""
+    return (*(part / sum(gaps) for part in accumulate(gaps[:-1], initial=0)), 1)
 
 
 @st.composite
 def components(draw, values) -> Component:
-    interval = draw(marks.filter(wide))[:2]
-    x = (0.0, *draw(marks.filter(lambda inside: wide([0, *inside, 1]))), 1.0)
+    a, b = places([1, *draw(gaps), 1])[1:3]
+    x = places(draw(gaps))
     y = draw(st.lists(values, min_size=len(x), max_size=len(x)))
-    return Component(label=draw(labels), interval=tuple(interval), x=x, y=tuple(y))
+    return Component(label=draw(labels), interval=(a, b), x=x, y=tuple(y))
 
 
 @st.composite

@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex, to_rgb
 from scipy.interpolate import PchipInterpolator
 
 from joda.errors import JodaError
-from joda.plot import COLOURS, plot, write_png
+from joda.draw import COLOURS, draw, write_png
 from joda.profile import Channel, Channels, Component, Joint, Profile, Resistance
 
 HINGE = Joint(name="door", type="hinge", range=(-0.5, 1.5), unit="rad")
@@ -52,7 +52,7 @@ def texts(axes):
 
 
 def test_red_curve_is_the_conservative_torque():
-    force = plot(profile()).axes[0]
+    force = draw(profile()).axes[0]
     q, value, line = curve(force, "conservative torque")
     s = (q + 0.5) / 2
     away = (np.abs(s - 0.25) > 1e-9) & (np.abs(s - 0.75) > 1e-9)
@@ -63,7 +63,7 @@ def test_red_curve_is_the_conservative_torque():
 
 
 def test_jumps_at_the_ends_of_a_component_are_upright():
-    q, value, _ = curve(plot(profile(joint=SLIDE)).axes[0], "conservative force")
+    q, value, _ = curve(draw(profile(joint=SLIDE)).axes[0], "conservative force")
     for edge, before, after in ((0.25, 0.0, 0.5), (0.75, 0.25, 0.0)):
         assert value[q < edge][-1] == pytest.approx(before, abs=1e-9)
         assert value[q > edge][0] == pytest.approx(after, abs=1e-9)
@@ -73,26 +73,26 @@ def test_jumps_at_the_ends_of_a_component_are_upright():
 def test_components_that_touch_do_not_spike_where_they_meet():
     left = Component(interval=(0, 0.5), x=(0, 1), y=(1, 1))
     right = Component(interval=(0.5, 1), x=(0, 1), y=(1, 1))
-    _, value, _ = curve(plot(profile(conservative=(left, right))).axes[0], "conservative")
+    _, value, _ = curve(draw(profile(conservative=(left, right))).axes[0], "conservative")
     assert set(value) == {1.0}
 
 
 def test_a_component_of_a_millionth_of_the_range_is_drawn():
     peak = Component(interval=(0.5, 0.500001), x=(0, 0.5, 1), y=(0, 3, 0))
-    _, value, _ = curve(plot(profile(conservative=(peak,))).axes[0], "conservative")
+    _, value, _ = curve(draw(profile(conservative=(peak,))).axes[0], "conservative")
     assert value.max() == pytest.approx(3)
 
 
 def test_the_maximum_of_a_channel_is_drawn_where_it_combines_by_maximum():
     other = Component(interval=(0, 1), x=(0, 1), y=(0.75, 0.75))
-    figure = plot(profile(conservative=(LATCH, other), combine="max", joint=SLIDE))
+    figure = draw(profile(conservative=(LATCH, other), combine="max", joint=SLIDE))
     q, value, _ = curve(figure.axes[0], "conservative")
     np.testing.assert_allclose(value, np.maximum(latch(q), 0.75), atol=1e-12)
     assert "conservative\n(max)" in texts(figure.axes[1])
 
 
 def test_band_is_the_force_plus_and_minus_dry_friction():
-    force = plot(profile(joint=SLIDE)).axes[0]
+    force = draw(profile(joint=SLIDE)).axes[0]
     (band,) = [c for c in force.collections if isinstance(c, PolyCollection)]
     edge = band.get_paths()[0].vertices
     for s in (0.1, 0.3, 0.5, 0.65, 0.9):
@@ -110,7 +110,7 @@ def test_band_is_the_force_plus_and_minus_dry_friction():
 def test_gravity_is_the_blue_dashed_line_and_inside_the_panel():
     q = np.linspace(-0.5, 1.5, 7)
     balance = 40 * np.cos(q)
-    force = plot(profile(), gravity=(q, balance)).axes[0]
+    force = draw(profile(), gravity=(q, balance)).axes[0]
     x, y, line = curve(force, "gravity equilibrium")
     np.testing.assert_array_equal(x, q)
     np.testing.assert_array_equal(y, balance)
@@ -121,20 +121,20 @@ def test_gravity_is_the_blue_dashed_line_and_inside_the_panel():
 
 
 def test_no_gravity_line_and_no_band_unless_there_is_one():
-    force = plot(profile(friction=())).axes[0]
+    force = draw(profile(friction=())).axes[0]
     assert force.get_legend_handles_labels()[1] == ["conservative torque"]
     assert not force.collections
 
 
 def test_damping_has_its_own_panel():
-    damping = plot(profile()).axes[2]
+    damping = draw(profile()).axes[2]
     q, value, _ = curve(damping, "damping")
     expected = PchipInterpolator(GREASE.x, GREASE.y)((q + 0.5) / 2)
     np.testing.assert_allclose(value, expected, atol=1e-12)
 
 
 def test_second_axis_runs_from_0_to_1_over_the_range():
-    figure = plot(profile())
+    figure = draw(profile())
     figure.canvas.draw()
     force = figure.axes[0]
     (top,) = force.child_axes
@@ -153,7 +153,7 @@ def test_second_axis_runs_from_0_to_1_over_the_range():
     ],
 )
 def test_axes_name_quantity_and_unit(joint, labels):
-    force, _, damping = plot(profile(joint=joint)).axes
+    force, _, damping = draw(profile(joint=joint)).axes
     assert [force.get_ylabel(), damping.get_ylabel(), damping.get_xlabel()] == labels
 
 
@@ -170,13 +170,13 @@ def test_axes_name_quantity_and_unit(joint, labels):
 )
 def test_ticks_are_in_the_fitting_multiple_of_the_unit(peak, unit, number):
     flat = Component(interval=(0, 1), x=(0, 1), y=(peak, peak))
-    force = plot(profile(conservative=(flat,), friction=(), joint=SLIDE)).axes[0]
+    force = draw(profile(conservative=(flat,), friction=(), joint=SLIDE)).axes[0]
     assert force.get_ylabel() == f"force\n({unit})"
     assert float(force.yaxis.get_major_formatter()(peak)) == pytest.approx(number)
 
 
 def test_one_bar_per_component_in_its_place_and_its_channel_s_colour():
-    figure = plot(profile())
+    figure = draw(profile())
     bars = figure.axes[1].patches
     places = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars]
     assert places == [(0.0, 1.0), (-0.5, 1.5), (-0.5, 1.5)]
@@ -197,7 +197,7 @@ def test_every_component_has_a_bar_and_every_label_stays_inside_the_strip(count)
         )
         for i in range(count)
     )
-    figure = plot(profile(conservative=(), friction=components, damping=()))
+    figure = draw(profile(conservative=(), friction=components, damping=()))
     figure.canvas.draw()
     strip = figure.axes[1]
     assert len(strip.patches) == count
@@ -216,14 +216,14 @@ def test_every_component_has_a_bar_and_every_label_stays_inside_the_strip(count)
 
 def test_a_picture_of_up_to_12_components_is_1200_by_900():
     for count in (0, 1, 12):
-        figure = plot(profile(conservative=(LATCH,) * count, friction=(), damping=()))
+        figure = draw(profile(conservative=(LATCH,) * count, friction=(), damping=()))
         assert figure.canvas.get_width_height() == (1200, 900)
 
 
 def test_names_are_shown_as_written_and_long_ones_do_not_run_into_the_range():
     name = "cup_board $x_1$ " * 20
     joint = HINGE.model_copy(update={"name": name})
-    figure = plot(profile(joint=joint))
+    figure = draw(profile(joint=joint))
     figure.canvas.draw()
     title, tail = figure.texts
     assert title.get_text().startswith("cup_board $x_1$ cup_board")
@@ -234,7 +234,7 @@ def test_names_are_shown_as_written_and_long_ones_do_not_run_into_the_range():
 
 
 def test_an_empty_profile_says_so():
-    figure = plot(Profile(joint=SLIDE))
+    figure = draw(Profile(joint=SLIDE))
     force, strip, damping = figure.axes
     assert "no conservative force, no dry friction" in texts(force)
     assert texts(strip) == ["no components"]
@@ -246,20 +246,20 @@ def test_an_empty_profile_says_so():
 def test_a_users_matplotlibrc_does_not_change_the_picture(tmp_path):
     import matplotlib
 
-    write_png(plot(profile()), tmp_path / "plain.png")
+    write_png(draw(profile()), tmp_path / "plain.png")
     with matplotlib.rc_context({"text.usetex": True, "lines.linewidth": 9, "font.size": 30}):
-        write_png(plot(profile()), tmp_path / "custom.png")
+        write_png(draw(profile()), tmp_path / "custom.png")
     assert (tmp_path / "plain.png").read_bytes() == (tmp_path / "custom.png").read_bytes()
 
 
 def test_a_script_without_glyphs_is_no_warning(tmp_path):
     joint = HINGE.model_copy(update={"name": "冰箱门"})
-    write_png(plot(profile(joint=joint)), tmp_path / "door.png")
+    write_png(draw(profile(joint=joint)), tmp_path / "door.png")
 
 
 def test_write_png_writes_a_png_of_1200_by_900(tmp_path):
     path = tmp_path / "profile.png"
-    write_png(plot(profile()), path)
+    write_png(draw(profile()), path)
     content = path.read_bytes()
     assert content.startswith(b"\x89PNG\r\n\x1a\n")
     assert [int.from_bytes(content[i : i + 4], "big") for i in (16, 20)] == [1200, 900]
@@ -268,7 +268,7 @@ def test_write_png_writes_a_png_of_1200_by_900(tmp_path):
 def test_write_png_keeps_a_file_that_is_there_already(tmp_path):
     path = tmp_path / "profile.png"
     path.write_bytes(b"mine")
-    figure = plot(profile())
+    figure = draw(profile())
     with pytest.raises(JodaError) as error:
         write_png(figure, path)
     assert str(error.value) == f"{path}: exists already; choose another name or add --force."
@@ -279,9 +279,9 @@ def test_write_png_keeps_a_file_that_is_there_already(tmp_path):
 
 def test_write_png_names_a_folder_that_is_missing(tmp_path):
     with pytest.raises(JodaError, match="does not exist; create it first"):
-        write_png(plot(profile()), tmp_path / "missing" / "profile.png")
+        write_png(draw(profile()), tmp_path / "missing" / "profile.png")
 
 
 def test_importing_joda_and_the_plotter_loads_no_matplotlib():
-    code = "import joda, joda.plot, sys; sys.exit('matplotlib' in sys.modules)"
+    code = "import joda, joda.draw, sys; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
