@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 START = np.deg2rad(3.0)
-DURATION = 2.0
+DURATION = 1.0
 
 
 @dataclass(frozen=True)

@@ -165,8 +165,12 @@ class Profile(_Frozen):
     def to_json(self) -> str:
         """The file's text: indented, each list of numbers on one line."""
         text = json.dumps(self.model_dump(mode="json"), indent=2, ensure_ascii=False)
-        lists = re.compile(r"\[\s*(-?\d[^\[\]{}\"]*?)\s*\]")
-        return lists.sub(lambda match: f"[{' '.join(match[1].split())}]", text) + "\n"
+        strings_or_lists = re.compile(r'"(?:[^"\\]|\\.)*"|\[[^\[\]{}"]*\]')
+
+        def fold(match: re.Match[str]) -> str:
+            return match[0] if match[0][0] == '"' else re.sub(r"\s+", " ", match[0]).replace("[ ", "[").replace(" ]", "]")
+
+        return strings_or_lists.sub(fold, text) + "\n"
 
     def attributes(self) -> dict[str, str]:
         """The plugin's attributes for the joint, key to text; empty channels are left out."""

@@ -1,0 +1,82 @@
+"""One joint with a profile, as small as MuJoCo allows: the physics tests' common ground."""
+
+import mujoco
+import numpy as np
+
+SOLVERS = ("Newton", "CG", "PGS")
+EULER_LIKE = ("Euler", "implicit", "implicitfast")
+
+ROWS = 'solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
+
+
+def flat(value: float, a: float = 0, b: float = 1) -> str:
+    """A component that is constant on [a, b]."""
+    return f"{a!r} {b!r} | 0 1 | {float(value)!r} {float(value)!r}"
+
+
+def component(interval, x, y, label="") -> str:
+    """A component as in the plugin's attributes."""
+    numbers = (" ".join(repr(float(v)) for v in part) for part in (interval, x, y))
+    return (f"{label}: " if label else "") + " | ".join(numbers)
+
+
+def scene(
+    conservative: str = "",
+    friction: str = "",
+    damping: str = "",
+    *,
+    kind: str = "slide",
+    inertia: float = 1.0,
+    limits: tuple[float, float] = (0.0, 1.0),
+    h: float = 0.002,
+    integrator: str = "Euler",
+    solver: str = "Newton",
+    joint: str = 'frictionloss="1e-12"',
+    option: str = 'tolerance="1e-12"',
+    flag: str = "",
+    equality: bool = True,
+    extra: str = "",
+) -> str:
+    """MJCF of a slide (mass) or hinge (inertia) along x, without gravity."""
+    keys = {"conservative": conservative, "friction": friction, "damping": damping}
+    config = "".join(f'<config key="{k}" value="{v}"/>' for k, v in keys.items() if v)
+    body = (
+        f'<inertial pos="0 0 0" mass="{inertia!r}" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>'
+    )
+    row = f'<equality><joint name="joda_damping_j" joint1="j" {ROWS}/></equality>'
+    return f"""
+    <mujoco>
+      <compiler angle="radian" boundmass="0" boundinertia="0"/>
+      <option timestep="{h!r}" integrator="{integrator}" solver="{solver}" gravity="0 0 0" {option}>
+        <flag {flag}/>
+      </option>
+      <extension><plugin plugin="joda.joint_dynamics"><instance name="p">
+        <config key="range" value="{limits[0]!r} {limits[1]!r}"/>{config}
+      </instance></plugin></extension>
+      <worldbody>
+        <body name="b">{body}
+          <joint name="j" type="{kind}" axis="1 0 0" range="{limits[0]!r} {limits[1]!r}" {joint}/>
+          <plugin instance="p"/>
+        </body>
+      </worldbody>
+      {row if equality else ""}
+      {extra}
+    </mujoco>"""
+
+
+def load(*args, **kwargs) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """The scene's model and data, with the joint in the middle of its range."""
+    model = mujoco.MjModel.from_xml_string(scene(*args, **kwargs))
+    data = mujoco.MjData(model)
+    data.qpos[0] = np.mean(model.jnt_range[0])
+    return model, data
+
+
+def run(model: mujoco.MjModel, data: mujoco.MjData, seconds: float) -> None:
+    """Steps for so long."""
+    mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
+
+
+def warnings(data: mujoco.MjData) -> int:
+    """How many warnings the engine has counted."""
+    return sum(int(warning.number) for warning in data.warning)
