@@ -6,28 +6,37 @@ friction), and an equality
 constraint on the joint, inert by itself (the plugin makes its row the damping).
 """
 
+import math
 import os
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 from xml.sax.saxutils import quoteattr
 
 import mujoco
+import numpy as np
 
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes
 from joda.mjcf import Element, MjcfError, Source
-from joda.model import find_joint, joint_name, joint_type, load_model, load_spec, sentence
+from joda.model import find_joint, joint_name, joint_type, load, sentence
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
-from joda.scene import plugin_name, prefix
+from joda.scene import find_instance, prefix
 
 TRACE = "1e-12"
 """A frictionloss (N or N·m) that makes a solver row and is otherwise nothing."""
 
 INERT = 'solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
 """Makes an equality constraint that does nothing until the plugin sets its row."""
+
+SAME = (
+    *("nq", "nu", "nbody", "ngeom", "nsensor", "jnt_type", "jnt_axis", "jnt_pos", "jnt_range"),
+    *("qpos0", "body_mass", "dof_invweight0", "geom_size", "actuator_gainprm"),
+)
+"""What of the model must be the same afterwards."""
 
 DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
 """Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
@@ -68,132 +77,155 @@ def attach(
     if joint is not None and len(loaded) != 1:
         raise JodaError("--joint goes with exactly one profile; each profile names its own joint.")
     check_target(output, force)
-    compiled = load_model(model)
+    spec, compiled = load(model)
     targets = [find_joint(compiled, joint or profile.joint.name) for profile in loaded]
     for target in targets:
         if targets.count(target) > 1:
             raise JodaError(f"joint '{joint_name(compiled, target)}' is given two profiles.")
 
-    scene = _Scene(model, compiled)
+    scene = _Scene(model, spec, compiled, targets)
     for target, profile in zip(targets, loaded, strict=True):
         scene.add(target, profile, native)
-    scene.source.relocate(output.parent)
-    content = scene.finish()
+    content = scene.finish(output.parent)
     _verify(output, content, compiled)
     write_bytes(output, content)
     return scene.notes
 
 
+@dataclass
+class _Instance:
+    """A plugin instance to be written: that of the body of `joint`."""
+
+    joint: int
+    existing: str  # its name if it stands in <extension> already, else empty
+    config: dict[str, str]
+
+
 class _Scene:
     """A model's text that is being given profiles."""
 
-    def __init__(self, path: Path, model: mujoco.MjModel) -> None:
-        self.model = model
+    def __init__(
+        self, path: Path, spec: mujoco.MjSpec, model: mujoco.MjModel, targets: list[int]
+    ) -> None:
+        self.spec, self.model = spec, model
         self.notes: list[str] = []
-        self.spec = load_spec(path)
-        self.source, self.joints = self._open(path)
-        self.configs: dict[int, dict[str, str]] = {}  # body: attributes of its instance
-        self.names: dict[int, str] = {}  # joint: name given to it here
+        self.source, self.joints = self._open(path, targets)
+        self.instances: dict[int, _Instance] = {}  # by body
+        self.rows: list[str] = []  # equalities to add
+        self.names = [model.joint(k).name for k in range(model.njnt)]
 
-    def _open(self, path: Path) -> tuple[Source, list[tuple[Element, Element]]]:
+    def _open(
+        self, path: Path, targets: list[int]
+    ) -> tuple[Source, dict[int, tuple[Element, Element]]]:
         """The text to edit, and its (body, joint) elements by joint id."""
         names = [self.model.joint(k).name for k in range(self.model.njnt)]
         try:
             source = Source(path)
             joints = source.joints()
-            if [element.attributes.get("name", "") for _, element in joints] == names:
-                return source, joints
-            reason = "some of its joints are not in the text"
+            written = [element.attributes.get("name", "") for _, element in joints]
+            found = dict(enumerate(joints))
+            if written != names:  # includes what MuJoCo generates
+                pairs = zip(written, joints, strict=True)
+                found = {names.index(name): pair for name, pair in pairs if name and name in names}
+            lacking = [joint_name(self.model, k) for k in targets if k not in found]
+            if not lacking:
+                return source, found
+            reason = f"joint '{lacking[0]}' is not found there by its name"
         except MjcfError as error:
             reason = str(error)
-        self.notes.append(f"{path} was written out by MuJoCo first, as {reason}.")
-        self.spec.compile()
+        self.notes.append(
+            f"{path} was written out by MuJoCo first, numbers rounded to six digits: {reason}."
+        )
         source = Source(path, self.spec.to_xml().encode())
-        return source, source.joints()
+        return source, dict(enumerate(source.joints()))
 
     def add(self, joint: int, profile: Profile, native: str) -> None:
         """Edits the text for one joint."""
-        label = f"joint '{joint_name(self.model, joint)}'"
         kind = joint_type(self.model, joint)
         if kind != profile.joint.type:
             raise JodaError(
-                f"{label} is a {kind} and the profile is for a {profile.joint.type}; "
-                "set joint.type, joint.unit and joint.range of the profile."
+                f"joint '{joint_name(self.model, joint)}' is a {kind} and the profile is for a "
+                f"{profile.joint.type}; set joint.type, joint.unit and joint.range of the profile."
             )
         self._compare_range(joint, profile)
         changes = self._native(joint, native)
         changes |= self._limit(joint, profile)
-        if not self.model.joint(joint).name:
-            self.names[joint] = changes["name"] = self._new_name(joint)
-            self.notes.append(f"{label} had no name and is now '{changes['name']}'.")
-        if changes:
-            self.joints[joint][1].set(**changes)
-        body = int(self.model.jnt_bodyid[joint])
-        config = self.configs.setdefault(body, self._config(body, joint))
-        front = prefix(self.model, joint)
-        for key in ATTRIBUTES:
-            if config.pop(front + key, None) and key == "range":
-                self.notes.append(f"{label} carried a profile already; the new one replaces it.")
-        config |= {front + key: text for key, text in profile.attributes().items()}
-        own_name = self.names.get(joint, self.model.joint(joint).name)
-        row = f"joda_damping_{own_name}"
-        if self.spec.equality(row) is None:
-            self.source.root.insert_last(
-                f"<equality>\n  <joint name={quoteattr(row)} joint1={quoteattr(own_name)} "
-                f"{INERT}/>\n</equality>"
-            )
+        if not self.names[joint]:
+            changes["name"] = self._new_name(joint)
+            self._note(joint, f"had no name and is now '{changes['name']}'")
+            self.names[joint] = changes["name"]
+        self.joints[joint][1].set(**changes)
+        self._configure(joint, profile)
+        if not self._has_row(joint):
+            row, name = quoteattr(f"joda_damping_{self.names[joint]}"), quoteattr(self.names[joint])
+            self.rows.append(f"<joint name={row} joint1={name} {INERT}/>")
 
-    def finish(self) -> bytes:
-        """The text, with the plugin's instances in it."""
+    def finish(self, folder: Path) -> bytes:
+        """The text with the plugin's instances in it, for a file that will lie in `folder`."""
         declared = {
-            element.attributes.get("name"): element
-            for element in self.source.root.walk()
-            if element.tag == "instance"
+            e.attributes.get("name"): e for e in self.source.root.walk() if e.tag == "instance"
         }
         fresh = []
-        for body, config in self.configs.items():
-            existing = plugin_name(self.model, body)
-            first = next(k for k in range(self.model.njnt) if self.model.jnt_bodyid[k] == body)
-            name = existing or f"joda_{self.names.get(first, self.model.joint(first).name)}"
+        for instance in self.instances.values():
+            name = instance.existing or f"joda_{self.names[instance.joint]}"
             keys = "".join(
                 f"\n  <config key={quoteattr(key)} value={quoteattr(value)}/>"
-                for key, value in config.items()
+                for key, value in instance.config.items()
             )
             text = f"<instance name={quoteattr(name)}>{keys}\n</instance>"
-            if existing:
-                indent = declared[existing]._indent()
-                declared[existing].replace(text.replace("\n", "\n" + indent))
+            if instance.existing:
+                declared[name].replace(text)
             else:
-                fresh.append(text.replace("\n", "\n    "))
-                self._refer(first, name)
+                fresh.append(text)
+                self._refer(instance.joint, name)
         if fresh:
+            lines = "\n".join(fresh).replace("\n", "\n    ")
             self.source.root.insert_first(
-                f'<extension>\n  <plugin plugin="{PLUGIN}">\n    '
-                + "\n    ".join(fresh)
-                + "\n  </plugin>\n</extension>"
+                f'<extension>\n  <plugin plugin="{PLUGIN}">\n    {lines}\n  </plugin>\n</extension>'
             )
+        if self.rows:
+            lines = "\n  ".join(self.rows)
+            self.source.root.insert_last(f"<equality>\n  {lines}\n</equality>")
+        self.source.relocate(folder)
         return self.source.render()
+
+    def _configure(self, joint: int, profile: Profile) -> None:
+        """Puts the profile into the instance of the joint's body."""
+        body = int(self.model.jnt_bodyid[joint])
+        if body not in self.instances:
+            found = find_instance(self.spec, self.model, body)
+            if found is None and self.model.body_plugin[body] >= 0:
+                raise JodaError(
+                    f"the body of joint '{joint_name(self.model, joint)}' carries another plugin "
+                    "already, and MuJoCo allows one per body; remove it or put it elsewhere."
+                )
+            self.instances[body] = _Instance(joint, *(found or ("", {})))
+        config = self.instances[body].config
+        front = prefix(self.model, joint)
+        if [key for key in ATTRIBUTES if config.pop(front + key, None)]:
+            self._note(joint, "carried a profile already, which the new one replaces")
+        config |= {front + key: text for key, text in profile.attributes().items()}
 
     def _refer(self, joint: int, name: str) -> None:
         """Puts the reference to the instance into the joint's body."""
         body, element = self.joints[joint]
         reference = f"<plugin instance={quoteattr(name)}/>"
-        if element in body.own:
+        inline = next((child for child in body.children if child.tag == "plugin"), None)
+        if inline:
+            inline.replace(reference)
+        elif element in body.own:
             element.insert_after(reference)
         else:
             body.insert_first(reference)
 
-    def _config(self, body: int, joint: int) -> dict[str, str]:
-        """The attributes that the body's instance has now."""
-        name = plugin_name(self.model, body)
-        if name is None:
-            return {}
-        for plugin in self.spec.plugins:
-            if plugin.name == name and plugin.plugin_name == PLUGIN:
-                return {key: value for key, value in plugin.config.items() if value}
-        raise JodaError(
-            f"the body of joint '{joint_name(self.model, joint)}' carries another plugin already, "
-            "and MuJoCo allows one per body; remove it or put it elsewhere."
+    def _has_row(self, joint: int) -> bool:
+        """Whether the joint has the equality that carries the damping."""
+        m = self.model
+        return any(
+            m.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT
+            and (m.eq_obj1id[k], m.eq_obj2id[k]) == (joint, -1)
+            and "joda_damping" in m.equality(k).name
+            for k in range(m.neq)
         )
 
     def _compare_range(self, joint: int, profile: Profile) -> None:
@@ -201,64 +233,87 @@ class _Scene:
         span = given[1] - given[0]
         if max(abs(a - b) for a, b in zip(own, given, strict=True)) > 1e-3 * span:
             text = f"{own[0]:g} to {own[1]:g}" if own[0] < own[1] else "not set"
-            self.notes.append(
-                f"joint '{joint_name(self.model, joint)}': the model's range is {text}, the "
-                f"profile's {given[0]:g} to {given[1]:g} {profile.joint.unit}; the profile keeps its own."
+            self._note(
+                joint,
+                f"has range {text} in the model and {given[0]:g} to {given[1]:g} "
+                f"{profile.joint.unit} in the profile, which keeps its own",
             )
 
     def _native(self, joint: int, native: str) -> dict[str, str]:
         """What becomes of the joint's own damping, stiffness and frictionloss."""
-        dof = self.model.jnt_dofadr[joint]
+        m, dof = self.model, self.model.jnt_dofadr[joint]
         values = {
-            "damping": [self.model.dof_damping[dof], *self.model.dof_dampingpoly[dof]],
-            "stiffness": [self.model.jnt_stiffness[joint], *self.model.jnt_stiffnesspoly[joint]],
-            "frictionloss": [self.model.dof_frictionloss[dof]],
+            "damping": [m.dof_damping[dof], *m.dof_dampingpoly[dof]],
+            "stiffness": [m.jnt_stiffness[joint], *m.jnt_stiffnesspoly[joint]],
+            "frictionloss": [m.dof_frictionloss[dof]],
         }
-        present = {name: v[0] for name, v in values.items() if any(v) and v[0] != float(TRACE)}
+        present = {name: v for name, v in values.items() if any(v) and v != [float(TRACE)]}
         changes = {}
         if native == "replace":
-            changes = {name: "0 0 0" if any(values[name][1:]) else "0" for name in present}
+            changes = {
+                name: " ".join("0" for _ in np.trim_zeros(v, "b")) for name, v in present.items()
+            }
+            # MuJoCo makes stiffness and damping of it
+            if any(self.spec.joints[joint].springdamper):
+                changes["springdamper"] = "0 0"
         if native == "replace" or "frictionloss" not in present:
             changes["frictionloss"] = TRACE
         if present:
-            listed = ", ".join(f"{name} {value:g}" for name, value in present.items())
-            what = "replaced by the profile" if native == "replace" else "kept besides the profile"
-            self.notes.append(
-                f"joint '{joint_name(self.model, joint)}': native {listed} {what} (--native {native})."
+            listed = ", ".join(
+                f"{name} {' '.join(f'{x:g}' for x in np.trim_zeros(v, 'b'))}"
+                for name, v in present.items()
             )
+            what = "replaced by the profile" if native == "replace" else "kept besides the profile"
+            self._note(joint, f"has native {listed}, {what} (--native {native})")
         return changes
 
     def _limit(self, joint: int, profile: Profile) -> dict[str, str]:
-        """The joint-limit hint as the limit's damping ratio."""
+        """The joint-limit hint as the limit's damping ratio, its stiffness as it is."""
         hint = profile.joint_limit_hint
-        if hint.selected_side == "none" or hint.elasticity == "none":
+        limited = self.model.jnt_limited[joint]
+        if not limited or hint.selected_side == "none" or hint.elasticity == "none":
             return {}
-        time = self.model.jnt_solref[joint][0]
         ratio = DAMP_RATIO[hint.elasticity]
-        self.notes.append(
-            f"joint '{joint_name(self.model, joint)}': damping ratio of the limits {ratio:g} "
-            f"({hint.elasticity} elasticity; MuJoCo has one value for both ends)."
+        first, second = map(float, self.model.jnt_solref[joint])
+        if first > 0:  # time constant (at least 2 h), damping ratio: stiffness ~ 1 / product^2
+            time = max(first, 2 * self.model.opt.timestep) * second / ratio
+            values = f"{time:g} {ratio:g}"
+        else:  # -stiffness, -damping
+            values = f"{first:g} {-2 * ratio * math.sqrt(-first):g}"
+        self._note(
+            joint,
+            f"has limits of damping ratio {ratio:g} now ({hint.elasticity} elasticity; MuJoCo has "
+            "one value for both ends)",
         )
-        return {"solreflimit": f"{time if time > 0 else 0.02:g} {ratio:g}"}
+        return {"solreflimit": values}
+
+    def _note(self, joint: int, text: str) -> None:
+        name = self.names[joint] or joint_name(self.model, joint)
+        self.notes.append(f"joint '{name}' {text}.")
 
     def _new_name(self, joint: int) -> str:
         body = self.model.body(self.model.jnt_bodyid[joint]).name or "unnamed"
-        taken = {self.model.joint(k).name for k in range(self.model.njnt)}
         base = re.sub(r"\W+", "_", f"{body}_joint")
-        return next(n for n in (base, *(f"{base}{k}" for k in range(10**6))) if n not in taken)
+        return next(n for n in (base, *(f"{base}{k}" for k in range(10**6))) if n not in self.names)
 
 
 def _verify(output: Path, content: bytes, before: mujoco.MjModel) -> None:
     """Compiles the scene where it will lie; raises JodaError if it is not the model it was."""
     trial = output.with_name(f".{output.stem}.{os.getpid()}.xml")
-    write_bytes(trial, content)
     try:
+        trial.write_bytes(content)
         after = mujoco.MjModel.from_xml_path(str(trial))
         mujoco.MjData(after)
+    except OSError as error:
+        raise JodaError(f"{output}: cannot be written ({error.strerror}).") from None
     except (ValueError, mujoco.FatalError) as error:
         raise JodaError(f"{output}: the scene would not load: {sentence(error)}") from None
     finally:
         trial.unlink(missing_ok=True)
-    same = before.nq == after.nq and (before.jnt_axis == after.jnt_axis).all()
-    if not same or (before.nbody, before.ngeom) != (after.nbody, after.ngeom):
-        raise JodaError(f"{output}: MuJoCo writes this model out as another one; attach cannot help.")
+    for name in SAME:
+        old, new = np.array(getattr(before, name)), np.array(getattr(after, name))
+        if old.shape != new.shape or not np.allclose(old, new, rtol=1e-3, atol=1e-6):
+            raise JodaError(
+                f"{output}: written out by MuJoCo the model is another one ({name}); "
+                "attach to the file in which the joint itself is written."
+            )

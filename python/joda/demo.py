@@ -1,13 +1,13 @@
 """The first contact: a microwave that shuts itself, beside the same one without a profile."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from joda.attach import attach
 from joda.errors import JodaError
@@ -15,10 +15,13 @@ from joda.files import write_bytes, write_text
 from joda.model import find_joint, load_model
 from joda.draw import draw, write_png
 from joda.profile import Profile
+from joda.render import render
 from joda.simulate import Motion, gravity_force, release
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+Image = NDArray[np.uint8]
 
 START = np.deg2rad(3.0)
 DURATION = 1.0
@@ -100,8 +103,8 @@ def demo(
     motions = [release(m, joint, START, DURATION) for m in (before, model)]
     picture = folder / "release.png"
     progress("drawing both doors")
-    views = [_render(m, joint, motion) for m, motion in zip((before, model), motions, strict=True)]
-    write_png(_picture(motions, views), picture, force=True)
+    views = render(scene, "front", "door", [motion.position[-1] for motion in motions])
+    write_png(_picture(motions, views or []), picture, force=True)
     shut = motions[1].time[motions[1].position <= 0]
     return Demo(
         plain=plain,
@@ -117,28 +120,13 @@ def demo(
     )
 
 
-def _render(model: mujoco.MjModel, joint: int, motion: Motion) -> Any:
-    """The scene at the end of the motion as an RGB array; None where nothing can render."""
-    try:
-        renderer = mujoco.Renderer(model, 480, 640)
-    except Exception:  # each backend fails in its own way; the curves tell the story without it
-        return None
-    with renderer:
-        data = mujoco.MjData(model)
-        data.qpos[model.jnt_qposadr[joint]] = motion.position[-1]
-        mujoco.mj_forward(model, data)
-        renderer.update_scene(data, camera="front")
-        return renderer.render()
-
-
-def _picture(motions: list[Motion], views: list[Any]) -> "Figure":
+def _picture(motions: list[Motion], views: Sequence[Image]) -> "Figure":
     from matplotlib.figure import Figure
 
-    shown = [view for view in views if view is not None]
-    figure = Figure(figsize=(10, 5.2 if shown else 4), dpi=130, layout="constrained")
+    figure = Figure(figsize=(10, 5.2 if views else 4), dpi=130, layout="constrained")
     names = ("without a profile", "with the latch profile")
     colours = ("#888888", "#c8202f")
-    grid = figure.add_gridspec(len(shown) or 1, 2 if shown else 1, width_ratios=[2, 1] if shown else None)
+    grid = figure.add_gridspec(len(views) or 1, 2 if views else 1, width_ratios=[2, 1] if views else None)
     axes = figure.add_subplot(grid[:, 0])
     for motion, name, colour in zip(motions, names, colours, strict=True):
         axes.plot(motion.time, np.rad2deg(motion.position), color=colour, lw=2.2, label=name)
@@ -149,7 +137,7 @@ def _picture(motions: list[Motion], views: list[Any]) -> "Figure":
     axes.set_title("A microwave door, let go at 3 degrees", loc="left")
     axes.legend(frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
-    for k, (view, name) in enumerate(zip(shown, names, strict=False)):
+    for k, (view, name) in enumerate(zip(views, names, strict=False)):
         image = figure.add_subplot(grid[k, 1])
         image.imshow(view)
         image.set_title(f"{name}, after {DURATION:g} s", fontsize=9)

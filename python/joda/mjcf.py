@@ -26,13 +26,17 @@ class Document:
 
     path: Path
     content: bytes
-    parent: "Element | None" = None  # the <include> that brought it in
     root: "Element" = field(init=False)
     edits: list[tuple[int, int, bytes]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Parses the content."""
         self.root = _parse(self)
+
+    def edit(self, start: int, end: int, text: str) -> None:
+        """Puts `text`, with the file's line ends, in the place of bytes `start` to `end`."""
+        newline = "\r\n" if b"\r\n" in self.content else "\n"
+        self.edits.append((start, end, text.replace("\n", newline).encode()))
 
 
 @dataclass(eq=False)
@@ -80,36 +84,30 @@ class Element:
         self.document.edits.append((self.start, self.inner, tag))
 
     def replace(self, text: str) -> None:
-        """Puts other text in the place of the element."""
-        self.document.edits.append((self.start, self.end, text.encode()))
+        """Puts other lines in the place of the element, indented as it is."""
+        self.document.edit(self.start, self.end, text.replace("\n", "\n" + self._indent()))
 
     def insert_after(self, text: str) -> None:
         """Inserts lines after the element, indented as it is."""
-        self.document.edits.append((self.end, self.end, self._indented(text, 0)))
+        self.document.edit(self.end, self.end, self._indented(text, 0))
 
     def insert_first(self, text: str) -> None:
-        """Inserts lines before the element's first child."""
-        if self.document.content[self.inner - 2 : self.inner] == b"/>":  # <tag/>
-            tag = self.document.content[self.start : self.inner - 2].rstrip()
-            close = f"\n{self._indent()}</{self.tag}>".encode()
-            new = tag + b">" + self._indented(text, 1) + close
-            self.document.edits.append((self.start, self.inner, new))
-        else:
-            self.document.edits.append((self.inner, self.inner, self._indented(text, 1)))
+        """Inserts lines before the element's first child; the element must have an end tag."""
+        self.document.edit(self.inner, self.inner, self._indented(text, 1))
 
     def insert_last(self, text: str) -> None:
         """Inserts lines before the element's end tag; the element must have one."""
         at = len(self.document.content[: self.close].rstrip())
-        self.document.edits.append((at, at, self._indented(text, 1)))
+        self.document.edit(at, at, self._indented(text, 1))
 
     def _indent(self) -> str:
         line = self.document.content.rfind(b"\n", 0, self.start) + 1
         before = self.document.content[line : self.start]
         return before.decode() if not before.strip() else ""
 
-    def _indented(self, text: str, levels: int) -> bytes:
+    def _indented(self, text: str, levels: int) -> str:
         indent = "\n" + self._indent() + "  " * levels
-        return "".join(indent + line for line in text.splitlines()).encode()
+        return indent + text.replace("\n", indent)
 
 
 class Source:
@@ -117,7 +115,7 @@ class Source:
 
     def __init__(self, path: Path, content: bytes | None = None):
         """Reads the file, or takes `content` for what stands there; raises MjcfError, OSError."""
-        self.folder = path.parent
+        self.folder = path.parent.resolve()
         self.main = Document(path, path.read_bytes() if content is None else content)
         if self.main.root.tag != "mujoco":
             raise MjcfError(f"the root element is <{self.main.root.tag}>, not <mujoco>")
@@ -137,13 +135,22 @@ class Source:
         return out
 
     def relocate(self, folder: Path) -> None:
-        """Rewrites what the text refers to for a main file that will lie in `folder`."""
-        here, there = self.folder.resolve(), folder.resolve()
-        if here == there:
-            return
+        """Rewrites what the text refers to for a main file that will lie in `folder`.
 
+        To be called when all other edits are made.
+        """
+        there = folder.resolve()
+        if there != self.folder:
+            self._relocate_assets(there)
+        self._relocate_includes(self.main, there)
+
+    def render(self) -> bytes:
+        """The main file's bytes with all edits made."""
+        return _apply(self.main)
+
+    def _relocate_assets(self, there: Path) -> None:
         def moved(path: str) -> str:
-            return path if os.path.isabs(path) else os.path.relpath(here / path, there)
+            return path if os.path.isabs(path) else os.path.relpath(self.folder / path, there)
 
         kinds = ("assetdir", "meshdir", "texturedir")
         named = set()
@@ -155,44 +162,42 @@ class Source:
                     element.set(**{kind: moved(path) for kind, path in found.items()})
             elif element.tag == "model" and "file" in element.attributes:
                 element.set(file=moved(element.attributes["file"]))
-        if "assetdir" not in named:
-            missing = [kind for kind in kinds[1:] if kind not in named]
-            if missing:
-                paths = " ".join(f"{kind}={quoteattr(moved('.'))}" for kind in missing)
-                self.root.insert_first(f"<compiler {paths}/>")
-        for include in self._includes(self.main):
-            include.set(file=moved(include.attributes["file"]))
+        missing = [] if "assetdir" in named else [kind for kind in kinds[1:] if kind not in named]
+        if missing:
+            paths = " ".join(f"{kind}={quoteattr(moved('.'))}" for kind in missing)
+            self.root.insert_first(f"<compiler {paths}/>")
 
-    def render(self) -> bytes:
-        """The main file's bytes with all edits made."""
-        return _apply(self.main)
+    def _relocate_includes(self, document: Document, there: Path) -> None:
+        """Rewrites the includes that stay, as MuJoCo looks them up from the main file first."""
+        for element in _raw(document.root):
+            inner = element.included
+            if not inner:
+                continue
+            moves = there != self.folder
+            if _changed(inner) or (moves and any(e.included for e in _raw(inner.root))):
+                self._relocate_includes(inner, there)
+            elif moves or inner.path != self.folder / element.attributes["file"]:
+                element.set(file=os.path.relpath(inner.path, there))
 
     def _include(self, document: Document) -> None:
         for element in _raw(document.root):
             if element.tag != "include":
                 continue
             name = element.attributes.get("file", "")
-            for folder in (self.folder, document.path.parent):
-                if (folder / name).is_file():
-                    break
-            else:
+            tried = [folder / name for folder in (self.folder, document.path.parent)]
+            path = next((path for path in tried if path.is_file()), None)
+            if path is None:
                 raise MjcfError(f"{document.path}: the included file {name} does not exist")
-            element.included = Document(folder / name, (folder / name).read_bytes(), element)
+            element.included = Document(path, path.read_bytes())
             self._include(element.included)
-
-    def _includes(self, document: Document) -> Iterator[Element]:
-        """The includes that will stay, seen from the main file."""
-        for element in _raw(document.root):
-            if element.included and _changed(element.included):
-                yield from self._includes(element.included)
-            elif element.included:
-                yield element
 
 
 def _parse(document: Document) -> Element:
     """The tree of a document's elements; raises MjcfError where it is not XML."""
     parser = expat.ParserCreate()
-    content, stack, roots = document.content, [], []  # type: ignore[var-annotated]
+    content = document.content
+    stack: list[Element] = []
+    roots: list[Element] = []
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
         start = parser.CurrentByteIndex
@@ -258,7 +263,7 @@ def _apply(document: Document, start: int = 0, end: int | None = None) -> bytes:
     for element in _raw(document.root):
         if element.included and _changed(element.included):
             root = element.included.root
-            text = _apply(element.included, root.inner, root.close).strip(b"\r\n")
+            text = _apply(element.included, root.inner, root.close).strip()
             edits.append((element.start, element.end, text))
     out, at = [], start
     for first, last, text in sorted(edits, key=lambda edit: edit[:2]):

@@ -8,28 +8,27 @@ import mujoco
 from joda.errors import JodaError
 from joda.profile import Joint
 
-_TYPES = {int(getattr(mujoco.mjtJoint, f"mjJNT_{t.upper()}")): t for t in ("free", "ball", "slide", "hinge")}
+_TYPES = {
+    int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name
+    for name in ("free", "ball", "slide", "hinge")
+}
 _SCALAR = ("hinge", "slide")
 
 
-def load_spec(path: Path) -> mujoco.MjSpec:
-    """An MJCF or URDF file as MjSpec; raises JodaError."""
+def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+    """An MJCF or URDF file, parsed and compiled; raises JodaError."""
     if not path.is_file():
         raise JodaError(f"{path}: no such file; give an MJCF or URDF file.")
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        spec = mujoco.MjSpec.from_file(str(path))
+        return spec, spec.compile()
     except (ValueError, mujoco.FatalError) as error:
-        raise JodaError(f"{path}: MuJoCo cannot read it: {sentence(error)}") from None
+        raise JodaError(f"{path}: MuJoCo cannot load it: {sentence(error)}") from None
 
 
 def load_model(path: Path) -> mujoco.MjModel:
     """An MJCF or URDF file, compiled; raises JodaError."""
-    if not path.is_file():
-        raise JodaError(f"{path}: no such file; give an MJCF or URDF file.")
-    try:
-        return mujoco.MjModel.from_xml_path(str(path))
-    except (ValueError, mujoco.FatalError) as error:
-        raise JodaError(f"{path}: MuJoCo cannot load it: {sentence(error)}") from None
+    return load(path)[1]
 
 
 def sentence(error: Exception) -> str:

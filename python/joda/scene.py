@@ -4,16 +4,38 @@ from pathlib import Path
 
 import mujoco
 
-from joda.model import describe_joint, load_spec
+from joda.errors import JodaError
+from joda.model import describe_joint, load
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
 
 
-def plugin_name(model: mujoco.MjModel, body: int) -> str | None:
-    """Name of the plugin instance that the body refers to, None if there is none."""
-    instance = int(model.body_plugin[body])
-    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_PLUGIN, instance) if instance >= 0 else None
-    return str(name) if instance >= 0 else None
+def find_instance(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, body: int
+) -> tuple[str, dict[str, str]] | None:
+    """Name and attributes of the plugin's instance on the body, None if there is none.
+
+    Args:
+        spec: the compiled spec.
+        model: what it compiled to.
+        body: id.
+
+    Returns:
+        the name, empty where the attributes are written in the body itself, and the attributes;
+        each has its joint's `prefix`.
+    """
+    reference = spec.bodies[body].plugin
+    if not reference.active:
+        return None
+    if reference.plugin_name == PLUGIN:
+        name, config = "", reference.config
+    else:
+        declared = {p.name: p.config for p in spec.plugins if p.plugin_name == PLUGIN}
+        if reference.name not in declared:
+            return None
+        name, config = reference.name, declared[reference.name]
+    alone = model.body_jntnum[body] == 1
+    return name, {k.removeprefix("0.") if alone else k: text for k, text in config.items() if text}
 
 
 def prefix(model: mujoco.MjModel, joint: int) -> str:
@@ -35,17 +57,27 @@ def read_profiles(path: str | Path) -> dict[str, Profile]:
     Raises:
         JodaError: the file cannot be loaded.
     """
-    spec = load_spec(Path(path))
-    model = spec.compile()
-    configs = {p.name: dict(p.config) for p in spec.plugins if p.plugin_name == PLUGIN}
+    spec, model = load(Path(path))
     out = {}
     for joint in range(model.njnt):
-        config = configs.get(plugin_name(model, int(model.jnt_bodyid[joint])) or "", {})
+        found = find_instance(spec, model, int(model.jnt_bodyid[joint]))
+        config = found[1] if found else {}
         front = prefix(model, joint)
-        own = {key: config[front + key] for key in ATTRIBUTES if config.get(front + key)}
+        own = {key: config[front + key] for key in ATTRIBUTES if front + key in config}
         if own:
-            lo_hi = own["range"].split() if "range" in own else None
-            limits = (float(lo_hi[0]), float(lo_hi[1])) if lo_hi else None
-            described = describe_joint(model, joint, limits)
+            described = describe_joint(model, joint, _limits(own.get("range"), front))
             out[described.name] = Profile.from_attributes(described, own)
     return out
+
+
+def _limits(text: str | None, front: str) -> tuple[float, float] | None:
+    """The attribute "range" as numbers."""
+    if text is None:
+        return None
+    try:
+        lo, hi = map(float, text.split())
+    except ValueError:
+        lo = hi = 0
+    if not lo < hi:
+        raise JodaError(f'attribute "{front}range": expected two increasing numbers, got "{text}".')
+    return lo, hi

@@ -1,0 +1,189 @@
+"""The commands as a user types them: what they print, what they leave, how they fail."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import mujoco
+import pytest
+
+from joda.bench import bench, hinges
+from joda.demo import demo
+from joda.plot import plot
+from joda.profile import Profile
+
+MODELS = Path(__file__).parents[1] / "models"
+
+
+def joda(*arguments, cwd=None, **environment):
+    """Runs the command line in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-c", "from joda.cli import main; main()", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env={**os.environ, **environment},
+    )
+
+
+def fails(*arguments, cwd=None) -> str:
+    """The one sentence that a mistake is answered with."""
+    result = joda(*arguments, cwd=cwd)
+    assert result.returncode == 2, result
+    assert result.stdout == ""
+    assert result.stderr.startswith("joda: ")
+    assert result.stderr.count("\n") == 1
+    return result.stderr
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("microwave.xml", "microwave.latch.json"):
+        (tmp_path / name).write_bytes((MODELS / name).read_bytes())
+    return tmp_path
+
+
+def test_without_arguments_it_shows_its_help():
+    assert joda().stdout == joda("--help").stdout
+    assert joda().returncode == 0
+
+
+@pytest.mark.parametrize("command", ["demo", "attach", "plot", "bench", "schema"])
+def test_every_help_has_an_example(command):
+    text = joda(command, "--help").stdout
+    assert "Example:" in text
+    assert f"joda {command}" in text.split("Example:")[1]
+
+
+def test_attach_then_plot(folder):
+    result = joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.splitlines()[-1] == "scene.xml"
+    mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    result = joda("plot", "scene.xml", cwd=folder)
+    assert result.stdout == "scene.png\n"
+    assert (folder / "scene.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_mistakes_are_one_sentence_and_leave_nothing(folder):
+    before = sorted(folder.iterdir())
+    (folder / "bad.json").write_text('{"joint": {"name": "door"')
+    composed = "microwave.latch.json"
+    attach = ("attach", "microwave.xml", composed, "-o")
+    assert "no such file" in fails("attach", "nothing.xml", composed, "-o", "s.xml", cwd=folder)
+    assert "bad.json: not JSON" in fails("attach", "microwave.xml", "bad.json", "-o", "s.xml", cwd=folder)
+    assert "exists already; choose another name or add --force" in fails(*attach, "microwave.xml", cwd=folder)
+    assert "does not exist; create it first" in fails(*attach, "no/s.xml", cwd=folder)
+    assert "hinges and slides of the model: 'door'" in fails(*attach, "s.xml", "--joint", "dor", cwd=folder)
+    assert "carries no profile" in fails("plot", "microwave.xml", cwd=folder)
+    assert "carries no profile; attach one first" in fails("bench", "microwave.xml", cwd=folder)
+    assert "Missing" in fails("attach", cwd=folder)
+    assert "No such option" in fails("plot", composed, "--colour", "red", cwd=folder)
+    assert "No such command 'bend'" in fails("bend", cwd=folder)
+    assert "replace" in fails(*attach, "s.xml", "--native", "drop", cwd=folder)
+    (folder / "bad.json").unlink()
+    assert sorted(folder.iterdir()) == before
+
+
+def test_the_schema_describes_the_file():
+    schema = json.loads(joda("schema", "composed").stdout)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    validator = jsonschema.Draft202012Validator(schema)
+    good = json.loads((MODELS / "microwave.latch.json").read_text())
+    validator.validate(good)
+    with pytest.raises(jsonschema.ValidationError):
+        validator.validate({**good, "chanels": {}})
+
+
+def test_a_hand_written_file_with_only_the_fixed_keys_is_valid(tmp_path):
+    channel = {"combine": "sum", "components": []}
+    content = {
+        "schema_version": 1,
+        "joint": {"name": "door", "type": "hinge", "range": [0, 1.5], "unit": "rad"},
+        "channels": {name: channel for name in ("conservative", "friction", "damping")},
+        "effects": [],
+    }
+    (tmp_path / "composed.json").write_text(json.dumps(content))
+    assert Profile.read(tmp_path / "composed.json").joint.range == (0, 1.5)
+
+
+class TestDemo:
+    def test_the_door_with_the_latch_shuts_and_the_other_stays(self, tmp_path):
+        result = demo(tmp_path / "out")
+        assert result.plain_end == pytest.approx(result.start, abs=1e-6)
+        assert abs(result.joda_end) < 0.002
+        assert 0 < result.shut_after < 1
+        for path in (result.plain, result.composed, result.scene, result.profile, result.picture):
+            assert path.is_file()
+
+    def test_it_prints_what_happened_as_json(self, tmp_path):
+        result = joda("demo", "-o", tmp_path / "out", "--json")
+        assert json.loads(result.stdout)["shut_after"] < 1
+
+    def test_it_works_where_nothing_can_render(self, tmp_path):
+        result = joda("demo", "-o", tmp_path / "out", MUJOCO_GL="disabled")
+        assert result.returncode == 0
+        assert "shut itself" in result.stdout
+
+    def test_it_overwrites_only_when_told_to(self, tmp_path):
+        (tmp_path / "mine.txt").write_text("mine")
+        assert "exists already; choose another folder with -o or add --force" in fails("demo", "-o", tmp_path)
+        assert joda("demo", "-o", tmp_path, "--force").returncode == 0
+        assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
+class TestBench:
+    """Only what is measured is tested here, not how fast it is."""
+
+    def test_rows_are_ratios_of_times(self, folder, monkeypatch):
+        monkeypatch.setattr("joda.bench.ROUNDS", 3)
+        joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
+        for rows in (bench(), bench(folder / "scene.xml")):
+            for row in rows:
+                assert row.ratio > 0
+                assert row.microseconds[0] > 0
+        assert "one" not in bench(folder / "scene.xml")[0].what
+
+    def test_the_native_scene_has_no_plugin_and_the_same_joints(self, folder):
+        from joda.bench import _without_plugin
+        from joda.scene import read_profiles
+
+        joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
+        native = _without_plugin(folder / "scene.xml", read_profiles(folder / "scene.xml"), True)
+        assert (native.nplugin, native.neq, native.njnt) == (0, 0, 1)
+        assert native.dof_damping[0] > 0.1
+        assert native.dof_frictionloss[0] == pytest.approx(0.07, rel=1e-6)
+
+    def test_hinges_differ_only_in_what_acts_on_them(self):
+        plain, native, ours = (hinges(3, kind) for kind in ("plain", "native", "joda"))
+        assert plain.nv == native.nv == ours.nv == 3
+        assert (plain.dof_frictionloss == 0).all()
+        assert ours.nplugin == 3
+
+
+class TestPlot:
+    def test_a_profile_file(self, folder):
+        assert plot(folder / "microwave.latch.json") == folder / "microwave.latch.png"
+
+    def test_a_joint_must_be_chosen_where_several_carry_profiles(self, tmp_path):
+        from joda.errors import JodaError
+
+        (tmp_path / "two.xml").write_text(TWO)
+        with pytest.raises(JodaError, match="several joints carry a profile; choose with --joint: 'a', 'b'"):
+            plot(tmp_path / "two.xml")
+        with pytest.raises(JodaError, match="joint 'c' carries no profile; these do: 'a', 'b'"):
+            plot(tmp_path / "two.xml", joint="c")
+        assert plot(tmp_path / "two.xml", joint="b") == tmp_path / "two.b.png"
+
+
+TWO = """
+<mujoco><extension><plugin plugin="joda.joint_dynamics">
+  <instance name="p"><config key="damping" value="0 1 | 0 1 | 1 1"/></instance>
+  <instance name="q"><config key="damping" value="0 1 | 0 1 | 1 1"/></instance></plugin></extension>
+  <worldbody>
+    <body><joint name="a" range="0 90"/><geom size=".1"/><plugin instance="p"/></body>
+    <body><joint name="b" range="0 90"/><geom size=".1"/><plugin instance="q"/></body>
+  </worldbody></mujoco>"""

@@ -1,0 +1,163 @@
+"""Loading the plugin, reading its attributes, and what it says when they are wrong."""
+
+import re
+import subprocess
+import sys
+
+import mujoco
+import pytest
+from joints import component, flat, load, scene
+
+import joda
+from joda import plugin
+
+TWO_JOINTS = """
+<mujoco><extension><plugin plugin="joda.joint_dynamics"><instance name="p">{config}</instance></plugin></extension>
+  <worldbody><body name="arm"><joint name="turn" range="-90 90" frictionloss="1e-12"/>
+    <joint name="lift" type="slide" range="0 .5" frictionloss="1e-12"/><geom size=".1"/><plugin instance="p"/>
+  </body></worldbody></mujoco>"""
+
+
+def refused(text: str) -> str:
+    """The plugin's sentence about a model that does not load."""
+    with pytest.raises(ValueError) as error:
+        mujoco.MjData(mujoco.MjModel.from_xml_string(text))
+    lines = [line for line in str(error.value).splitlines() if "joda.joint_dynamics:" in line]
+    assert lines, str(error.value)
+    return lines[0]
+
+
+def configured(**config: str) -> str:
+    """The test scene with these attributes and no others."""
+    keys = "".join(f'<config key="{key}" value="{value}"/>' for key, value in config.items())
+    return re.sub(r"<config key=.*/>", keys, scene(), count=1)
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        (dict(friction="0 1 | 0 1 | 1 nan"), 'attribute "friction": component 1: "nan" is not a finite number'),
+        (dict(friction=flat(-1.0)), 'attribute "friction": component 1: values of friction and damping must not be negative'),
+        (dict(damping=flat(1.0) + "; " + flat(-1.0)), 'attribute "damping": component 2: values of friction and damping must not be negative'),
+        (dict(conservative="latch: 0 1 | 0 0.5 0.5 1 | 1 1 1 1"), 'attribute "conservative": component 1 "latch": x must increase'),
+        (dict(conservative="0 1 | 0 1 | 1 1 1"), 'attribute "conservative": component 1: x has 2 numbers and y has 3; they must be equally many'),
+        (dict(conservative="0.5 1.5 | 0 1 | 1 1"), 'attribute "conservative": component 1: the interval must satisfy 0 <= a < b <= 1'),
+        (dict(conservative="0 1 | 0 1"), 'attribute "conservative": component 1: expected "label: a b | x ... | y ..."'),
+        (dict(friction=flat(1.0), friction_combine="mean"), 'attribute "friction_combine": must be "sum" or "max", got "mean"'),
+        (dict(range="1 0"), 'attribute "range": expected two increasing numbers, got "1 0"'),
+        (dict(range="0 one"), 'attribute "range": "one" is not a finite number'),
+    ],
+)  # fmt: skip
+def test_bad_attributes_are_refused_in_one_sentence(config, message):
+    assert f"joda.joint_dynamics: instance 'p': {message}" in refused(configured(**config))
+
+
+def test_unknown_attributes_are_refused():
+    with pytest.raises(ValueError, match="frction"):
+        mujoco.MjModel.from_xml_string(configured(frction=flat(1.0)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('type="slide" axis="1 0 0" range="0.0 1.0"', 'type="ball"', "joint 'j' is a ball joint; a profile needs a hinge or a slide"),
+        ('<joint name="j" type="slide" axis="1 0 0" range="0.0 1.0" frictionloss="1e-12"/>', "<freejoint name='j'/>", "joint 'j' is a free joint; a profile needs a hinge or a slide"),
+        ('<joint name="j" type="slide" axis="1 0 0" range="0.0 1.0" frictionloss="1e-12"/>', "", "body 'b' has 0 joints, none at place 0"),
+        ('<plugin instance="p"/>', "", "0 bodies refer to it; put <plugin instance=\"...\"/> into exactly the one body"),
+        ('<body name="b">', '<body name="c"><geom size=".1"/><plugin instance="p"/></body><body name="b">', "2 bodies refer to it"),
+    ],
+)  # fmt: skip
+def test_a_wrong_place_is_refused_in_one_sentence(old, new, message):
+    text = scene(damping=flat(1.0), equality=False)
+    assert old in text
+    assert message in refused(text.replace(old, new))
+
+
+def test_no_range_is_refused():
+    text = configured(damping=flat(1.0)).replace('range="0.0 1.0"', "", 1)
+    text = re.sub(r"<equality>.*</equality>", "", text)
+    assert "attribute \"range\": joint 'j' has no range; give it one, or write this attribute" in refused(text)
+
+
+def test_the_joints_own_range_is_the_default():
+    given, default = (mujoco.MjModel.from_xml_string(t) for t in (
+        configured(range="0 1", conservative=component((0, 1), (0, 1), (1, 2))),
+        configured(conservative=component((0, 1), (0, 1), (1, 2))),
+    ))  # fmt: skip
+    forces = []
+    for model in (given, default):
+        data = mujoco.MjData(model)
+        data.qpos[0] = 0.3
+        mujoco.mj_forward(model, data)
+        forces.append(data.qfrc_passive[0])
+    assert forces == pytest.approx([1.3, 1.3])
+
+
+def test_joints_of_one_body_are_told_apart_by_their_place():
+    config = "".join(
+        f'<config key="{key}" value="{value}"/>'
+        for key, value in {"0.conservative": flat(-2.0), "1.conservative": flat(3.0), "1.damping": flat(1.0)}.items()
+    )
+    model = mujoco.MjModel.from_xml_string(TWO_JOINTS.format(config=config))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_passive == pytest.approx([-2, 3])
+    assert model.npluginstate == 2
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("friction", "body 'arm' has 2 joints; write each attribute with the joint's place in the body in front, as in \"0.friction\""),
+        ("2.friction", "body 'arm' has 2 joints, none at place 2"),
+    ],
+)  # fmt: skip
+def test_wrong_places_in_a_body_are_refused(key, message):
+    config = f'<config key="{key}" value="{flat(1.0)}"/>'
+    assert message in refused(TWO_JOINTS.format(config=config))
+
+
+def test_a_joint_is_configured_once():
+    assert "is configured twice" in refused(configured(**{"friction": flat(1.0), "0.friction": flat(1.0)}))
+
+
+def test_plain_mujoco_loads_the_plugin():
+    code = f"import mujoco; mujoco.MjModel.from_xml_string('''{scene(damping=flat(1.0))}'''); print('loaded')"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (result.stdout, result.stderr) == ("loaded\n", "")
+
+
+@pytest.mark.parametrize("first", ["joda", "mujoco", "joda.attach", "joda.bench"])
+def test_any_import_order_works(first):
+    code = f"import {first}, mujoco, joda; joda.plugin_path()"
+    result = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_plugin_path_is_the_library():
+    assert joda.plugin_path().name.startswith("libjoda_plugin")
+    assert joda.plugin_path().is_file()
+
+
+def test_another_mujoco_is_refused(monkeypatch):
+    monkeypatch.setattr(plugin, "_loaded", False)
+    monkeypatch.setattr(mujoco, "mj_versionString", lambda: "3.17.0")
+    message = f"joda was built for MuJoCo {mujoco.__version__} and found 3.17.0; run: pip install mujoco=={mujoco.__version__}"
+    with pytest.raises(joda.JodaError, match=re.escape(message)):
+        plugin.load()
+
+
+def test_a_missing_library_is_named(monkeypatch, tmp_path):
+    monkeypatch.setattr(plugin, "__file__", str(tmp_path / "plugin.py"))
+    with pytest.raises(joda.JodaError, match="the plugin library libjoda_plugin is missing; reinstall joda"):
+        plugin.plugin_path()
+
+
+def test_hand_edited_text_is_read_generously():
+    """Line breaks, no labels, labels with colons, a closing semicolon."""
+    text = "\n  door: latch: 0 .5 | 0 1 | -1 -1 ;\n  0.5 1 | 0 .5 1 | 2 2 2;\n"
+    model, data = load(text)
+    for position, force in ((0.2, -1), (0.7, 2)):
+        data.qpos[0] = position
+        mujoco.mj_forward(model, data)
+        assert data.qfrc_passive[0] == pytest.approx(force)
