@@ -41,14 +41,15 @@ int CountPositive(const mjtNum* values, int n) {
 
 // Row among [first, last) of this step's constraints that belongs to the object, -1: none. Rows
 // come in the order of their objects. `expected` is tried first, then bisection.
-int FindRow(const mjData* d, int first, int last, int expected, int type, int id) {
-  int lo = first, hi = last, row = first + expected;
-  if (row >= last) row = (lo + hi) / 2;
+inline int FindRow(const mjData* d, int first, int last, int expected, int type, int id) {
+  int row = first + expected;
+  if (row < last && d->efc_type[row] == type && d->efc_id[row] == id) return row;
+  int lo = first, hi = last;
   while (lo < hi) {
+    row = (lo + hi) / 2;
     if (d->efc_type[row] == type && d->efc_id[row] == id) return row;
     const bool before = d->efc_type[row] < type || (d->efc_type[row] == type && d->efc_id[row] < id);
     (before ? lo : hi) = before ? row + 1 : row;
-    row = (lo + hi) / 2;
   }
   return -1;
 }
@@ -106,12 +107,13 @@ void SetRow(const Step& step, mjData* d, int row, double D, double bound, double
 // Part of the field that must act implicitly for stability, as a stiffness: what is stiffer than
 // kExplicitStiffness at the steepest place that the joint may reach within this step, or would move
 // it by more than a fraction of its range (kStride).
-double ImplicitStiffness(const Profile& p, double s, double v, double force, double h,
+double ImplicitStiffness(const Step& step, const Profile& p, double s, double v, double force,
                          double inertia) {
-  const double soft = kExplicitStiffness * inertia / (h * h);
-  double stiffness = std::abs(force) * p.per_range / kStride;
+  const double soft = kExplicitStiffness * inertia * step.per_h * step.per_h;
+  double stiffness = std::abs(force) * p.per_range * (1 / kStride);
   if (p.conservative.MaxDescent() * p.per_range > soft) {
-    const double reach = (h * std::abs(v) + h * h / inertia * std::abs(force)) * p.per_range;
+    const double free = step.h * (std::abs(v) + step.h / inertia * std::abs(force));
+    const double reach = free * p.per_range;
     stiffness = std::max(stiffness, p.conservative.MaxDescent(s - reach, s + reach) * p.per_range);
   }
   return std::max(0.0, stiffness - soft);
@@ -167,7 +169,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) const {
     double force = 0, stiffness = 0, drag = 0, friction = 0;
     if (step.spring) {
       force = p.conservative(s).value;
-      stiffness = ImplicitStiffness(p, s, v, force, h, inertia);
+      stiffness = ImplicitStiffness(step, p, s, v, force, inertia);
       drag = h * stiffness;
     }
     if (step.damper) drag += p.damping(s).value;

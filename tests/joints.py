@@ -3,10 +3,11 @@
 import mujoco
 import numpy as np
 
+from joda.scene import INERT
+
 SOLVERS = ("Newton", "CG", "PGS")
 EULER_LIKE = ("Euler", "implicit", "implicitfast")
 
-ROWS = 'solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
 
 
 def flat(value: float, a: float = 0, b: float = 1) -> str:
@@ -43,7 +44,7 @@ def scene(
     body = (
         f'<inertial pos="0 0 0" mass="{inertia!r}" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>'
     )
-    row = f'<equality><joint name="joda_damping_j" joint1="j" {ROWS}/></equality>'
+    row = f'<equality><joint name="joda_damping_j" joint1="j" {INERT}/></equality>'
     return f"""
     <mujoco>
       <compiler angle="radian" boundmass="0" boundinertia="0"/>

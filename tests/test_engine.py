@@ -3,11 +3,12 @@
 import mujoco
 import numpy as np
 import pytest
-from joints import ROWS, SOLVERS, component, flat, load, run, scene, warnings
+from joints import SOLVERS, component, flat, load, run, scene, warnings
 from mujoco import batch, rollout
 
 import joda
 from joda.profile import Channel, Channels, Component, Joint, Profile, Resistance
+from joda.scene import INERT
 
 FULL = mujoco.mjtState.mjSTATE_INTEGRATION
 LATCH = component((0, 0.3), (0, 0.5, 1), (-2, -3, 0))
@@ -38,7 +39,7 @@ def chain(count: int = 4, option: str = "", joint: str = "") -> str:
     """Hinged links that fall on a floor, each with all three channels: contacts and coupling."""
     keys = "".join(f'<config key="{k}" value="{v}"/>' for k, v in EVERYTHING.items())
     instances = "".join(f'<instance name="p{k}">{keys}</instance>' for k in range(count))
-    rows = "".join(f'<joint name="joda_damping_j{k}" joint1="j{k}" {ROWS}/>' for k in range(count))
+    rows = "".join(f'<joint name="joda_damping_j{k}" joint1="j{k}" {INERT}/>' for k in range(count))
     links, close = "", ""
     for k in range(count):
         links += (

@@ -2,8 +2,8 @@
 
 Per joint that is: a named plugin instance with the profile's numbers, a reference to it in the body
 that the joint moves, a trace of `frictionloss` (it makes the solver row that carries the dry
-friction), and an equality
-constraint on the joint, inert by itself (the plugin makes its row the damping).
+friction), and an equality constraint on the joint, inert by itself (the plugin makes its row the
+damping).
 """
 
 import math
@@ -24,22 +24,16 @@ from joda.mjcf import Element, MjcfError, Source
 from joda.model import find_joint, joint_name, joint_type, load, sentence
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
-from joda.scene import find_instance, prefix
+from joda.scene import DAMPING_ROW, INERT, TRACE, find_instance, prefix
 
-TRACE = "1e-12"
-"""A frictionloss (N or N·m) that makes a solver row and is otherwise nothing."""
-
-INERT = 'solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
-"""Makes an equality constraint that does nothing until the plugin sets its row."""
+DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
+"""Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
 
 SAME = (
     *("nq", "nu", "nbody", "ngeom", "nsensor", "jnt_type", "jnt_axis", "jnt_pos", "jnt_range"),
     *("qpos0", "body_mass", "dof_invweight0", "geom_size", "actuator_gainprm"),
 )
 """What of the model must be the same afterwards."""
-
-DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
-"""Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
 
 
 def attach(
@@ -150,6 +144,8 @@ class _Scene:
         self._compare_range(joint, profile)
         changes = self._native(joint, native)
         changes |= self._limit(joint, profile)
+        if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
+            changes |= self._discrete(joint)
         if not self.names[joint]:
             changes["name"] = self._new_name(joint)
             self._note(joint, f"had no name and is now '{changes['name']}'")
@@ -157,7 +153,7 @@ class _Scene:
         self.joints[joint][1].set(**changes)
         self._configure(joint, profile)
         if not self._has_row(joint):
-            row, name = quoteattr(f"joda_damping_{self.names[joint]}"), quoteattr(self.names[joint])
+            row, name = quoteattr(DAMPING_ROW + self.names[joint]), quoteattr(self.names[joint])
             self.rows.append(f"<joint name={row} joint1={name} {INERT}/>")
 
     def finish(self, folder: Path) -> bytes:
@@ -222,7 +218,7 @@ class _Scene:
         """Whether the joint has the equality that carries the damping."""
         m = self.model
         return any(
-            m.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT
+            m.eq_type[k] == int(mujoco.mjtEq.mjEQ_JOINT)
             and (m.eq_obj1id[k], m.eq_obj2id[k]) == (joint, -1)
             and "joda_damping" in m.equality(k).name
             for k in range(m.neq)
@@ -290,6 +286,14 @@ class _Scene:
     def _note(self, joint: int, text: str) -> None:
         name = self.names[joint] or joint_name(self.model, joint)
         self.notes.append(f"joint '{name}' {text}.")
+
+    def _discrete(self, joint: int) -> dict[str, str]:
+        """MuJoCo's stiffest friction row, under the integrator that leaves the plugin no row."""
+        self._note(joint, "gets a stiff friction row of MuJoCo's own, for integrator discrete")
+        return {
+            "solreffriction": f"0 {-1 / self.model.opt.timestep:g}",
+            "solimpfriction": "0.9999 0.9999",
+        }
 
     def _new_name(self, joint: int) -> str:
         body = self.model.body(self.model.jnt_bodyid[joint]).name or "unnamed"

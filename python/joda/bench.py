@@ -13,12 +13,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from joda.attach import INERT
 from joda.errors import JodaError
 from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import CHANNELS, Channel, Channels, Component, Joint, Profile, Resistance
-from joda.scene import read_profiles
+from joda.scene import DAMPING_ROW, INERT, TRACE, read_profiles
 
 ROUNDS = 31
 SWING = 100  # steps; all joints move meanwhile
@@ -85,7 +84,7 @@ def bench(
 def hinges(count: int, kind: str) -> mujoco.MjModel:
     """Doors side by side: "plain", with "native" spring, damping and friction, or with profiles."""
     native = 'stiffness="0.5" damping="0.2" frictionloss="0.1"' if kind == "native" else ""
-    native = 'frictionloss="1e-12"' if kind == "joda" else native
+    native = f'frictionloss="{TRACE}"' if kind == "joda" else native
     bodies, instances, rows = [], [], []
     config = "".join(f'<config key="{k}" value="{v}"/>' for k, v in _three_channels().attributes().items())
     for k in range(count):
@@ -95,11 +94,12 @@ def hinges(count: int, kind: str) -> mujoco.MjModel:
             f'<geom type="box" size=".2 .01 .2" pos=".2 0 0" mass="1"/>{reference}</body>'
         )
         instances.append(f'<instance name="p{k}">{config}</instance>')
-        rows.append(f'<joint name="joda_damping_j{k}" joint1="j{k}" {INERT}/>')
+        rows.append(f'<joint name="{DAMPING_ROW}j{k}" joint1="j{k}" {INERT}/>')
     extension = f'<extension><plugin plugin="{PLUGIN}">{"".join(instances)}</plugin></extension>'
     extra = (extension, f"<equality>{''.join(rows)}</equality>") if kind == "joda" else ("", "")
+    quiet = '<option><flag contact="disable"/></option>'  # a row of doors is no collision benchmark
     return mujoco.MjModel.from_xml_string(
-        f'<mujoco><compiler angle="radian"/><option><flag contact="disable"/></option>{extra[0]}'
+        f'<mujoco><compiler angle="radian"/>{quiet if count > 1 else ""}{extra[0]}'
         f"<worldbody>{''.join(bodies)}</worldbody>{extra[1]}</mujoco>"
     )
 
@@ -171,7 +171,7 @@ def _without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> m
         if plugin.plugin_name == PLUGIN:
             spec.delete(plugin)
     for equality in list(spec.equalities):
-        if equality.name.startswith("joda_damping_"):
+        if equality.name.startswith(DAMPING_ROW):
             spec.delete(equality)
     grid = np.linspace(0, 1, 101)
     for name, profile in profiles.items():

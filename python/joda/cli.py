@@ -26,7 +26,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 
 @app.command()
 def demo(
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to fill.")] = Path("joda_demo"),
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder to fill [default: joda_demo].")
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

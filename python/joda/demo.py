@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import count
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -55,7 +56,7 @@ class Demo:
 
 
 def demo(
-    output: str | Path = "joda_demo",
+    output: str | Path | None = None,
     *,
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
@@ -63,7 +64,8 @@ def demo(
     """Attaches the bundled latch to the bundled microwave and lets both doors go at 3 degrees.
 
     Args:
-        output: folder for everything that is made; created if missing.
+        output: folder for everything that is made; created if missing. By default joda_demo, or
+            the first of joda_demo_2, joda_demo_3, ... that does not exist.
         force: overwrite what an earlier demo left there.
         progress: told what is being done.
 
@@ -73,7 +75,7 @@ def demo(
     Raises:
         JodaError: the folder cannot be written, or holds files already.
     """
-    folder = Path(output)
+    folder = Path(output) if output is not None else _fresh("joda_demo")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not force:
         raise JodaError(f"{folder}: exists already; choose another folder with -o or add --force.")
     try:
@@ -118,6 +120,11 @@ def demo(
         shut_after=float(shut[0]) if len(shut) else float("nan"),
         duration=DURATION,
     )
+
+
+def _fresh(name: str) -> Path:
+    candidates = (Path(f"{name}_{k}" if k > 1 else name) for k in count(1))
+    return next(path for path in candidates if not path.exists())
 
 
 def _picture(motions: list[Motion], views: Sequence[Image]) -> "Figure":

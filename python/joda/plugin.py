@@ -60,7 +60,7 @@ def set_profile(
     Raises:
         JodaError: the joint does not exist or carries no profile.
     """
-    from joda import _core
+    import joda._core as core
 
     number = joint if isinstance(joint, int) else model.joint(joint).id
     attributes = profile.attributes()
@@ -71,6 +71,6 @@ def set_profile(
     ]
     lo, hi = profile.joint.range
     try:
-        _core.set_profile(model._address, data._address, number, lo, hi, texts)
+        core.set_profile(model._address, data._address, number, lo, hi, texts)
     except ValueError as error:
         raise JodaError(str(error)) from None

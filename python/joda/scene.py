@@ -9,6 +9,15 @@ from joda.model import describe_joint, load
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
 
+TRACE = "1e-12"
+"""A frictionloss (N or N·m) that makes a solver row and is otherwise nothing."""
+
+DAMPING_ROW = "joda_damping_"
+"""Begins the name of the equality constraint whose row carries a joint's damping."""
+
+INERT = 'solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
+"""Makes that constraint do nothing until the plugin sets its row."""
+
 
 def find_instance(
     spec: mujoco.MjSpec, model: mujoco.MjModel, body: int

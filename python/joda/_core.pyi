@@ -1,0 +1,23 @@
+"""Types of the C++ core; see cpp/bindings.cc."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+MUJOCO_VERSION: int
+
+class Channel:
+    """A channel of a profile, merged at load."""
+
+    def __init__(self, text: str, combine: str = "sum", nonnegative: bool = False) -> None: ...
+    def __call__(self, s: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def max_descent(self) -> float: ...
+    @property
+    def knots(self) -> NDArray[np.float64]: ...
+    @property
+    def coefficients(self) -> NDArray[np.float64]: ...
+
+def set_profile(
+    model_address: int, data_address: int, joint: int, lo: float, hi: float, texts: Sequence[str]
+) -> None: ...
