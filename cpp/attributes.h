@@ -4,7 +4,8 @@
 //
 // One component after another, separated by ';'. The label and its ':' may be left out. [a, b] is
 // the interval in normalised joint position, x the control points in the component's own coordinate
-// (from 0 to 1), y their values in physical units. Every error is one sentence (std::invalid_argument).
+// (from 0 to 1), y their values in physical units. Every error is one sentence
+// (std::invalid_argument).
 #ifndef JODA_ATTRIBUTES_H_
 #define JODA_ATTRIBUTES_H_
 
@@ -90,7 +91,8 @@ inline void Validate(const Component& c, bool nonnegative) {
     }
   }
   if (!(c.y.cwiseAbs().maxCoeff() <= kMaxValue)) fail("y must lie between -1e15 and 1e15");
-  if (nonnegative && c.y.minCoeff() < 0) fail("values of friction and damping must not be negative");
+  if (nonnegative && c.y.minCoeff() < 0)
+    fail("values of friction and damping must not be negative");
 }
 
 // All components of one channel; the text may be empty.

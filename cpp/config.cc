@@ -13,9 +13,9 @@ namespace {
 constexpr int kMaxJoints = 6;  // hinges and slides that one MuJoCo body can have
 
 // "range", then the texts of the channels.
-constexpr std::array<const char*, 7> kKeys = {"range",    "conservative",     "conservative_combine",
-                                              "friction", "friction_combine", "damping",
-                                              "damping_combine"};
+constexpr std::array<const char*, 7> kKeys = {
+    "range",   "conservative",   "conservative_combine", "friction", "friction_combine",
+    "damping", "damping_combine"};
 
 const char* Value(const mjModel* m, int instance, const std::string& key) {
   const char* value = mj_getPluginConfig(m, instance, key.c_str());
@@ -97,9 +97,8 @@ auto Attribute(const std::string& key, const Parse& parse) {
 PiecewiseCubic ParseNamed(const std::string& prefix, const char* const* keys,
                           const char* const* texts, bool nonnegative) {
   const Combine combine = Attribute(prefix + keys[1], [&] { return ParseCombine(texts[1]); });
-  return Attribute(prefix + keys[0], [&] {
-    return PiecewiseCubic(ParseChannel(texts[0], nonnegative), combine);
-  });
+  return Attribute(prefix + keys[0],
+                   [&] { return PiecewiseCubic(ParseChannel(texts[0], nonnegative), combine); });
 }
 
 }  // namespace

@@ -260,8 +260,8 @@ class PiecewiseCubic {
     }
   }
 
-  Eigen::VectorXd knots_;         // n + 1, increasing
-  Eigen::Matrix4Xd c_;            // coefficients about the left knot of each piece
+  Eigen::VectorXd knots_;  // n + 1, increasing
+  Eigen::Matrix4Xd c_;     // coefficients about the left knot of each piece
   std::array<int, kBuckets + 1> buckets_{};
   std::vector<Sample> at_knots_;  // exact values at the knots, where closed intervals may meet
   double max_descent_ = 0;

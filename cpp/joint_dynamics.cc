@@ -19,9 +19,12 @@ constexpr double kExplicitStiffness = 1;
 // Largest part of the range through which the field alone may move the joint in one step.
 constexpr double kStride = 0.25;
 
-// The friction row's D over the joint's inertia. Larger is stiffer, but the solver's line search (50
-// evaluations) must still find the narrow zone in which the joint sticks.
+// The friction row's D over the joint's inertia. Larger is stiffer, but the solver's line search
+// (50 evaluations) must still find the narrow zone in which the joint sticks.
 constexpr double kStiffRow = 1e4;
+
+// The damping row's D over the joint's inertia where there is no damping: as good as no row.
+constexpr double kIdleRow = 1e-10;
 
 // The equality constraint on the joint alone that is there to carry the damping, -1: none.
 int FindEquality(const mjModel* m, int joint) {
@@ -48,7 +51,8 @@ inline int FindRow(const mjData* d, int first, int last, int expected, int type,
   while (lo < hi) {
     row = (lo + hi) / 2;
     if (d->efc_type[row] == type && d->efc_id[row] == id) return row;
-    const bool before = d->efc_type[row] < type || (d->efc_type[row] == type && d->efc_id[row] < id);
+    const bool before =
+        d->efc_type[row] < type || (d->efc_type[row] == type && d->efc_id[row] < id);
     (before ? lo : hi) = before ? row + 1 : row;
   }
   return -1;
@@ -152,8 +156,7 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
     mine.profile = std::move(profile);
     return;
   }
-  throw std::invalid_argument(JointName(m, joint) +
-                              " carries no profile; attach one first");
+  throw std::invalid_argument(JointName(m, joint) + " carries no profile; attach one first");
 }
 
 void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) const {
@@ -184,7 +187,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) const {
     }
     const int damping_row = step.keeps_rows ? FindDampingRow(d, joint) : -1;
     if (damping_row >= 0) {
-      SetRow(step, d, damping_row, std::max(h * drag, mjMINVAL), 0, 0);
+      SetRow(step, d, damping_row, std::max(h * drag, kIdleRow * inertia), 0, 0);
       drag = 0;
     } else {
       force /= 1 + h * h * stiffness / inertia;
@@ -226,8 +229,8 @@ void JointDynamics::Register() {
       d->plugin_data[instance] = reinterpret_cast<uintptr_t>(new JointDynamics(m, instance));
       return 0;
     } catch (const std::exception& error) {
-      mju_warning("joda.joint_dynamics: instance '%s': %s",
-                  m->names + m->name_pluginadr[instance], error.what());
+      mju_warning("joda.joint_dynamics: instance '%s': %s", m->names + m->name_pluginadr[instance],
+                  error.what());
       return -1;
     }
   };
@@ -260,7 +263,8 @@ extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double l
     int slot = -1;
     mjp_getPlugin("joda.joint_dynamics", &slot);
     if (instance < 0 || m->plugin[instance] != slot) {
-      throw std::invalid_argument("its body carries no joda.joint_dynamics; attach a profile first");
+      throw std::invalid_argument(
+          "its body carries no joda.joint_dynamics; attach a profile first");
     }
     reinterpret_cast<joda::JointDynamics*>(d->plugin_data[instance])
         ->SetProfile(m, joint, joda::ParseProfile("", lo, hi, texts));

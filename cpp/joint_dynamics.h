@@ -56,6 +56,6 @@ class JointDynamics {
 // Replaces the profile of `joint` in `d` only; the texts are as in the attributes. Returns 0, or -1
 // with one sentence in `error`.
 extern "C" MJAPI int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
-                                const char* const texts[6], char* error, int error_size);
+                                      const char* const texts[6], char* error, int error_size);
 
 #endif  // JODA_JOINT_DYNAMICS_H_

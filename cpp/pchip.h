@@ -43,7 +43,8 @@ inline Eigen::VectorXd PchipSlopes(const Eigen::VectorXd& x, const Eigen::Vector
   return d;
 }
 
-// Column k holds c0..c3 of the cubic c0 + c1 t + c2 t^2 + c3 t^3, t = x - x[k], on [x[k], x[k + 1]].
+// Column k holds c0..c3 of the cubic c0 + c1 t + c2 t^2 + c3 t^3, t = x - x[k], on [x[k], x[k +
+// 1]].
 inline Eigen::Matrix4Xd PchipCubics(const Eigen::VectorXd& x, const Eigen::VectorXd& y) {
   const Eigen::VectorXd d = PchipSlopes(x, y);
   Eigen::Matrix4Xd c(4, x.size() - 1);

@@ -33,8 +33,8 @@ double Uniform(Random& random) { return std::uniform_real_distribution<>(0, 1)(r
 
 std::string Number(Random& random) {
   static const char* const extremes[] = {
-      "0",    "1",   "-0.0", "1e15", "-1e15", "1.1e15", "1e308", "-1e308", "1e309",
-      "1e-9", "nan", "inf",  "5e-324", "-2.2e-308", "1e-160", "0x1p3", "+1", "--1"};
+      "0",    "1",   "-0.0", "1e15",   "-1e15",     "1.1e15", "1e308", "-1e308", "1e309",
+      "1e-9", "nan", "inf",  "5e-324", "-2.2e-308", "1e-160", "0x1p3", "+1",     "--1"};
   if (Below(random, 6) == 0) return Pick(random, extremes);
   const int exponent = Below(random, 8) == 0 ? Below(random, 40) - 24 : 0;
   return Print((2 * Uniform(random) - 1) * std::pow(10, exponent));
@@ -81,11 +81,21 @@ std::string Mutate(Random& random, std::string text) {
   for (int k = Below(random, 4); k > 0 && !text.empty(); --k) {
     const size_t at = random() % text.size();
     switch (Below(random, 5)) {
-      case 0: text[at] = Pick(random, "0123456789.eE+-|;: \n\xc3"); break;
-      case 1: text.insert(at, " " + Number(random) + " "); break;
-      case 2: text.erase(at, 1 + random() % 8); break;
-      case 3: text.insert(at, text.substr(at, random() % 40)); break;
-      default: text.insert(at, Bytes(random)); break;
+      case 0:
+        text[at] = Pick(random, "0123456789.eE+-|;: \n\xc3");
+        break;
+      case 1:
+        text.insert(at, " " + Number(random) + " ");
+        break;
+      case 2:
+        text.erase(at, 1 + random() % 8);
+        break;
+      case 3:
+        text.insert(at, text.substr(at, random() % 40));
+        break;
+      default:
+        text.insert(at, Bytes(random));
+        break;
     }
   }
   return text;

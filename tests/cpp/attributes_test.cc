@@ -18,7 +18,8 @@ std::string Error(const std::string& text, bool nonnegative = false) {
 }
 
 TEST_CASE("a channel is parsed with labels, white space and a closing semicolon") {
-  const auto channel = ParseChannel("\n latch: 0 0.5 |0 .5 1| 1 -2e0 3;\t0.5 1 | 0 1 | 4 5 ; ", false);
+  const auto channel =
+      ParseChannel("\n latch: 0 0.5 |0 .5 1| 1 -2e0 3;\t0.5 1 | 0 1 | 4 5 ; ", false);
   REQUIRE(channel.size() == 2);
   CHECK(channel[0].label == "latch");
   CHECK(channel[0].b == 0.5);
