@@ -9,7 +9,6 @@ SOLVERS = ("Newton", "CG", "PGS")
 EULER_LIKE = ("Euler", "implicit", "implicitfast")
 
 
-
 def flat(value: float, a: float = 0, b: float = 1) -> str:
     """A component that is constant on [a, b]."""
     return f"{a!r} {b!r} | 0 1 | {float(value)!r} {float(value)!r}"
@@ -41,9 +40,7 @@ def scene(
     """MJCF of a slide (mass) or hinge (inertia) along x, without gravity."""
     keys = {"conservative": conservative, "friction": friction, "damping": damping}
     config = "".join(f'<config key="{k}" value="{v}"/>' for k, v in keys.items() if v)
-    body = (
-        f'<inertial pos="0 0 0" mass="{inertia!r}" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>'
-    )
+    body = f'<inertial pos="0 0 0" mass="{inertia!r}" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>'
     row = f'<equality><joint name="joda_damping_j" joint1="j" {INERT}/></equality>'
     return f"""
     <mujoco>

@@ -74,10 +74,16 @@ def test_mistakes_are_one_sentence_and_leave_nothing(folder):
     composed = "microwave.latch.json"
     attach = ("attach", "microwave.xml", composed, "-o")
     assert "no such file" in fails("attach", "nothing.xml", composed, "-o", "s.xml", cwd=folder)
-    assert "bad.json: not JSON" in fails("attach", "microwave.xml", "bad.json", "-o", "s.xml", cwd=folder)
-    assert "exists already; choose another name or add --force" in fails(*attach, "microwave.xml", cwd=folder)
+    assert "bad.json: not JSON" in fails(
+        "attach", "microwave.xml", "bad.json", "-o", "s.xml", cwd=folder
+    )
+    assert "exists already; choose another name or add --force" in fails(
+        *attach, "microwave.xml", cwd=folder
+    )
     assert "does not exist; create it first" in fails(*attach, "no/s.xml", cwd=folder)
-    assert "hinges and slides of the model: 'door'" in fails(*attach, "s.xml", "--joint", "dor", cwd=folder)
+    assert "hinges and slides of the model: 'door'" in fails(
+        *attach, "s.xml", "--joint", "dor", cwd=folder
+    )
     assert "carries no profile" in fails("plot", "microwave.xml", cwd=folder)
     assert "carries no profile; attach one first" in fails("bench", "microwave.xml", cwd=folder)
     assert "Missing" in fails("attach", cwd=folder)
@@ -96,6 +102,12 @@ def test_the_schema_describes_the_file():
     validator.validate(good)
     with pytest.raises(jsonschema.ValidationError):
         validator.validate({**good, "chanels": {}})
+
+
+def test_the_templates_schema_fits_the_library():
+    validator = jsonschema.Draft202012Validator(json.loads(joda("schema", "template").stdout))
+    for path in (MODELS.parent / "templates").glob("*.json"):
+        validator.validate(json.loads(path.read_text()))
 
 
 def test_a_hand_written_file_with_only_the_fixed_keys_is_valid(tmp_path):
@@ -130,7 +142,9 @@ class TestDemo:
 
     def test_it_overwrites_only_when_told_to(self, tmp_path):
         (tmp_path / "mine.txt").write_text("mine")
-        assert "exists already; choose another folder with -o or add --force" in fails("demo", "-o", tmp_path)
+        assert "exists already; choose another folder with -o or add --force" in fails(
+            "demo", "-o", tmp_path
+        )
         assert joda("demo", "-o", tmp_path, "--force").returncode == 0
         assert (tmp_path / "mine.txt").read_text() == "mine"
 
@@ -172,7 +186,9 @@ class TestPlot:
         from joda.errors import JodaError
 
         (tmp_path / "two.xml").write_text(TWO)
-        with pytest.raises(JodaError, match="several joints carry a profile; choose with --joint: 'a', 'b'"):
+        with pytest.raises(
+            JodaError, match="several joints carry a profile; choose with --joint: 'a', 'b'"
+        ):
             plot(tmp_path / "two.xml")
         with pytest.raises(JodaError, match="joint 'c' carries no profile; these do: 'a', 'b'"):
             plot(tmp_path / "two.xml", joint="c")

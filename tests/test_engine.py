@@ -12,7 +12,9 @@ from joda.scene import INERT
 
 FULL = mujoco.mjtState.mjSTATE_INTEGRATION
 LATCH = component((0, 0.3), (0, 0.5, 1), (-2, -3, 0))
-EVERYTHING = dict(conservative=LATCH, friction=flat(0.2), damping=component((0, 1), (0, 1), (0.1, 0.6)))
+EVERYTHING = dict(
+    conservative=LATCH, friction=flat(0.2), damping=component((0, 1), (0, 1), (0.1, 0.6))
+)
 
 
 def swinging(**options):
@@ -62,13 +64,17 @@ def chain(count: int = 4, option: str = "", joint: str = "") -> str:
 def test_solvers_jacobians_and_islands_agree(solver, jacobian, island):
     def final(solver, jacobian, island):
         option = f'solver="{solver}" jacobian="{jacobian}" tolerance="1e-13" iterations="5000"'
-        text = chain(option=option).replace("<worldbody>", f'<option><flag island="{island}"/></option><worldbody>', 1)
+        text = chain(option=option).replace(
+            "<worldbody>", f'<option><flag island="{island}"/></option><worldbody>', 1
+        )
         model = mujoco.MjModel.from_xml_string(text)
         data = mujoco.MjData(model)
         run(model, data, 0.25)  # before the first contact, where the solvers differ by themselves
         return np.concatenate([data.qpos, data.qvel])
 
-    assert final(solver, jacobian, island) == pytest.approx(final("Newton", "dense", "disable"), abs=1e-6)
+    assert final(solver, jacobian, island) == pytest.approx(
+        final("Newton", "dense", "disable"), abs=1e-6
+    )
 
 
 def test_inverse_dynamics_give_the_applied_force_back():
@@ -86,7 +92,9 @@ def test_inverse_dynamics_give_the_applied_force_back():
 def test_finite_difference_derivatives_match_the_closed_form():
     """A' = dv+/dq, dv+/dv of backward-Euler damping and explicit force, sliding."""
     h, inertia, k, c = 0.002, 0.05, 3.0, 0.4
-    model, data = load(component((0, 1), (0, 1), (k / 2, -k / 2)), flat(0.1), flat(c), inertia=inertia, h=h)
+    model, data = load(
+        component((0, 1), (0, 1), (k / 2, -k / 2)), flat(0.1), flat(c), inertia=inertia, h=h
+    )
     data.qvel[0] = 1.0
     A = np.zeros((2, 2))
     mujoco.mjd_transitionFD(model, data, 1e-6, True, A, None, None, None)
@@ -218,7 +226,9 @@ def test_swapping_needs_a_joint_that_carries_a_profile():
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><worldbody><body><joint name="j"/><geom size=".1"/></body></worldbody></mujoco>'
     )
-    with pytest.raises(joda.JodaError, match="carries no joda.joint_dynamics; attach a profile first"):
+    with pytest.raises(
+        joda.JodaError, match="carries no joda.joint_dynamics; attach a profile first"
+    ):
         joda.set_profile(model, mujoco.MjData(model), "j", random_profile(np.random.default_rng()))
 
 
@@ -243,7 +253,9 @@ def test_sleeping_and_waking():
 
 def test_sleep_of_one_tree_does_not_disturb_another():
     """Rows of sleeping trees vanish: the awake joint's rows are found all the same."""
-    text = scene(friction=flat(0.5), damping=flat(1.0), inertia=0.1, flag='sleep="enable"', option="")
+    text = scene(
+        friction=flat(0.5), damping=flat(1.0), inertia=0.1, flag='sleep="enable"', option=""
+    )
     child = mujoco.MjSpec.from_string(text)
     parent = mujoco.MjSpec()
     parent.option.gravity = [0, 0, 0]
@@ -297,13 +309,19 @@ class TestMissingRows:
 
     def test_without_the_equality_damping_is_a_limited_force(self):
         h, inertia, c = 0.002, 0.01, 0.5
-        model, data = load(damping=flat(c), inertia=inertia, h=h, equality=False, limits=(-1e3, 1e3))
+        model, data = load(
+            damping=flat(c), inertia=inertia, h=h, equality=False, limits=(-1e3, 1e3)
+        )
         data.qvel[0] = 1.0
         mujoco.mj_step(model, data)
         assert data.qvel[0] == pytest.approx(1 / (1 + h * c / inertia), rel=1e-9)
         for ratio in (1e2, 1e4):
             model, data = load(
-                damping=flat(ratio * inertia / h), inertia=inertia, h=h, equality=False, limits=(-1e3, 1e3)
+                damping=flat(ratio * inertia / h),
+                inertia=inertia,
+                h=h,
+                equality=False,
+                limits=(-1e3, 1e3),
             )
             data.qvel[0] = 1.0
             run(model, data, 1)

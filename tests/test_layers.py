@@ -13,7 +13,7 @@ LAYERS = [
     {"errors", "_build", "_core"},
     {"files", "plugin"},
     {"profile"},
-    {"field", "model", "mjcf"},
+    {"field", "model", "mjcf", "template"},
     {"scene", "simulate", "render"},
     {"attach", "draw"},  # stages, never each other
     {"plot", "bench", "demo"},  # what combines them

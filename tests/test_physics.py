@@ -19,7 +19,12 @@ def test_terminal_speed_is_force_over_damping(solver, integrator, ratio):
     h, inertia, push = 0.002, 0.01, 1.0
     damping = ratio * inertia / h
     model, data = load(
-        damping=flat(damping), inertia=inertia, h=h, limits=WIDE, solver=solver, integrator=integrator
+        damping=flat(damping),
+        inertia=inertia,
+        h=h,
+        limits=WIDE,
+        solver=solver,
+        integrator=integrator,
     )
     data.qfrc_applied[0] = push
     data.qvel[0] = 0.9 * push / damping
@@ -30,7 +35,12 @@ def test_terminal_speed_is_force_over_damping(solver, integrator, ratio):
 @pytest.mark.parametrize(("solver", "integrator"), COMBINATIONS)
 def test_terminal_speed_with_friction_and_damping(solver, integrator):
     model, data = load(
-        friction=flat(0.3), damping=flat(5), inertia=0.01, limits=WIDE, solver=solver, integrator=integrator
+        friction=flat(0.3),
+        damping=flat(5),
+        inertia=0.01,
+        limits=WIDE,
+        solver=solver,
+        integrator=integrator,
     )
     data.qfrc_applied[0] = -1
     run(model, data, 1)
@@ -60,13 +70,17 @@ def test_breakaway_at_the_friction_curve(solver, integrator, inertia, scale):
         data.qfrc_applied[0] = fraction * 1.5 * scale
         run(model, data, 0.2)
         free = 0.5 * abs(fraction - 1) * 1.5 * scale / inertia * 0.2**2  # at constant friction
-        assert abs(data.qpos[0] - 0.25) > 0.1 * min(free, 1e-2) if moves else abs(data.qvel[0]) < 1e-9
+        assert (
+            abs(data.qpos[0] - 0.25) > 0.1 * min(free, 1e-2) if moves else abs(data.qvel[0]) < 1e-9
+        )
 
 
 @pytest.mark.parametrize(("solver", "integrator"), [*COMBINATIONS, ("Newton", "RK4")])
 @pytest.mark.parametrize(("inertia", "friction"), [(1e-6, 0.01), (1e-2, 1.0), (10.0, 100.0)])
 def test_a_held_joint_does_not_creep(solver, integrator, inertia, friction):
-    model, data = load(friction=flat(friction), inertia=inertia, solver=solver, integrator=integrator)
+    model, data = load(
+        friction=flat(friction), inertia=inertia, solver=solver, integrator=integrator
+    )
     data.qfrc_applied[0] = 0.95 * friction
     run(model, data, 60)
     assert abs(data.qpos[0] - 0.5) < 1e-5
@@ -105,7 +119,9 @@ def test_a_detent_settles_where_its_energy_is_least(solver, integrator, inertia)
 @pytest.mark.parametrize("inertia", [1e-5, 1e-2, 1.0])
 def test_a_bistable_joint_settles_on_the_side_where_it_is_let_go(inertia):
     x, y = np.linspace(0, 1, 9), np.array([0.5, 1, 0, -1.2, 0, 1.2, 0, -1, -0.5])
-    model, data = load(component((0, 1), x, y), damping=flat(2 * np.sqrt(inertia * 5)), inertia=inertia)
+    model, data = load(
+        component((0, 1), x, y), damping=flat(2 * np.sqrt(inertia * 5)), inertia=inertia
+    )
     for start, well in ((0.1, 0.25), (0.45, 0.25), (0.55, 0.75), (0.9, 0.75)):
         mujoco.mj_resetData(model, data)
         data.qpos[0] = start
@@ -148,7 +164,9 @@ def test_equals_the_native_joint_step_for_step(kind):
     ours, mine = load(line, flat(friction), flat(damping), kind=kind, inertia=inertia)
     h = ours.opt.timestep
     hard = f'solreffriction="0 {-1 / h}" solimpfriction="0.9999 0.9999"'
-    attributes = f'stiffness="{stiffness}" springref="0.5" frictionloss="{friction}" damping="{damping}"'
+    attributes = (
+        f'stiffness="{stiffness}" springref="0.5" frictionloss="{friction}" damping="{damping}"'
+    )
     text = scene(kind=kind, inertia=inertia, joint=f"{attributes} {hard}", equality=False)
     native = mujoco.MjModel.from_xml_string(text)
     theirs = mujoco.MjData(native)
@@ -179,12 +197,21 @@ def test_rk4_is_right_in_the_limit():
     force, damping = np.array([2.0, 0.5, -1, -2]), np.array([0.1, 1.0, 0.2, 0.5])
     F, C = PchipInterpolator(x, force), PchipInterpolator(x, damping)
     fine = solve_ivp(
-        lambda t, z: [z[1], (F(z[0]) - C(z[0]) * z[1]) / 0.2], (0, 1), [0.15, 0.0], rtol=1e-11, atol=1e-12
+        lambda t, z: [z[1], (F(z[0]) - C(z[0]) * z[1]) / 0.2],
+        (0, 1),
+        [0.15, 0.0],
+        rtol=1e-11,
+        atol=1e-12,
     ).y[0, -1]
     errors = []
     for h in (0.004, 0.002, 0.001):
         model, data = load(
-            component((0, 1), x, force), "", component((0, 1), x, damping), inertia=0.2, h=h, integrator="RK4"
+            component((0, 1), x, force),
+            "",
+            component((0, 1), x, damping),
+            inertia=0.2,
+            h=h,
+            integrator="RK4",
         )
         data.qpos[0] = 0.15
         run(model, data, 1)
@@ -210,7 +237,10 @@ def test_trajectory_converges_to_scipys(integrator):
     errors = []
     for h in (0.002, 0.001):
         model, data = load(
-            *(component((0, 1), x, y) for y in values.values()), inertia=0.2, h=h, integrator=integrator
+            *(component((0, 1), x, y) for y in values.values()),
+            inertia=0.2,
+            h=h,
+            integrator=integrator,
         )
         data.qpos[0] = 0.15
         run(model, data, 0.4)
@@ -220,7 +250,9 @@ def test_trajectory_converges_to_scipys(integrator):
 
 
 def test_beyond_the_range_the_force_of_the_end_is_held():
-    model, data = load(component((0, 1), (0, 1), (-2.0, 1.0)), joint='frictionloss="1e-12" limited="false"')
+    model, data = load(
+        component((0, 1), (0, 1), (-2.0, 1.0)), joint='frictionloss="1e-12" limited="false"'
+    )
     for position, force in ((-5.0, -2.0), (0.0, -2.0), (1.0, 1.0), (5.0, 1.0)):
         data.qpos[0] = position
         mujoco.mj_forward(model, data)
@@ -234,7 +266,9 @@ class TestDiscrete:
     def test_damping_is_stable_and_right_for_small_steps(self, ratio):
         h, inertia, push = 0.002, 0.01, 1.0
         damping = ratio * inertia / h
-        model, data = load(damping=flat(damping), inertia=inertia, h=h, limits=WIDE, integrator="discrete")
+        model, data = load(
+            damping=flat(damping), inertia=inertia, h=h, limits=WIDE, integrator="discrete"
+        )
         data.qfrc_applied[0] = push
         mujoco.mj_step(model, data, int(np.ceil(20 / ratio)) + 200)
         terminal = push / damping + push * h / inertia  # what the explicit, limited force gives
@@ -251,7 +285,10 @@ class TestDiscrete:
 
 def test_noslip_does_not_lock_the_damping():
     model, data = load(
-        friction=flat(0.3), damping=flat(0.5), inertia=0.1, limits=WIDE,
+        friction=flat(0.3),
+        damping=flat(0.5),
+        inertia=0.1,
+        limits=WIDE,
         option='tolerance="1e-12" noslip_iterations="5"',
     )
     data.qfrc_applied[0] = 1

@@ -76,7 +76,10 @@ def test_a_wrong_place_is_refused_in_one_sentence(old, new, message):
 def test_no_range_is_refused():
     text = configured(damping=flat(1.0)).replace('range="0.0 1.0"', "", 1)
     text = re.sub(r"<equality>.*</equality>", "", text)
-    assert "attribute \"range\": joint 'j' has no range; give it one, or write this attribute" in refused(text)
+    assert (
+        "attribute \"range\": joint 'j' has no range; give it one, or write this attribute"
+        in refused(text)
+    )
 
 
 def test_the_joints_own_range_is_the_default():
@@ -96,7 +99,11 @@ def test_the_joints_own_range_is_the_default():
 def test_joints_of_one_body_are_told_apart_by_their_place():
     config = "".join(
         f'<config key="{key}" value="{value}"/>'
-        for key, value in {"0.conservative": flat(-2.0), "1.conservative": flat(3.0), "1.damping": flat(1.0)}.items()
+        for key, value in {
+            "0.conservative": flat(-2.0),
+            "1.conservative": flat(3.0),
+            "1.damping": flat(1.0),
+        }.items()
     )
     model = mujoco.MjModel.from_xml_string(TWO_JOINTS.format(config=config))
     data = mujoco.MjData(model)
@@ -118,7 +125,9 @@ def test_wrong_places_in_a_body_are_refused(key, message):
 
 
 def test_a_joint_is_configured_once():
-    assert "is configured twice" in refused(configured(**{"friction": flat(1.0), "0.friction": flat(1.0)}))
+    assert "is configured twice" in refused(
+        configured(**{"friction": flat(1.0), "0.friction": flat(1.0)})
+    )
 
 
 def test_plain_mujoco_loads_the_plugin():
@@ -130,7 +139,9 @@ def test_plain_mujoco_loads_the_plugin():
 @pytest.mark.parametrize("first", ["joda", "mujoco", "joda.attach", "joda.bench"])
 def test_any_import_order_works(first):
     code = f"import {first}, mujoco, joda; joda.plugin_path()"
-    result = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True
+    )
     assert (result.returncode, result.stderr) == (0, "")
 
 
@@ -149,7 +160,9 @@ def test_another_mujoco_is_refused(monkeypatch):
 
 def test_a_missing_library_is_named(monkeypatch, tmp_path):
     monkeypatch.setattr(plugin, "__file__", str(tmp_path / "plugin.py"))
-    with pytest.raises(joda.JodaError, match="the plugin library libjoda_plugin is missing; reinstall joda"):
+    with pytest.raises(
+        joda.JodaError, match="the plugin library libjoda_plugin is missing; reinstall joda"
+    ):
         plugin.plugin_path()
 
 

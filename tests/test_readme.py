@@ -19,7 +19,12 @@ def shell(command: str, cwd: Path) -> subprocess.CompletedProcess:
     """Runs the command with this Python's `joda` and `python` first on the path."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return subprocess.run(
-        command, shell=True, cwd=cwd, capture_output=True, text=True, env={**os.environ, "PATH": path}
+        command,
+        shell=True,
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PATH": path},
     )
 
 
@@ -47,7 +52,9 @@ def test_the_python_example(folder):
 
 
 def test_the_xml_example_is_a_profile():
-    config = re.search(r"```xml\n<instance name=\"joda_door\">\n(.*?)</instance>", TEXT, re.DOTALL)[1]
+    config = re.search(r"```xml\n<instance name=\"joda_door\">\n(.*?)</instance>", TEXT, re.DOTALL)[
+        1
+    ]
     model = mujoco.MjModel.from_xml_string(
         f"""<mujoco><extension><plugin plugin="joda.joint_dynamics"><instance name="p">{config}
         </instance></plugin></extension><worldbody><body><joint frictionloss="1e-12"/>

@@ -75,7 +75,9 @@ def bench(
     few, many = hinges(10, "joda"), hinges(200, "joda")
     few_native, many_native = hinges(10, "native"), hinges(200, "native")
     times = _measure([(few, None), (many, None), (few_native, None), (many_native, None)])
-    rows.append(_row("step per joint, 200 joints / 10 joints", times[1] / 200, times[0] / 10, "<= 1.2"))
+    rows.append(
+        _row("step per joint, 200 joints / 10 joints", times[1] / 200, times[0] / 10, "<= 1.2")
+    )
     rows.append(_row("10 hinges, three channels / native elements", times[0], times[2], ""))
     rows.append(_row("200 hinges, three channels / native elements", times[1], times[3], ""))
     return rows
@@ -86,7 +88,9 @@ def hinges(count: int, kind: str) -> mujoco.MjModel:
     native = 'stiffness="0.5" damping="0.2" frictionloss="0.1"' if kind == "native" else ""
     native = f'frictionloss="{TRACE}"' if kind == "joda" else native
     bodies, instances, rows = [], [], []
-    config = "".join(f'<config key="{k}" value="{v}"/>' for k, v in _three_channels().attributes().items())
+    config = "".join(
+        f'<config key="{k}" value="{v}"/>' for k, v in _three_channels().attributes().items()
+    )
     for k in range(count):
         reference = f'<plugin instance="p{k}"/>' if kind == "joda" else ""
         bodies.append(

@@ -43,11 +43,15 @@ def demo(
     with _progress("demo") as progress:
         result = run(output, force=force, progress=progress)
     if as_json:
-        _print_json({key: str(v) if isinstance(v, Path) else v for key, v in asdict(result).items()})
+        _print_json(
+            {key: str(v) if isinstance(v, Path) else v for key, v in asdict(result).items()}
+        )
         return
     degrees = 57.29577951308232
     print(f"Both doors were let go at rest, {result.start * degrees:.1f} degrees open.")
-    print(f"  without a profile: after {result.duration:g} s still {result.plain_end * degrees:.1f} degrees open")
+    print(
+        f"  without a profile: after {result.duration:g} s still {result.plain_end * degrees:.1f} degrees open"
+    )
     print(f"  with the latch:    shut itself after {result.shut_after:.2f} s")
     print("Files:")
     for what in ("picture", "profile", "scene", "composed", "plain"):
@@ -59,7 +63,8 @@ def demo(
 def attach(
     model: Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)],
     composed: Annotated[
-        list[Path], typer.Argument(help="Profiles (composed.json), one per joint.", show_default=False)
+        list[Path],
+        typer.Argument(help="Profiles (composed.json), one per joint.", show_default=False),
     ],
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Scene to write.", show_default=False)
@@ -139,13 +144,17 @@ def bench(
     table = Table("comparison", "ratio", "required", "µs per step", box=None, pad_edge=False)
     for row in rows:
         ours, other = row.microseconds
-        table.add_row(row.what, f"{row.ratio:.3f} ± {row.spread:.3f}", row.bar, f"{ours:.2f} / {other:.2f}")
+        table.add_row(
+            row.what, f"{row.ratio:.3f} ± {row.spread:.3f}", row.bar, f"{ours:.2f} / {other:.2f}"
+        )
     Console(width=None if sys.stdout.isatty() else 110).print(table)
 
 
 @app.command()
 def schema(
-    file: Annotated[Literal["composed"], typer.Argument(help="Which file.")] = "composed",
+    file: Annotated[
+        Literal["composed", "template"], typer.Argument(help="Which file.")
+    ] = "composed",
 ) -> None:
     """Print the JSON Schema of a file format.
 
@@ -154,8 +163,10 @@ def schema(
         joda schema composed
     """
     from joda.profile import Profile
+    from joda.template import Template
 
-    _print_json({"composed": Profile}[file].model_json_schema())
+    model = {"composed": Profile, "template": Template}[file]
+    _print_json(model.model_json_schema())
 
 
 def main() -> None:

@@ -133,13 +133,22 @@ def _picture(motions: list[Motion], views: Sequence[Image]) -> "Figure":
     figure = Figure(figsize=(10, 5.2 if views else 4), dpi=130, layout="constrained")
     names = ("without a profile", "with the latch profile")
     colours = ("#888888", "#c8202f")
-    grid = figure.add_gridspec(len(views) or 1, 2 if views else 1, width_ratios=[2, 1] if views else None)
+    grid = figure.add_gridspec(
+        len(views) or 1, 2 if views else 1, width_ratios=[2, 1] if views else None
+    )
     axes = figure.add_subplot(grid[:, 0])
     for motion, name, colour in zip(motions, names, colours, strict=True):
         axes.plot(motion.time, np.rad2deg(motion.position), color=colour, lw=2.2, label=name)
     axes.axhline(0, color="#333333", lw=0.8)
-    axes.annotate("closed", (DURATION, 0), ha="right", va="bottom", fontsize=9, xytext=(0, 2),
-                  textcoords="offset points")
+    axes.annotate(
+        "closed",
+        (DURATION, 0),
+        ha="right",
+        va="bottom",
+        fontsize=9,
+        xytext=(0, 2),
+        textcoords="offset points",
+    )
     axes.set(xlabel="time (s)", ylabel="door angle (degrees)", xlim=(0, DURATION))
     axes.set_title("A microwave door, let go at 3 degrees", loc="left")
     axes.legend(frameon=False)

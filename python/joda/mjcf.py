@@ -13,6 +13,7 @@ from pathlib import Path
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
+_TAG = re.compile(rb"""<(?:[^"'>]|"[^"]*"|'[^']*')*>""")
 _ATTRIBUTE = re.compile(rb"""\s+([\w:.\-]+)\s*=\s*("[^"]*"|'[^']*')""")
 
 
@@ -194,7 +195,7 @@ class Source:
 
 def _parse(document: Document) -> Element:
     """The tree of a document's elements; raises MjcfError where it is not XML."""
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate("UTF-8")  # as MuJoCo reads, whatever is declared
     content = document.content
     stack: list[Element] = []
     roots: list[Element] = []
@@ -223,9 +224,8 @@ def _parse(document: Document) -> Element:
 
 def _tag_end(content: bytes, start: int) -> int:
     """Index behind the '>' that closes the start tag at `start`."""
-    match = re.compile(rb"""<(?:[^"'>]|"[^"]*"|'[^']*')*>""").match(content, start)
-    if not match:
-        raise MjcfError("unsupported encoding; save the file as UTF-8")
+    match = _TAG.match(content, start)
+    assert match  # as it is well-formed
     return match.end()
 
 

@@ -168,7 +168,11 @@ class Profile(_Frozen):
         strings_or_lists = re.compile(r'"(?:[^"\\]|\\.)*"|\[[^\[\]{}"]*\]')
 
         def fold(match: re.Match[str]) -> str:
-            return match[0] if match[0][0] == '"' else re.sub(r"\s+", " ", match[0]).replace("[ ", "[").replace(" ]", "]")
+            return (
+                match[0]
+                if match[0][0] == '"'
+                else re.sub(r"\s+", " ", match[0]).replace("[ ", "[").replace(" ]", "]")
+            )
 
         return strings_or_lists.sub(fold, text) + "\n"
 

@@ -1,0 +1,96 @@
+"""Effect templates: equivalent joint-level behaviours as prototype curves, one JSON file each."""
+
+from collections.abc import Sequence
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from joda.errors import JodaError
+from joda.files import read_text
+from joda.profile import Component, describe
+
+
+class Curve(BaseModel):
+    """A prototype: PCHIP control points, their largest magnitude 1."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        Component(interval=(0, 1), x=self.x, y=self.y)
+        if max(map(abs, self.y)) != 1:
+            raise ValueError("the largest magnitude in y must be 1")
+        return self
+
+
+class Curves(BaseModel):
+    """Prototypes of the channels; a template may leave channels out."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    conservative: Curve | None = None
+    friction: Curve | None = None
+    damping: Curve | None = None
+
+    @model_validator(mode="after")
+    def _nonnegative(self) -> Self:
+        for name in ("friction", "damping"):
+            curve = getattr(self, name)
+            if curve and min(curve.y) < 0:
+                raise ValueError(f"{name}.y is negative; friction and damping must not be")
+        return self
+
+
+class Template(BaseModel):
+    """An effect that a joint may have.
+
+    Attributes:
+        name: the file's name without its ending.
+        description: the behaviour, for people and models to choose by.
+        placement: where on a joint it is typically found.
+        channels: prototype curves in the interval's own coordinate u, from 0 at its low end to 1.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    description: str
+    placement: str
+    channels: Curves
+
+
+def read_templates(folders: Sequence[str | Path] = ()) -> dict[str, Template]:
+    """The library's templates and those of further folders, by name.
+
+    Args:
+        folders: folders of *.json files; a template there replaces one of the same name.
+
+    Returns:
+        name to template, sorted by name.
+
+    Raises:
+        JodaError: a folder does not exist, or a file is no template.
+    """
+    with as_file(files("joda") / "templates") as bundled:
+        paths = sorted(bundled.glob("*.json"))
+    for folder in map(Path, folders):
+        if not folder.is_dir():
+            raise JodaError(f"{folder}: no such folder of templates.")
+        paths += sorted(folder.glob("*.json"))
+    templates = {path.stem: _read(path) for path in paths}
+    return dict(sorted(templates.items()))
+
+
+def _read(path: Path) -> Template:
+    try:
+        template = Template.model_validate_json(read_text(path))
+    except ValidationError as error:
+        raise JodaError(f"{path}: {describe(error)}") from None
+    if template.name != path.stem:
+        raise JodaError(f"{path}: name: must be the file's name, '{path.stem}'.")
+    return template
