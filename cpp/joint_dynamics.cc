@@ -24,7 +24,7 @@ constexpr double kStride = 0.25;
 constexpr double kStiffRow = 1e4;
 
 // The damping row's D over the joint's inertia where there is no damping: as good as no row.
-constexpr double kIdleRow = 1e-10;
+constexpr double kIdleRow = 1e-12;
 
 // The equality constraint on the joint alone that is there to carry the damping, -1: none.
 int FindEquality(const mjModel* m, int joint) {

@@ -40,7 +40,8 @@ def scene(
     """MJCF of a slide (mass) or hinge (inertia) along x, without gravity."""
     keys = {"conservative": conservative, "friction": friction, "damping": damping}
     config = "".join(f'<config key="{k}" value="{v}"/>' for k, v in keys.items() if v)
-    body = f'<inertial pos="0 0 0" mass="{inertia!r}" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>'
+    i = repr(inertia)
+    body = f'<inertial pos="0 0 0" mass="{i}" diaginertia="{i} {i} {i}"/>'
     row = f'<equality><joint name="joda_damping_j" joint1="j" {INERT}/></equality>'
     return f"""
     <mujoco>

@@ -1,4 +1,4 @@
-"""The plugin inside MuJoCo's machinery: inverse, derivatives, copies, states, threads, sleep, flags."""
+"""The plugin in MuJoCo's machinery: inverse, derivatives, copies, states, threads, sleep, flags."""
 
 import mujoco
 import numpy as np
@@ -46,8 +46,9 @@ def chain(count: int = 4, option: str = "", joint: str = "") -> str:
     for k in range(count):
         links += (
             f'<body pos="{0.25 if k else 0} 0 {0 if k else 0.3}">'
-            f'<joint name="j{k}" axis="0 1 0" range="-1.2 1.2" limited="true" frictionloss="1e-12" {joint}/>'
-            f'<geom type="capsule" fromto="0 0 0 .25 0 0" size=".02" mass=".3"/><plugin instance="p{k}"/>'
+            f'<joint name="j{k}" axis="0 1 0" range="-1.2 1.2" frictionloss="1e-12" {joint}/>'
+            f'<geom type="capsule" fromto="0 0 0 .25 0 0" size=".02" mass=".3"/>'
+            f'<plugin instance="p{k}"/>'
         )
         close += "</body>"
     return f"""
@@ -226,9 +227,7 @@ def test_swapping_needs_a_joint_that_carries_a_profile():
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><worldbody><body><joint name="j"/><geom size=".1"/></body></worldbody></mujoco>'
     )
-    with pytest.raises(
-        joda.JodaError, match="carries no joda.joint_dynamics; attach a profile first"
-    ):
+    with pytest.raises(joda.JodaError, match="carries no joda\\.joint_dynamics; attach a profile"):
         joda.set_profile(model, mujoco.MjData(model), "j", random_profile(np.random.default_rng()))
 
 
@@ -345,7 +344,7 @@ class TestMissingRows:
         assert abs(data.qvel[0]) < 1e-12
 
     def test_without_a_friction_row_a_friction_channel_is_refused(self):
-        message = "joint 'j' has a friction channel but no friction row in the solver; add frictionloss=\"1e-12\""
+        message = "joint 'j' has a friction channel but no friction row in the solver"
         with pytest.raises(ValueError, match=message):
             load(friction=flat(0.5), joint="")
 

@@ -190,7 +190,7 @@ def test_equals_the_native_joint_step_for_step(kind):
 
 
 def test_rk4_is_right_in_the_limit():
-    """Halving the step halves the error against a fine SciPy integration, damping varying with s."""
+    """Halving the step halves the error against SciPy's integration, damping varying with s."""
     from scipy.integrate import solve_ivp
 
     x = np.array([0, 0.3, 0.6, 1])

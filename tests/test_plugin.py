@@ -1,3 +1,4 @@
+# ruff: noqa: E501 (tables of sentences)
 """Loading the plugin, reading its attributes, and what it says when they are wrong."""
 
 import re
@@ -12,9 +13,11 @@ import joda
 from joda import plugin
 
 TWO_JOINTS = """
-<mujoco><extension><plugin plugin="joda.joint_dynamics"><instance name="p">{config}</instance></plugin></extension>
+<mujoco><extension><plugin plugin="joda.joint_dynamics">
+    <instance name="p">{config}</instance></plugin></extension>
   <worldbody><body name="arm"><joint name="turn" range="-90 90" frictionloss="1e-12"/>
-    <joint name="lift" type="slide" range="0 .5" frictionloss="1e-12"/><geom size=".1"/><plugin instance="p"/>
+    <joint name="lift" type="slide" range="0 .5" frictionloss="1e-12"/><geom size=".1"/>
+    <plugin instance="p"/>
   </body></worldbody></mujoco>"""
 
 
@@ -131,7 +134,8 @@ def test_a_joint_is_configured_once():
 
 
 def test_plain_mujoco_loads_the_plugin():
-    code = f"import mujoco; mujoco.MjModel.from_xml_string('''{scene(damping=flat(1.0))}'''); print('loaded')"
+    text = scene(damping=flat(1.0))
+    code = f"import mujoco; mujoco.MjModel.from_xml_string('''{text}'''); print('loaded')"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (result.stdout, result.stderr) == ("loaded\n", "")
 
@@ -153,7 +157,8 @@ def test_plugin_path_is_the_library():
 def test_another_mujoco_is_refused(monkeypatch):
     monkeypatch.setattr(plugin, "_loaded", False)
     monkeypatch.setattr(mujoco, "mj_versionString", lambda: "3.17.0")
-    message = f"joda was built for MuJoCo {mujoco.__version__} and found 3.17.0; run: pip install mujoco=={mujoco.__version__}"
+    own = mujoco.__version__
+    message = f"joda was built for MuJoCo {own} and found 3.17.0; run: pip install mujoco=={own}"
     with pytest.raises(joda.JodaError, match=re.escape(message)):
         plugin.load()
 

@@ -10,16 +10,25 @@ from joda.errors import JodaError
 from joda.template import read_templates
 
 TEMPLATES = read_templates()
-NAMES = """
-constant_friction_hinge constant_damping_hinge constant_positive_conservative_hinge
-constant_negative_conservative_hinge detent_internal bistable_mechanism bistable_mechanism_internal
-magnetic_return_to_low_end magnetic_return_to_high_end spring_return_to_low_end
-spring_return_to_high_end spring_loaded_snap_detent_to_low_end spring_loaded_snap_detent_to_high_end
-""".split()
+NAMES = (
+    "constant_friction_hinge",
+    "constant_damping_hinge",
+    "constant_positive_conservative_hinge",
+    "constant_negative_conservative_hinge",
+    "detent_internal",
+    "bistable_mechanism",
+    "bistable_mechanism_internal",
+    "magnetic_return_to_low_end",
+    "magnetic_return_to_high_end",
+    "spring_return_to_low_end",
+    "spring_return_to_high_end",
+    "spring_loaded_snap_detent_to_low_end",
+    "spring_loaded_snap_detent_to_high_end",
+)
 
 
 def rest(name: str, start: float) -> float:
-    """Where a damped joint comes to rest that is let go at `start`, the template on its whole range."""
+    """Where a damped joint with the template on its whole range comes to rest from `start`."""
     curve = TEMPLATES[name].channels.conservative
     model, data = load(component((0, 1), curve.x, curve.y), damping=flat(1.0), inertia=0.05)
     data.qpos[0] = start

@@ -2,6 +2,7 @@
 
 import os
 import secrets
+import subprocess
 
 import mujoco
 import numpy as np
@@ -57,6 +58,19 @@ def movable(model) -> list[int]:
         if joint_type(model, k) in ("hinge", "slide")
         and not model.joint(k).name.startswith("robot:")
     ]
+
+
+@pytest.mark.parametrize(("CI", "outcome"), [("", "Skipped"), ("true", "Failed")])
+def test_a_failed_download_skips_here_and_fails_in_ci(tmp_path, monkeypatch, CI, outcome):
+    failure = subprocess.CompletedProcess([], 1, "", "ERROR: No matching distribution\n")
+    monkeypatch.setattr("assets.CACHE", tmp_path)
+    monkeypatch.setattr("assets.subprocess.run", lambda *_, **__: failure)
+    monkeypatch.setenv("CI", CI)
+    with pytest.raises(
+        BaseException, match=r"==.* failed: ERROR: No matching distribution"
+    ) as error:
+        asset("kitchen")
+    assert error.typename == outcome
 
 
 @pytest.fixture(scope="module", params=NAMES)

@@ -21,10 +21,10 @@ import numpy as np
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes
 from joda.mjcf import Element, MjcfError, Source
-from joda.model import find_joint, joint_name, joint_type, load, sentence
+from joda.model import find_joint, joint_name, joint_type, load, sentence, write_out
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
-from joda.scene import DAMPING_ROW, INERT, TRACE, find_instance, prefix
+from joda.scene import DAMPING_ROW, INERT, TRACE, find_instance, has_damping_row, prefix
 
 DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
 """Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
@@ -130,7 +130,7 @@ class _Scene:
         self.notes.append(
             f"{path} was written out by MuJoCo first, numbers rounded to six digits: {reason}."
         )
-        source = Source(path, self.spec.to_xml().encode())
+        source = Source(path, write_out(self.spec, path))
         return source, dict(enumerate(source.joints()))
 
     def add(self, joint: int, profile: Profile, native: str) -> None:
@@ -152,7 +152,7 @@ class _Scene:
             self.names[joint] = changes["name"]
         self.joints[joint][1].set(**changes)
         self._configure(joint, profile)
-        if not self._has_row(joint):
+        if not has_damping_row(self.model, joint):
             row, name = quoteattr(DAMPING_ROW + self.names[joint]), quoteattr(self.names[joint])
             self.rows.append(f"<joint name={row} joint1={name} {INERT}/>")
 
@@ -213,16 +213,6 @@ class _Scene:
             element.insert_after(reference)
         else:
             body.insert_first(reference)
-
-    def _has_row(self, joint: int) -> bool:
-        """Whether the joint has the equality that carries the damping."""
-        m = self.model
-        return any(
-            m.eq_type[k] == int(mujoco.mjtEq.mjEQ_JOINT)
-            and (m.eq_obj1id[k], m.eq_obj2id[k]) == (joint, -1)
-            and "joda_damping" in m.equality(k).name
-            for k in range(m.neq)
-        )
 
     def _compare_range(self, joint: int, profile: Profile) -> None:
         own, given = tuple(map(float, self.model.jnt_range[joint])), profile.joint.range

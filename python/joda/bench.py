@@ -94,7 +94,8 @@ def hinges(count: int, kind: str) -> mujoco.MjModel:
     for k in range(count):
         reference = f'<plugin instance="p{k}"/>' if kind == "joda" else ""
         bodies.append(
-            f'<body pos="{k} 0 0"><joint name="j{k}" axis="0 0 1" range="0 1.5" limited="true" {native}/>'
+            f'<body pos="{k} 0 0">'
+            f'<joint name="j{k}" axis="0 0 1" range="0 1.5" limited="true" {native}/>'
             f'<geom type="box" size=".2 .01 .2" pos=".2 0 0" mass="1"/>{reference}</body>'
         )
         instances.append(f'<instance name="p{k}">{config}</instance>')

@@ -1,10 +1,11 @@
-"""The command line: each command is a Python function of the same name, and a table of what it says."""
+"""The command line: each command is a Python function of the same name."""
 
 import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from math import degrees
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -47,11 +48,9 @@ def demo(
             {key: str(v) if isinstance(v, Path) else v for key, v in asdict(result).items()}
         )
         return
-    degrees = 57.29577951308232
-    print(f"Both doors were let go at rest, {result.start * degrees:.1f} degrees open.")
-    print(
-        f"  without a profile: after {result.duration:g} s still {result.plain_end * degrees:.1f} degrees open"
-    )
+    start, end = degrees(result.start), degrees(result.plain_end)
+    print(f"Both doors were let go at rest, {start:.1f} degrees open.")
+    print(f"  without a profile: after {result.duration:g} s still {end:.1f} degrees open")
     print(f"  with the latch:    shut itself after {result.shut_after:.2f} s")
     print("Files:")
     for what in ("picture", "profile", "scene", "composed", "plain"):
@@ -165,8 +164,8 @@ def schema(
     from joda.profile import Profile
     from joda.template import Template
 
-    model = {"composed": Profile, "template": Template}[file]
-    _print_json(model.model_json_schema())
+    schemas = {"composed": Profile.model_json_schema, "template": Template.model_json_schema}
+    _print_json(schemas[file]())
 
 
 def main() -> None:

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import count
 from importlib.resources import as_file, files
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.attach import attach
+from joda.draw import draw, write_png
 from joda.errors import JodaError
 from joda.files import write_bytes, write_text
 from joda.model import find_joint, load_model
-from joda.draw import draw, write_png
 from joda.profile import Profile
 from joda.render import render
 from joda.simulate import Motion, gravity_force, release

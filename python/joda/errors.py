@@ -1,4 +1,4 @@
-"""The one exception for a user's mistake: a sentence that says what is wrong and what would be right."""
+"""The one exception for a user's mistake."""
 
 
 class JodaError(ValueError):

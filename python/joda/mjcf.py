@@ -116,7 +116,7 @@ class Source:
 
     def __init__(self, path: Path, content: bytes | None = None):
         """Reads the file, or takes `content` for what stands there; raises MjcfError, OSError."""
-        self.folder = path.parent.resolve()
+        self.folder = _join(Path.cwd(), path.parent)
         self.main = Document(path, path.read_bytes() if content is None else content)
         if self.main.root.tag != "mujoco":
             raise MjcfError(f"the root element is <{self.main.root.tag}>, not <mujoco>")
@@ -140,7 +140,7 @@ class Source:
 
         To be called when all other edits are made.
         """
-        there = folder.resolve()
+        there = _join(Path.cwd(), folder)
         if there != self.folder:
             self._relocate_assets(there)
         self._relocate_includes(self.main, there)
@@ -177,7 +177,7 @@ class Source:
             moves = there != self.folder
             if _changed(inner) or (moves and any(e.included for e in _raw(inner.root))):
                 self._relocate_includes(inner, there)
-            elif moves or inner.path != self.folder / element.attributes["file"]:
+            elif moves or inner.path != _join(self.folder, element.attributes["file"]):
                 element.set(file=os.path.relpath(inner.path, there))
 
     def _include(self, document: Document) -> None:
@@ -185,7 +185,7 @@ class Source:
             if element.tag != "include":
                 continue
             name = element.attributes.get("file", "")
-            tried = [folder / name for folder in (self.folder, document.path.parent)]
+            tried = [_join(folder, name) for folder in (self.folder, document.path.parent)]
             path = next((path for path in tried if path.is_file()), None)
             if path is None:
                 raise MjcfError(f"{document.path}: the included file {name} does not exist")
@@ -193,10 +193,19 @@ class Source:
             self._include(element.included)
 
 
+def _join(folder: Path, path: str | Path) -> Path:
+    """The path without "..", taken away as text, as MuJoCo does; links are not resolved."""
+    return Path(os.path.normpath(folder / path))
+
+
 def _parse(document: Document) -> Element:
     """The tree of a document's elements; raises MjcfError where it is not XML."""
-    parser = expat.ParserCreate("UTF-8")  # as MuJoCo reads, whatever is declared
     content = document.content
+    try:  # MuJoCo reads bytes, whatever is declared; a comment may well be Latin-1
+        content.decode()
+        parser = expat.ParserCreate("UTF-8")
+    except UnicodeDecodeError:
+        parser = expat.ParserCreate("ISO-8859-1")
     stack: list[Element] = []
     roots: list[Element] = []
 

@@ -21,9 +21,21 @@ def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
         raise JodaError(f"{path}: no such file; give an MJCF or URDF file.")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        return spec, spec.compile()
+        model = spec.compile()
+        bytes(model.names).decode()
+        return spec, model
+    except UnicodeDecodeError:
+        raise _not_utf8(path) from None
     except (ValueError, mujoco.FatalError) as error:
         raise JodaError(f"{path}: MuJoCo cannot load it: {sentence(error)}") from None
+
+
+def write_out(spec: mujoco.MjSpec, path: Path) -> bytes:
+    """The spec that was loaded from `path` as MuJoCo writes it, in one file; raises JodaError."""
+    try:
+        return str(spec.to_xml()).encode()
+    except UnicodeDecodeError:
+        raise _not_utf8(path) from None
 
 
 def load_model(path: Path) -> mujoco.MjModel:
@@ -31,11 +43,15 @@ def load_model(path: Path) -> mujoco.MjModel:
     return load(path)[1]
 
 
+def _not_utf8(path: Path) -> JodaError:
+    return JodaError(f"{path}: it, or a file that it includes, is not UTF-8; save it as UTF-8.")
+
+
 def sentence(error: Exception) -> str:
     """MuJoCo's error in one line; the plugin's own sentence where it has one."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     own = [line for line in lines if line.startswith("joda.joint_dynamics:")]
-    text = own[0] if own else "; ".join(dict.fromkeys(lines))
+    text = own[0] if own else "; ".join(dict.fromkeys(lines)).replace(":;", ":")
     return re.sub(r"^(XML )?Error: ", "", text).rstrip(".") + "."
 
 

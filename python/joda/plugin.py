@@ -32,7 +32,7 @@ def plugin_path() -> Path:
 
 def load() -> None:
     """Loads the plugin, once; raises JodaError if it was built for another MuJoCo."""
-    import mujoco  # loads the plugin by itself, through the entry point, if it is imported first here
+    import mujoco  # if this is its first import, it calls us through the entry point
 
     global _loaded
     if _loaded:

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import mujoco
 
-from joda.errors import JodaError
 from joda.model import describe_joint, load
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
@@ -15,7 +14,7 @@ TRACE = "1e-12"
 DAMPING_ROW = "joda_damping_"
 """Begins the name of the equality constraint whose row carries a joint's damping."""
 
-INERT = 'solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
+INERT = 'active="true" solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
 """Makes that constraint do nothing until the plugin sets its row."""
 
 
@@ -54,6 +53,16 @@ def prefix(model: mujoco.MjModel, joint: int) -> str:
     return "" if alone else f"{joint - model.body_jntadr[body]}."
 
 
+def has_damping_row(model: mujoco.MjModel, joint: int) -> bool:
+    """Whether the joint has the equality constraint whose row carries its damping."""
+    return any(
+        model.eq_type[k] == int(mujoco.mjtEq.mjEQ_JOINT)
+        and (model.eq_obj1id[k], model.eq_obj2id[k]) == (joint, -1)
+        and DAMPING_ROW in model.equality(k).name
+        for k in range(model.neq)
+    )
+
+
 def read_profiles(path: str | Path) -> dict[str, Profile]:
     """The profiles that a scene carries.
 
@@ -74,19 +83,7 @@ def read_profiles(path: str | Path) -> dict[str, Profile]:
         front = prefix(model, joint)
         own = {key: config[front + key] for key in ATTRIBUTES if front + key in config}
         if own:
-            described = describe_joint(model, joint, _limits(own.get("range"), front))
+            limits = tuple(map(float, own["range"].split())) if "range" in own else None
+            described = describe_joint(model, joint, limits)  # type: ignore[arg-type]
             out[described.name] = Profile.from_attributes(described, own)
     return out
-
-
-def _limits(text: str | None, front: str) -> tuple[float, float] | None:
-    """The attribute "range" as numbers."""
-    if text is None:
-        return None
-    try:
-        lo, hi = map(float, text.split())
-    except ValueError:
-        lo = hi = 0
-    if not lo < hi:
-        raise JodaError(f'attribute "{front}range": expected two increasing numbers, got "{text}".')
-    return lo, hi

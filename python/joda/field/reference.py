@@ -1,4 +1,4 @@
-"""The channels of a profile in NumPy: the definition that the other implementations are tested on."""
+"""The channels of a profile in NumPy: the definition that all implementations are tested on."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
