@@ -10,10 +10,8 @@ import jsonschema
 import mujoco
 import pytest
 
-from joda.bench import bench, hinges
-from joda.demo import demo
-from joda.plot import plot
-from joda.profile import Profile
+from joda import JodaError, Profile, bench, demo, plot
+from joda._bench import _without_plugin, hinges
 
 MODELS = Path(__file__).parents[1] / "models"
 
@@ -153,7 +151,7 @@ class TestBench:
     """Only what is measured is tested here, not how fast it is."""
 
     def test_rows_are_ratios_of_times(self, folder, monkeypatch):
-        monkeypatch.setattr("joda.bench.ROUNDS", 3)
+        monkeypatch.setattr("joda._bench.ROUNDS", 3)
         joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
         for rows in (bench(), bench(folder / "scene.xml")):
             for row in rows:
@@ -162,7 +160,6 @@ class TestBench:
         assert "one" not in bench(folder / "scene.xml")[0].what
 
     def test_the_native_scene_has_no_plugin_and_the_same_joints(self, folder):
-        from joda.bench import _without_plugin
         from joda.scene import read_profiles
 
         joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
@@ -183,8 +180,6 @@ class TestPlot:
         assert plot(folder / "microwave.latch.json") == folder / "microwave.latch.png"
 
     def test_a_joint_must_be_chosen_where_several_carry_profiles(self, tmp_path):
-        from joda.errors import JodaError
-
         (tmp_path / "two.xml").write_text(TWO)
         with pytest.raises(
             JodaError, match="several joints carry a profile; choose with --joint: 'a', 'b'"

@@ -14,9 +14,9 @@ LAYERS = [
     {"files", "plugin"},
     {"profile"},
     {"field", "model", "mjcf", "template"},
-    {"scene", "simulate", "render"},
-    {"attach", "draw"},  # stages, never each other
-    {"plot", "bench", "demo"},  # what combines them
+    {"scene", "motion", "offscreen", "_schema"},
+    {"_attach", "draw"},  # stages, never each other
+    {"_plot", "_bench", "_demo"},  # what combines them
     {"cli"},
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

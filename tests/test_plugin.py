@@ -140,7 +140,7 @@ def test_plain_mujoco_loads_the_plugin():
     assert (result.stdout, result.stderr) == ("loaded\n", "")
 
 
-@pytest.mark.parametrize("first", ["joda", "mujoco", "joda.attach", "joda.bench"])
+@pytest.mark.parametrize("first", ["joda", "mujoco", "joda.scene", "joda.cli"])
 def test_any_import_order_works(first):
     code = f"import {first}, mujoco, joda; joda.plugin_path()"
     result = subprocess.run(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from assets import NAMES, asset
 
-from joda.attach import attach
+from joda import attach
 from joda.model import describe_joint, joint_type, load_model
 from joda.profile import Channel, Channels, Component, Profile, Resistance
 from joda.scene import read_profiles

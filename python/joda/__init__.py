@@ -1,9 +1,49 @@
-"""JODA: joint dynamics for articulated objects in MuJoCo."""
+"""JODA: joint dynamics for articulated objects in MuJoCo.
+
+Every command is a function here, of the same name and meaning: `joda.attach`, `joda.plot`, ...
+They are loaded when they are first used, so that `import joda` stays light.
+"""
+
+from typing import TYPE_CHECKING, Any
 
 from joda.errors import JodaError
 from joda.plugin import load, plugin_path, set_profile
 
+if TYPE_CHECKING:
+    from joda._attach import attach
+    from joda._bench import bench
+    from joda._demo import demo
+    from joda._plot import plot
+    from joda._schema import schema
+    from joda.profile import Profile
+    from joda.scene import read_profiles
+
 load()
 
 __version__ = "0.1.0"
-__all__ = ["JodaError", "plugin_path", "set_profile"]
+__all__ = [
+    "JodaError",
+    "Profile",
+    "attach",
+    "bench",
+    "demo",
+    "plot",
+    "plugin_path",
+    "read_profiles",
+    "schema",
+    "set_profile",
+]
+
+_LAZY = {
+    "Profile": "joda.profile",
+    "read_profiles": "joda.scene",
+    **{name: f"joda._{name}" for name in ("attach", "bench", "demo", "plot", "schema")},
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module 'joda' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(_LAZY[name]), name)

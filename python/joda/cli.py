@@ -39,7 +39,7 @@ def demo(
 
         joda demo -o joda_demo
     """
-    from joda.demo import demo as run
+    from joda import demo as run
 
     with _progress("demo") as progress:
         result = run(output, force=force, progress=progress)
@@ -88,7 +88,7 @@ def attach(
 
         joda attach microwave.xml composed.json -o scene.xml
     """
-    from joda.attach import attach as run
+    from joda import attach as run
 
     for note in run(model, composed, output, joint=joint, native=native, force=force):
         print(note)
@@ -112,7 +112,7 @@ def plot(
 
         joda plot scene.xml --joint door -o profile.png
     """
-    from joda.plot import plot as run
+    from joda import plot as run
 
     print(run(source, output, joint=joint, force=force))
 
@@ -130,7 +130,7 @@ def bench(
 
         joda bench
     """
-    from joda.bench import bench as run
+    from joda import bench as run
 
     with _progress("bench") as progress:
         rows = run(scene, progress=progress)
@@ -161,11 +161,9 @@ def schema(
 
         joda schema composed
     """
-    from joda.profile import Profile
-    from joda.template import Template
+    from joda import schema as run
 
-    schemas = {"composed": Profile.model_json_schema, "template": Template.model_json_schema}
-    _print_json(schemas[file]())
+    _print_json(run(file))
 
 
 def main() -> None:

@@ -1,9 +1,30 @@
 """Evaluation of a profile's channels; one numerical meaning, shared by every implementation.
 
-`reference` is the definition, in NumPy; the C++ core (`joda._core.Channel`) merges a channel into
-one piecewise cubic at load and is what runs inside MuJoCo. Golden vectors from SciPy test both.
+`evaluate` is the definition, in NumPy; `merge` gives the C++ form, one piecewise cubic, which is
+what runs inside MuJoCo. Golden vectors from SciPy test both.
 """
 
-from joda.field.reference import evaluate, pchip_slopes
+from typing import TYPE_CHECKING
 
-__all__ = ["evaluate", "pchip_slopes"]
+from joda.field.reference import evaluate, pchip_slopes
+from joda.profile import Channel
+
+if TYPE_CHECKING:
+    from joda import _core
+
+__all__ = ["evaluate", "merge", "pchip_slopes"]
+
+
+def merge(channel: Channel) -> "_core.Channel":
+    """The channel merged into one piecewise cubic, in C++, for evaluation in bulk.
+
+    Args:
+        channel: its components and how they are combined.
+
+    Returns:
+        an object that gives (value, slope d/ds) for an array of normalised positions, as `evaluate`
+        does, and has the breakpoints and coefficients.
+    """
+    import joda._core as core
+
+    return core.Channel(channel.text(), channel.combine)

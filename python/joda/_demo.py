@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.attach import attach
+from joda._attach import attach
 from joda.draw import draw, write_png
 from joda.errors import JodaError
 from joda.files import write_bytes, write_text
 from joda.model import find_joint, load_model
+from joda.motion import Motion, gravity_force, release
+from joda.offscreen import render
 from joda.profile import Profile
-from joda.render import render
-from joda.simulate import Motion, gravity_force, release
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

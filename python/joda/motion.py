@@ -1,4 +1,4 @@
-"""Interactions with a joint, simulated in MuJoCo."""
+"""A joint in motion, and what gravity does to it, in MuJoCo."""
 
 from dataclasses import dataclass
 

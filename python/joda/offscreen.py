@@ -36,7 +36,7 @@ def render(
     asked = os.environ.get("MUJOCO_GL")
     for backend in [asked] if asked else ["egl", "osmesa"]:
         result = subprocess.run(
-            [sys.executable, "-m", "joda.render"],
+            [sys.executable, "-m", "joda.offscreen"],
             input=json.dumps([str(path), camera, joint, list(map(float, positions))]).encode(),
             capture_output=True,
             env={**os.environ, "MUJOCO_GL": backend},

@@ -7,9 +7,9 @@ import numpy as np
 from joda.draw import draw, write_png
 from joda.errors import JodaError
 from joda.model import find_joint, load_model
+from joda.motion import gravity_force
 from joda.profile import Profile
 from joda.scene import read_profiles
-from joda.simulate import gravity_force
 
 
 def plot(
