@@ -11,6 +11,7 @@ from assets import NAMES, asset
 
 from joda import attach
 from joda.model import describe_joint, joint_type, load_model
+from joda.motion import release
 from joda.profile import Channel, Channels, Component, Profile, Resistance
 from joda.scene import read_profiles
 
@@ -153,3 +154,29 @@ def test_the_kitchens_knobs_stand_their_native_damping(tmp_path):
     # the equalities that tie knobs to burners add 0.3 %
     assert data.qvel[dofs] == pytest.approx(0.1, rel=5e-3)
     assert [warning.number for warning in data.warning] == [0] * len(data.warning)
+
+
+def test_a_latch_shuts_the_microwave_that_stays_open_without(tmp_path):
+    """Let go at rest nearly closed (0 is shut, -2.094 open), as it comes and with a snap latch."""
+    path = asset("microwave")
+    door = describe_joint(load_model(path), 0)
+    latch = Component(
+        label="snap latch", interval=(0.95, 1), x=(0, 0.25, 0.5, 1), y=(0, -0.3, 0, 2)
+    )
+    profile = Profile(
+        joint=door,
+        channels=Channels(
+            conservative=Channel(components=(latch,)),
+            friction=flat("hinge", 0.05),
+            damping=flat("hinge", 0.05),
+        ),
+    )
+    attach(path, profile, tmp_path / "scene.xml")
+    ends = [
+        release(load_model(scene), 0, -0.04, 1.0).position[-1]
+        for scene in (path, tmp_path / "scene.xml")
+    ]
+    assert ends[0] == pytest.approx(-0.04, abs=1e-3)
+    assert ends[1] == pytest.approx(0, abs=2e-3)
+    away = release(load_model(tmp_path / "scene.xml"), 0, -1.0, 1.0).position
+    assert away[-1] == pytest.approx(-1.0, abs=1e-6)
