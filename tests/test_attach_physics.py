@@ -178,3 +178,18 @@ def test_mujocos_own_writer_and_binary_files_keep_the_behaviour(tmp_path):
     mujoco.mj_saveModel(m, str(tmp_path / "m.mjb"))
     binary = mujoco.MjModel.from_binary_path(str(tmp_path / "m.mjb"))
     assert np.array_equal(trajectory(binary), expected)
+
+
+def test_under_the_discrete_integrator_friction_holds_with_mujocos_stiffest_row(tmp_path):
+    """That integrator makes the plugin's rows anew, and MuJoCo's default row creeps."""
+    text = DOOR.replace("<worldbody>", '<option integrator="discrete"/><worldbody>', 1)
+    assert "discrete" in text
+    _, after, notes = attached(tmp_path, text, profile(force=None, friction=(0.3, 0.3)))
+    assert any("for integrator discrete" in note for note in notes)
+    m = model_of(after)
+    m.opt.gravity[:] = 0
+    d = mujoco.MjData(m)
+    joint = m.joint("door")
+    d.qpos[joint.qposadr[0]], d.qfrc_applied[joint.dofadr[0]] = 0.7, 0.28
+    mujoco.mj_step(m, d, round(60 / m.opt.timestep))
+    assert d.qpos[joint.qposadr[0]] == pytest.approx(0.7, abs=1e-3 * 1.5)
