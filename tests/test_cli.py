@@ -49,7 +49,7 @@ def test_without_arguments_it_shows_its_help():
     assert joda().returncode == 0
 
 
-@pytest.mark.parametrize("command", ["demo", "attach", "plot", "bench", "schema"])
+@pytest.mark.parametrize("command", ["demo", "attach", "context", "plot", "bench", "schema"])
 def test_every_help_has_an_example(command):
     text = joda(command, "--help").stdout
     assert "Example:" in text
@@ -64,6 +64,17 @@ def test_attach_then_plot(folder):
     result = joda("plot", "scene.xml", cwd=folder)
     assert result.stdout == "scene.png\n"
     assert (folder / "scene.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_context_is_printed_and_written(folder):
+    result = joda("context", "microwave.xml", "--joint", "door", "--json", "c.json", cwd=folder)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "door, a hinge between microwave and door" in result.stdout
+    assert "0 to 1.92 rad (0.0 to 110.0 degrees)" in result.stdout
+    content = json.loads((folder / "c.json").read_text())
+    assert content["joint"]["name"] == "door"
+    again = ("context", "microwave.xml", "--joint", "door", "--json", "c.json")
+    assert "c.json: exists already" in fails(*again, cwd=folder)
 
 
 def test_mistakes_are_one_sentence_and_leave_nothing(folder):

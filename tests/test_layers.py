@@ -14,7 +14,7 @@ LAYERS = [
     {"files", "plugin"},
     {"profile"},
     {"field", "model", "mjcf", "template"},
-    {"scene", "motion", "offscreen", "_schema"},
+    {"scene", "motion", "offscreen", "_schema", "_context"},
     {"_attach", "draw"},  # stages, never each other
     {"_plot", "_bench", "_demo"},  # what combines them
     {"cli"},

@@ -12,6 +12,7 @@ from joda.plugin import load, plugin_path, set_profile
 if TYPE_CHECKING:
     from joda._attach import attach
     from joda._bench import bench
+    from joda._context import context
     from joda._demo import demo
     from joda._plot import plot
     from joda._schema import schema
@@ -26,6 +27,7 @@ __all__ = [
     "Profile",
     "attach",
     "bench",
+    "context",
     "demo",
     "plot",
     "plugin_path",
@@ -37,7 +39,7 @@ __all__ = [
 _LAZY = {
     "Profile": "joda.profile",
     "read_profiles": "joda.scene",
-    **{name: f"joda._{name}" for name in ("attach", "bench", "demo", "plot", "schema")},
+    **{name: f"joda._{name}" for name in ("attach", "bench", "context", "demo", "plot", "schema")},
 }
 
 

@@ -96,6 +96,36 @@ def attach(
 
 
 @app.command()
+def context(
+    model: Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)],
+    joint: Annotated[
+        str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
+    ],
+    as_json: Annotated[
+        Path | None, typer.Option("--json", help="Write the whole context to this file.")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Tell what the model knows of a joint: axes, range, inertia, gravity, which end is up.
+
+    Example:
+
+        joda context microwave.xml --joint door
+    """
+    from joda import context as run
+    from joda.files import check_target, write_text
+
+    if as_json:
+        check_target(as_json, force)
+    found = run(model, joint)
+    if as_json:
+        write_text(as_json, found.model_dump_json(indent=2) + "\n")
+    print(found.describe())
+    if as_json:
+        print(as_json)
+
+
+@app.command()
 def plot(
     source: Annotated[Path, typer.Argument(help="composed.json, or a scene.", show_default=False)],
     joint: Annotated[

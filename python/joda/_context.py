@@ -1,0 +1,171 @@
+"""What can be known of a joint from the model alone: the context in which dynamics are proposed."""
+
+from pathlib import Path
+from typing import Literal
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from joda.model import describe_joint, find_joint, load_model
+from joda.profile import Joint
+
+POSITIONS = 21
+"""At how many positions, evenly over the range, inertia and gravity are sampled."""
+
+Vector = tuple[float, float, float]
+End = Literal["low_end", "high_end"]
+
+
+class Context(BaseModel):
+    """A joint's context: SI units, all other joints at their reference position.
+
+    Attributes:
+        joint: name, type, range and unit.
+        parent, child: the bodies that it connects.
+        axis_local: unit vector in the frame of the child body.
+        axis_world: the same in the world, at the low end.
+        anchor_world: a point on the axis (hinge), the body's origin (slide), at the low end; m.
+        moving_mass: of the child and all below it; kg.
+        positions: rad or m, evenly over the range.
+        inertia: generalised inertia at each position, from the mass matrix; kg·m² or kg.
+        gravity_force: generalised force of gravity at each position; N·m or N. Positive drives the
+            joint towards larger positions.
+        equivalent_inertia: the mean of `inertia`.
+        gravity_scale: the largest magnitude of `gravity_force`.
+        upper_end: the end at which the moving part lies higher, "level" if neither.
+        closed_end: the end at which the joint's reference position lies, "unknown" if it lies at
+            neither; opening is the motion away from it.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    joint: Joint
+    parent: str
+    child: str
+    axis_local: Vector
+    axis_world: Vector
+    anchor_world: Vector
+    moving_mass: float
+    positions: tuple[float, ...]
+    inertia: tuple[float, ...]
+    gravity_force: tuple[float, ...]
+    equivalent_inertia: float
+    gravity_scale: float
+    upper_end: End | Literal["level"]
+    closed_end: End | Literal["unknown"]
+
+    def describe(self) -> str:
+        """The context in a few lines for a person."""
+        joint, hinge = self.joint, self.joint.type == "hinge"
+        lo, hi = joint.range
+        degrees = f" ({np.rad2deg(lo):.1f} to {np.rad2deg(hi):.1f} degrees)" if hinge else ""
+        force = "N·m" if hinge else "N"
+        opens = {"low_end": "+q", "high_end": "-q", "unknown": "unknown"}[self.closed_end]
+        rows = {
+            "joint": f"{joint.name}, a {joint.type} between {self.parent} and {self.child}",
+            "range": f"{lo:g} to {hi:g} {joint.unit}{degrees}",
+            "axis": f"{_text(self.axis_local)} in the body, {_text(self.axis_world)} in the world",
+            "moving mass": f"{self.moving_mass:.4g} kg",
+            "inertia": f"{_span(self.inertia)} {'kg·m²' if hinge else 'kg'}",
+            "gravity": f"{_span(self.gravity_force)} {force} (positive drives +q)",
+            "upper end": self.upper_end.replace("_", " "),
+            "closed end": f"{self.closed_end.replace('_', ' ')}; opening: {opens}",
+        }
+        return "\n".join(f"{name + ':':12} {text}" for name, text in rows.items())
+
+
+def context(model: str | Path, joint: str) -> Context:
+    """Extracts the context of a joint.
+
+    Args:
+        model: MJCF or URDF file.
+        joint: its name or address, see `joda.model.find_joint`.
+
+    Returns:
+        the context.
+
+    Raises:
+        JodaError: the file cannot be loaded, the joint does not exist, is no hinge or slide, or has
+            no range.
+    """
+    m = load_model(Path(model))
+    j = find_joint(m, joint)
+    described = describe_joint(m, j)
+    data = mujoco.MjData(m)
+    dof, body = m.jnt_dofadr[j], int(m.jnt_bodyid[j])
+    positions = np.linspace(*described.range, POSITIONS)
+    inertia, gravity, height = (np.empty(POSITIONS) for _ in range(3))
+    for k in reversed(range(POSITIONS)):  # ends with the data at the low end
+        data.qpos[m.jnt_qposadr[j]] = positions[k]
+        inertia[k], gravity[k], height[k] = _at_rest(m, data, int(dof), body)
+    weight = float(m.body_subtreemass[body] * np.linalg.norm(m.opt.gravity))
+    gravity[np.abs(gravity) <= 1e-9 * weight] = 0  # rounding
+    parent = int(m.body_parentid[body])
+    return Context(
+        joint=described,
+        parent=_body_name(m, parent),
+        child=_body_name(m, body),
+        axis_local=_vector(m.jnt_axis[j]),
+        axis_world=_vector(data.xaxis[j]),
+        anchor_world=_vector(data.xanchor[j]),
+        moving_mass=float(m.body_subtreemass[body]),
+        positions=tuple(positions.tolist()),
+        inertia=tuple(inertia.tolist()),
+        gravity_force=tuple(gravity.tolist()),
+        equivalent_inertia=float(inertia.mean()),
+        gravity_scale=float(np.abs(gravity).max()),
+        upper_end=_upper_end(height),
+        closed_end=_closed_end(described, float(m.qpos0[m.jnt_qposadr[j]])),
+    )
+
+
+def _at_rest(
+    m: mujoco.MjModel, data: mujoco.MjData, dof: int, body: int
+) -> tuple[float, float, float]:
+    """Generalised inertia and gravity force of the dof, and the height of what it moves."""
+    mujoco.mj_fwdPosition(m, data)
+    mass, bias = np.empty((m.nv, m.nv)), np.empty(m.nv)
+    mujoco.mj_fullM(m, data, mass)
+    mujoco.mj_rne(m, data, 0, bias)  # at rest, all of it is gravity
+    up = -np.asarray(m.opt.gravity)
+    length = float(np.linalg.norm(up))
+    height = float(data.subtree_com[body] @ up) / length if length else 0.0
+    return float(mass[dof, dof]), float(-bias[dof]), height
+
+
+def _upper_end(height: NDArray[np.float64]) -> End | Literal["level"]:
+    rise = height[-1] - height[0]
+    if abs(rise) < 1e-6:
+        return "level"
+    return "high_end" if rise > 0 else "low_end"
+
+
+def _closed_end(joint: Joint, reference: float) -> End | Literal["unknown"]:
+    lo, hi = joint.range
+    s = (reference - lo) / (hi - lo)
+    if s < 0.1:
+        return "low_end"
+    return "high_end" if s > 0.9 else "unknown"
+
+
+def _text(vector: Vector) -> str:
+    return "(" + " ".join(f"{value:.3g}" for value in vector) + ")"
+
+
+def _span(values: tuple[float, ...]) -> str:
+    """One number where it hardly varies, else the extremes and the values at the ends."""
+    low, high = min(values), max(values)
+    if high - low <= 1e-3 * max(abs(low), abs(high), 1e-12):
+        return f"{values[0]:.4g}"
+    return f"{low:.4g} to {high:.4g}, at the ends {values[0]:.4g} and {values[-1]:.4g}"
+
+
+def _body_name(m: mujoco.MjModel, body: int) -> str:
+    return m.body(body).name or f"body {body}"
+
+
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = (float(round(value, 12)) + 0.0 for value in values)
+    return x, y, z
