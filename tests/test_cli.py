@@ -10,7 +10,7 @@ import jsonschema
 import mujoco
 import pytest
 
-from joda import JodaError, Profile, bench, demo, plot
+from joda import COMMANDS, JodaError, Profile, bench, demo, plot
 from joda._bench import _without_plugin, hinges
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -49,7 +49,7 @@ def test_without_arguments_it_shows_its_help():
     assert joda().returncode == 0
 
 
-@pytest.mark.parametrize("command", ["demo", "attach", "context", "plot", "bench", "schema"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_help_has_an_example(command):
     text = joda(command, "--help").stdout
     assert "Example:" in text

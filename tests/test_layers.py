@@ -13,9 +13,9 @@ LAYERS = [
     {"errors", "_build", "_core"},
     {"files", "plugin"},
     {"profile"},
-    {"field", "model", "mjcf", "template"},
+    {"field", "model", "mjcf", "template", "proposal"},
     {"scene", "motion", "offscreen", "_schema", "_context"},
-    {"_attach", "draw"},  # stages, never each other
+    {"_attach", "_compile", "draw"},  # stages, never each other
     {"_plot", "_bench", "_demo"},  # what combines them
     {"cli"},
 ]

@@ -163,6 +163,18 @@ def test_another_mujoco_is_refused(monkeypatch):
         plugin.load()
 
 
+def test_the_command_line_says_so_and_stops():
+    code = (
+        "import mujoco; mujoco.mj_versionString = lambda: '3.17.0'\n"
+        "import joda.plugin; joda.plugin._loaded = False\n"
+        "from joda.cli import main; main()"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 2
+    assert result.stderr.startswith("joda: joda was built for MuJoCo")
+    assert result.stderr.count("\n") == 1
+
+
 def test_a_missing_library_is_named(monkeypatch, tmp_path):
     monkeypatch.setattr(plugin, "__file__", str(tmp_path / "plugin.py"))
     with pytest.raises(

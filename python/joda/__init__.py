@@ -4,6 +4,7 @@ Every command is a function here, of the same name and meaning: `joda.attach`, `
 They are loaded when they are first used, so that `import joda` stays light.
 """
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from joda.errors import JodaError
@@ -12,6 +13,7 @@ from joda.plugin import load, plugin_path, set_profile
 if TYPE_CHECKING:
     from joda._attach import attach
     from joda._bench import bench
+    from joda._compile import compile
     from joda._context import context
     from joda._demo import demo
     from joda._plot import plot
@@ -19,7 +21,10 @@ if TYPE_CHECKING:
     from joda.profile import Profile
     from joda.scene import read_profiles
 
-load()
+try:
+    load()
+except JodaError as error:  # the command line and every use of the plugin say it again, and stop
+    warnings.warn(str(error), RuntimeWarning, stacklevel=2)
 
 __version__ = "0.1.0"
 __all__ = [
@@ -27,6 +32,7 @@ __all__ = [
     "Profile",
     "attach",
     "bench",
+    "compile",
     "context",
     "demo",
     "plot",
@@ -36,10 +42,11 @@ __all__ = [
     "set_profile",
 ]
 
+COMMANDS = ("attach", "bench", "compile", "context", "demo", "plot", "schema")
 _LAZY = {
     "Profile": "joda.profile",
     "read_profiles": "joda.scene",
-    **{name: f"joda._{name}" for name in ("attach", "bench", "context", "demo", "plot", "schema")},
+    **{name: f"joda._{name}" for name in COMMANDS},
 }
 
 

@@ -2,18 +2,26 @@
 
 from typing import Any, Literal
 
+from pydantic import BaseModel
+
 from joda.profile import Profile
+from joda.proposal import Proposal
 from joda.template import Template
 
 
-def schema(file: Literal["composed", "template"] = "composed") -> dict[str, Any]:
+def schema(file: Literal["composed", "proposal", "template"] = "composed") -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a file format.
 
     Args:
-        file: "composed" for `composed.json`, "template" for the effect templates.
+        file: "composed" for `composed.json`, "proposal" for `proposal.json`, "template" for the
+            effect templates.
 
     Returns:
         the schema as a JSON object.
     """
-    models = {"composed": Profile.model_json_schema, "template": Template.model_json_schema}
-    return models[file]()
+    models: dict[str, type[BaseModel]] = {
+        "composed": Profile,
+        "proposal": Proposal,
+        "template": Template,
+    }
+    return models[file].model_json_schema()

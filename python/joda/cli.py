@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from joda.errors import JodaError
+from joda.plugin import load
 
 app = typer.Typer(
     help="Joint dynamics for articulated objects in MuJoCo: latches, detents, friction, damping.",
@@ -92,6 +93,36 @@ def attach(
 
     for note in run(model, composed, output, joint=joint, native=native, force=force):
         print(note)
+    print(output)
+
+
+@app.command()
+def compile(
+    proposal: Annotated[Path, typer.Argument(help="proposal.json.", show_default=False)],
+    model: Annotated[Path, typer.Option("--model", help="MJCF or URDF file.", show_default=False)],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="composed.json to write.", show_default=False)
+    ],
+    joint: Annotated[
+        str | None, typer.Option("--joint", help="The joint, if not the one the proposal names.")
+    ] = None,
+    templates: Annotated[
+        list[Path] | None, typer.Option("--templates", help="Further folders of templates.")
+    ] = None,
+    key: Annotated[
+        str, typer.Option("--key", help="Another key draws other numbers for the same words.")
+    ] = "",
+    force: Force = False,
+) -> None:
+    """Compile a proposal's words (weak, medium, strong...) to physical curves.
+
+    The same proposal and key give the same bytes. Example:
+
+        joda compile proposal.json --model microwave.xml --joint door -o composed.json
+    """
+    from joda import compile as run
+
+    run(proposal, model, joint, output, templates=templates or (), key=key, force=force)
     print(output)
 
 
@@ -182,7 +213,7 @@ def bench(
 @app.command()
 def schema(
     file: Annotated[
-        Literal["composed", "template"], typer.Argument(help="Which file.")
+        Literal["composed", "proposal", "template"], typer.Argument(help="Which file.")
     ] = "composed",
 ) -> None:
     """Print the JSON Schema of a file format.
@@ -199,6 +230,7 @@ def schema(
 def main() -> None:
     """Runs the command line; a user's mistake is one sentence on stderr and exit status 2."""
     try:
+        load()
         status = app(sys.argv[1:] or ["--help"], standalone_mode=False)
     except JodaError as error:
         status = _fail(str(error))

@@ -1,0 +1,90 @@
+"""A proposal, `proposal.json`: which effects a joint has, where, how strong in words.
+
+The schema is that of the JODA paper (appendix "Output JSON Schema"), its spelling included.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from joda.errors import JodaError
+from joda.files import read_text
+from joda.profile import JointLimitHint, describe
+
+Label = Literal["none", "weak", "medium", "strong", "dominant"]
+Ratio = Annotated[float, Field(ge=0, le=1)]
+Factor = Annotated[float, Field(ge=0, le=100)]
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class JointSummary(_Frozen):
+    """The joint as the proposer understood it."""
+
+    joint_name: str
+    joint_type: Literal["revolute", "prismatic"]
+    motion_description: str = ""
+    overall_confidence: Ratio = 0.5
+
+
+class Strength(_Frozen):
+    """How strong an effect is in each channel, in words."""
+
+    conservative: Label = "none"
+    friction: Label = "none"
+    damping: Label = "none"
+
+
+class RefineFactor(_Frozen):
+    """Multiplies what the strength labels give, channel by channel."""
+
+    conservative: Factor = 1.0
+    friction: Factor = 1.0
+    damping: Factor = 1.0
+
+
+class EffectProposal(_Frozen):
+    """One effect.
+
+    Attributes:
+        effect_name: a template's name.
+        start_ratio, end_ratio: its interval in normalised joint position.
+        strength, refineFactor: per channel.
+        confidence: of the proposer, 0 to 1.
+        reason: why it is there.
+    """
+
+    effect_name: str
+    start_ratio: Ratio
+    end_ratio: Ratio
+    strength: Strength
+    refineFactor: RefineFactor = RefineFactor()
+    confidence: Ratio = 0.5
+    reason: str = ""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.start_ratio < self.end_ratio:
+            raise ValueError("start_ratio must be less than end_ratio")
+        return self
+
+
+class Proposal(_Frozen):
+    """The content of `proposal.json`."""
+
+    joint_summary: JointSummary
+    whole_motion_descrptn: str = ""
+    gravity_can_be_ignored: bool = False
+    joint_limit_hint: JointLimitHint = JointLimitHint()
+    effect_proposals: tuple[EffectProposal, ...]
+
+    @classmethod
+    def read(cls, path: str | Path) -> Self:
+        """Reads and checks a file; raises JodaError with file, key and remedy."""
+        try:
+            return cls.model_validate_json(read_text(Path(path)))
+        except ValidationError as error:
+            raise JodaError(f"{path}: {describe(error)}") from None
