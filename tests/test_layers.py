@@ -15,8 +15,9 @@ LAYERS = [
     {"profile"},
     {"field", "model", "mjcf", "template", "proposal"},
     {"scene", "motion", "offscreen", "_schema", "_context"},
+    {"studio"},
     {"_attach", "_compile", "draw"},  # stages, never each other
-    {"_plot", "_bench", "_demo"},  # what combines them
+    {"_plot", "_bench", "_demo", "_render"},  # what combines them
     {"cli"},
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from joda._context import context
     from joda._demo import demo
     from joda._plot import plot
+    from joda._render import render
     from joda._schema import schema
     from joda.profile import Profile
     from joda.scene import read_profiles
@@ -38,11 +39,12 @@ __all__ = [
     "plot",
     "plugin_path",
     "read_profiles",
+    "render",
     "schema",
     "set_profile",
 ]
 
-COMMANDS = ("attach", "bench", "compile", "context", "demo", "plot", "schema")
+COMMANDS = ("attach", "bench", "compile", "context", "demo", "plot", "render", "schema")
 _LAZY = {
     "Profile": "joda.profile",
     "read_profiles": "joda.scene",

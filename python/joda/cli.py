@@ -179,6 +179,32 @@ def plot(
 
 
 @app.command()
+def render(
+    model: Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)],
+    joint: Annotated[
+        str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder to fill.", show_default=False)
+    ],
+    count: Annotated[int, typer.Option(min=2, help="How many positions.")] = 5,
+    force: Force = False,
+) -> None:
+    """Picture a joint at several positions: what it moves, its axis, which way is +q.
+
+    Example:
+
+        joda render microwave.xml --joint door -o pictures
+    """
+    from joda import render as run
+
+    with _progress("render"):
+        paths = run(model, joint, output, count=count, force=force)
+    for path in paths:
+        print(path)
+
+
+@app.command()
 def bench(
     scene: Annotated[
         Path | None, typer.Argument(help="Scene with profiles [default: hinges of our own].")
