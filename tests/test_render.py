@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from assets import asset
 
-from joda import JodaError
-from joda._render import render
+from joda import JodaError, render
 from joda.offscreen import ask
 
 MICROWAVE = Path(__file__).parents[1] / "models" / "microwave.xml"

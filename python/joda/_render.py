@@ -94,7 +94,7 @@ def _labelled(image: Image, label: str) -> "Figure":
     figure.figimage(image)
     box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "boxstyle": "round,pad=0.4"}
     figure.text(
-        0.02, 0.968, label, fontsize=14, va="top", color="#222222", bbox=box, parse_math=False
+        0.02, 0.032, label, fontsize=14, va="bottom", color="#222222", bbox=box, parse_math=False
     )
     return figure
 
