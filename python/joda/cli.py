@@ -23,6 +23,10 @@ app = typer.Typer(
 )
 
 Force = Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")]
+Model = Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)]
+Joint = Annotated[
+    str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 
 
@@ -61,7 +65,7 @@ def demo(
 
 @app.command()
 def attach(
-    model: Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)],
+    model: Model,
     composed: Annotated[
         list[Path],
         typer.Argument(help="Profiles (composed.json), one per joint.", show_default=False),
@@ -128,10 +132,8 @@ def compile(
 
 @app.command()
 def context(
-    model: Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)],
-    joint: Annotated[
-        str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
-    ],
+    model: Model,
+    joint: Joint,
     as_json: Annotated[
         Path | None, typer.Option("--json", help="Write the whole context to this file.")
     ] = None,
@@ -180,10 +182,8 @@ def plot(
 
 @app.command()
 def render(
-    model: Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)],
-    joint: Annotated[
-        str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
-    ],
+    model: Model,
+    joint: Joint,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Folder to fill.", show_default=False)
     ],

@@ -32,11 +32,25 @@ ATTRIBUTES = ("range", *(f"{name}{part}" for name in CHANNELS for part in ("", "
 """The plugin's attributes for one joint."""
 
 
-class _Frozen(BaseModel):
+class Frozen(BaseModel):
+    """A part of a file: immutable, finite, without unknown keys."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class Component(_Frozen):
+class File(Frozen):
+    """The content of a JSON file."""
+
+    @classmethod
+    def read(cls, path: str | Path) -> Self:
+        """Reads and checks a file; raises JodaError with file, key and remedy."""
+        try:
+            return cls.model_validate_json(read_text(Path(path)))
+        except ValidationError as error:
+            raise JodaError(f"{path}: {describe(error)}") from None
+
+
+class Component(Frozen):
     """A local PCHIP curve.
 
     Attributes:
@@ -79,7 +93,7 @@ class Component(_Frozen):
         return (f"{self.label.strip()}: " if self.label.strip() else "") + " | ".join(numbers)
 
 
-class Channel(_Frozen):
+class Channel(Frozen):
     """Components and how they are combined: summed, or the largest of those that cover s."""
 
     combine: Literal["sum", "max"] = "sum"
@@ -103,7 +117,7 @@ class Resistance(Channel):
         return self
 
 
-class Channels(_Frozen):
+class Channels(Frozen):
     """The three channels of a profile."""
 
     conservative: Channel = Channel()
@@ -111,7 +125,7 @@ class Channels(_Frozen):
     damping: Resistance = Resistance()
 
 
-class Joint(_Frozen):
+class Joint(Frozen):
     """The joint that a profile is for.
 
     Attributes:
@@ -135,7 +149,7 @@ class Joint(_Frozen):
         return self
 
 
-class JointLimitHint(_Frozen):
+class JointLimitHint(Frozen):
     """How the joint's end stops feel: `elasticity` sets the damping ratio of the limit.
 
     MuJoCo has one set of limit parameters for both ends; `selected_side` none leaves them alone.
@@ -145,7 +159,7 @@ class JointLimitHint(_Frozen):
     elasticity: Literal["none", "weak", "medium", "strong"] = "none"
 
 
-class Profile(_Frozen):
+class Profile(File):
     """A joint's profile: the content of `composed.json`."""
 
     schema_version: Literal[1] = 1
@@ -153,14 +167,6 @@ class Profile(_Frozen):
     channels: Channels = Channels()
     effects: tuple[Any, ...] = Field(default=(), max_length=0)
     joint_limit_hint: JointLimitHint = JointLimitHint()
-
-    @classmethod
-    def read(cls, path: str | Path) -> Self:
-        """Reads and checks a file; raises JodaError with file, key and remedy."""
-        try:
-            return cls.model_validate_json(read_text(Path(path)))
-        except ValidationError as error:
-            raise JodaError(f"{path}: {describe(error)}") from None
 
     def to_json(self) -> str:
         """The file's text: indented, each list of numbers on one line."""

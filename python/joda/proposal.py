@@ -3,25 +3,18 @@
 The schema is that of the JODA paper (appendix "Output JSON Schema"), its spelling included.
 """
 
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from joda.errors import JodaError
-from joda.files import read_text
-from joda.profile import JointLimitHint, describe
+from joda.profile import File, Frozen, JointLimitHint
 
 Label = Literal["none", "weak", "medium", "strong", "dominant"]
 Ratio = Annotated[float, Field(ge=0, le=1)]
 Factor = Annotated[float, Field(ge=0, le=100)]
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class JointSummary(_Frozen):
+class JointSummary(Frozen):
     """The joint as the proposer understood it."""
 
     joint_name: str
@@ -30,7 +23,7 @@ class JointSummary(_Frozen):
     overall_confidence: Ratio = 0.5
 
 
-class Strength(_Frozen):
+class Strength(Frozen):
     """How strong an effect is in each channel, in words."""
 
     conservative: Label = "none"
@@ -38,7 +31,7 @@ class Strength(_Frozen):
     damping: Label = "none"
 
 
-class RefineFactor(_Frozen):
+class RefineFactor(Frozen):
     """Multiplies what the strength labels give, channel by channel."""
 
     conservative: Factor = 1.0
@@ -46,7 +39,7 @@ class RefineFactor(_Frozen):
     damping: Factor = 1.0
 
 
-class EffectProposal(_Frozen):
+class EffectProposal(Frozen):
     """One effect.
 
     Attributes:
@@ -72,7 +65,7 @@ class EffectProposal(_Frozen):
         return self
 
 
-class Proposal(_Frozen):
+class Proposal(File):
     """The content of `proposal.json`."""
 
     joint_summary: JointSummary
@@ -80,11 +73,3 @@ class Proposal(_Frozen):
     gravity_can_be_ignored: bool = False
     joint_limit_hint: JointLimitHint = JointLimitHint()
     effect_proposals: tuple[EffectProposal, ...]
-
-    @classmethod
-    def read(cls, path: str | Path) -> Self:
-        """Reads and checks a file; raises JodaError with file, key and remedy."""
-        try:
-            return cls.model_validate_json(read_text(Path(path)))
-        except ValidationError as error:
-            raise JodaError(f"{path}: {describe(error)}") from None

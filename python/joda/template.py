@@ -5,17 +5,14 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import model_validator
 
 from joda.errors import JodaError
-from joda.files import read_text
-from joda.profile import Component, describe
+from joda.profile import Component, File, Frozen
 
 
-class Curve(BaseModel):
+class Curve(Frozen):
     """A prototype: PCHIP control points, their largest magnitude 1."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     x: tuple[float, ...]
     y: tuple[float, ...]
@@ -28,10 +25,8 @@ class Curve(BaseModel):
         return self
 
 
-class Curves(BaseModel):
+class Curves(Frozen):
     """Prototypes of the channels; a template may leave channels out."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     conservative: Curve | None = None
     friction: Curve | None = None
@@ -46,7 +41,7 @@ class Curves(BaseModel):
         return self
 
 
-class Template(BaseModel):
+class Template(File):
     """An effect that a joint may have.
 
     Attributes:
@@ -55,8 +50,6 @@ class Template(BaseModel):
         placement: where on a joint it is typically found.
         channels: prototype curves in the interval's own coordinate u, from 0 at its low end to 1.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     description: str
@@ -87,10 +80,7 @@ def read_templates(folders: Sequence[str | Path] = ()) -> dict[str, Template]:
 
 
 def _read(path: Path) -> Template:
-    try:
-        template = Template.model_validate_json(read_text(path))
-    except ValidationError as error:
-        raise JodaError(f"{path}: {describe(error)}") from None
+    template = Template.read(path)
     if template.name != path.stem:
         raise JodaError(f"{path}: name: must be the file's name, '{path.stem}'.")
     return template
