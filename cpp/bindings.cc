@@ -67,6 +67,4 @@ Raises:
       py::arg("model_address"), py::arg("data_address"), py::arg("joint"), py::arg("lo"),
       py::arg("hi"), py::arg("texts"),
       "Replaces the profile of a joint in one mjData; texts: channel and combine, three times.");
-
-  module.attr("MUJOCO_VERSION") = mjVERSION_HEADER;
 }

@@ -259,6 +259,10 @@ void JointDynamics::Register() {
 extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
                                 const char* const texts[6], char* error, int error_size) {
   try {
+    if (joint < 0 || joint >= m->njnt) {
+      throw std::invalid_argument("the model has " + std::to_string(m->njnt) +
+                                  " joints, none with id " + std::to_string(joint));
+    }
     const int instance = m->body_plugin[m->jnt_bodyid[joint]];
     int slot = -1;
     mjp_getPlugin("joda.joint_dynamics", &slot);

@@ -121,6 +121,18 @@ TWO = DOOR.replace(JOINT, JOINT + '\n        <joint name="lift" type="slide" ran
 
 LIFT = dict(name="lift", kind="slide", limits=(0.0, 0.2))
 
+
+def swing(m: mujoco.MjModel, position: float, velocity: float, steps: int) -> np.ndarray:
+    """Positions of the first joint, a step apart, from that start."""
+    d = mujoco.MjData(m)
+    d.qpos[0], d.qvel[0] = position, velocity
+    positions = []
+    for _ in range(steps):
+        mujoco.mj_step(m, d)
+        positions.append(d.qpos[0])
+    return np.array(positions)
+
+
 UNNAMED = """\
 <mujoco>
   <worldbody>

@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from scenes import DOOR, EMPTY, LATCH, attached, model_of, profile
+from scenes import DOOR, EMPTY, LATCH, attached, model_of, profile, swing
 
 from joda import attach
 from joda.scene import read_profiles
@@ -157,27 +157,19 @@ def test_a_prefixed_copy_gets_a_new_profile_without_a_second_row(tmp_path):
     assert model_of(tmp_path / "new.xml").neq == 1
 
 
-def trajectory(m: mujoco.MjModel) -> np.ndarray:
-    d = mujoco.MjData(m)
-    d.qpos[0], d.qvel[0] = 0.8, 0.3
-    out = []
-    for _ in range(500):
-        mujoco.mj_step(m, d)
-        out.append(d.qpos[0])
-    return np.array(out)
-
-
 def test_mujocos_own_writer_and_binary_files_keep_the_behaviour(tmp_path):
     _, after, _ = attached(tmp_path)
     m = model_of(after)
-    expected = trajectory(m)
+    expected = swing(m, 0.8, 0.3, 500)
     spec = mujoco.MjSpec.from_file(str(after))
-    assert np.array_equal(trajectory(spec.compile()), expected)
+    assert np.array_equal(swing(spec.compile(), 0.8, 0.3, 500), expected)
     (tmp_path / "again.xml").write_text(spec.to_xml())
-    assert trajectory(model_of(tmp_path / "again.xml")) == pytest.approx(expected, abs=1e-6)
+    assert swing(model_of(tmp_path / "again.xml"), 0.8, 0.3, 500) == pytest.approx(
+        expected, abs=1e-6
+    )
     mujoco.mj_saveModel(m, str(tmp_path / "m.mjb"))
     binary = mujoco.MjModel.from_binary_path(str(tmp_path / "m.mjb"))
-    assert np.array_equal(trajectory(binary), expected)
+    assert np.array_equal(swing(binary, 0.8, 0.3, 500), expected)
 
 
 def test_under_the_discrete_integrator_friction_holds_with_mujocos_stiffest_row(tmp_path):

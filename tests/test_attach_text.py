@@ -17,6 +17,7 @@ from scenes import (
     profile,
     removed,
     stl,
+    swing,
     write,
 )
 
@@ -235,14 +236,7 @@ def test_an_empty_profile_kept_besides_native_values_changes_nothing(tmp_path):
 
 def moves(path: Path) -> np.ndarray:
     """The door's positions over 0.2 s from a swing."""
-    m = model_of(path)
-    d = mujoco.MjData(m)
-    d.qpos[0], d.qvel[0] = 0.2, 3.0
-    positions = []
-    for _ in range(100):
-        mujoco.mj_step(m, d)
-        positions.append(d.qpos[0])
-    return np.array(positions)
+    return swing(model_of(path), 0.2, 3.0, 100)
 
 
 # --- other folders

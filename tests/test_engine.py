@@ -231,6 +231,20 @@ def test_swapping_needs_a_joint_that_carries_a_profile():
         joda.set_profile(model, mujoco.MjData(model), "j", random_profile(np.random.default_rng()))
 
 
+@pytest.mark.parametrize(
+    ("joint", "message"),
+    [
+        ("k", "joint 'k' not found; .* 'j'"),
+        (1, "the model has 1 joints, none with id 1"),
+        (-1, "-1"),
+    ],
+)
+def test_swapping_names_a_joint_that_does_not_exist(joint, message):
+    model, data = swinging()
+    with pytest.raises(joda.JodaError, match=message):
+        joda.set_profile(model, data, joint, random_profile(np.random.default_rng()))
+
+
 def test_sleeping_and_waking():
     """A held joint falls asleep, keeps its place, and moves again when pushed."""
     model, data = load(

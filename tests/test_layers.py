@@ -14,10 +14,11 @@ LAYERS = [
     {"files", "plugin"},
     {"profile"},
     {"field", "model", "mjcf", "template", "proposal"},
-    {"scene", "motion", "offscreen", "_schema", "_context"},
-    {"studio"},
+    {"scene", "motion", "offscreen", "_schema"},
+    {"studio", "_context"},
     {"_attach", "_compile", "draw"},  # stages, never each other
-    {"_plot", "_bench", "_demo", "_render"},  # what combines them
+    {"_plot", "_bench", "_render"},  # what combines them
+    {"_demo"},
     {"cli"},
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

@@ -8,7 +8,7 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 from joda.errors import JodaError
-from joda.plugin import load, plugin_path, set_profile
+from joda.plugin import load, plugin_path
 
 if TYPE_CHECKING:
     from joda._attach import attach
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from joda._render import render
     from joda._schema import schema
     from joda.profile import Profile
-    from joda.scene import read_profiles
+    from joda.scene import read_profiles, set_profile
 
 try:
     load()
@@ -48,6 +48,7 @@ COMMANDS = ("attach", "bench", "compile", "context", "demo", "plot", "render", "
 _LAZY = {
     "Profile": "joda.profile",
     "read_profiles": "joda.scene",
+    "set_profile": "joda.scene",
     **{name: f"joda._{name}" for name in COMMANDS},
 }
 

@@ -6,18 +6,17 @@ once, and the median over the rounds of the ratio within a round is reported.
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from joda.errors import JodaError
 from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import CHANNELS, Channel, Channels, Component, Joint, Profile, Resistance
-from joda.scene import DAMPING_ROW, INERT, TRACE, read_profiles
+from joda.scene import DAMPING_ROW, INERT, TRACE, open_scene
 
 ROUNDS = 31
 SWING = 100  # steps; all joints move meanwhile
@@ -41,10 +40,6 @@ class Row:
     spread: float
     bar: str
     microseconds: tuple[float, float]
-
-    def json(self) -> dict[str, Any]:
-        """The row as a JSON object."""
-        return asdict(self)
 
 
 def bench(
@@ -85,8 +80,11 @@ def bench(
 
 def hinges(count: int, kind: str) -> mujoco.MjModel:
     """Doors side by side: "plain", with "native" spring, damping and friction, or with profiles."""
-    native = 'stiffness="0.5" damping="0.2" frictionloss="0.1"' if kind == "native" else ""
-    native = f'frictionloss="{TRACE}"' if kind == "joda" else native
+    attributes = {
+        "plain": "",
+        "native": 'stiffness="0.5" damping="0.2" frictionloss="0.1"',
+        "joda": f'frictionloss="{TRACE}"',
+    }[kind]
     bodies, instances, rows = [], [], []
     config = "".join(
         f'<config key="{k}" value="{v}"/>' for k, v in _three_channels().attributes().items()
@@ -95,7 +93,7 @@ def hinges(count: int, kind: str) -> mujoco.MjModel:
         reference = f'<plugin instance="p{k}"/>' if kind == "joda" else ""
         bodies.append(
             f'<body pos="{k} 0 0">'
-            f'<joint name="j{k}" axis="0 0 1" range="0 1.5" limited="true" {native}/>'
+            f'<joint name="j{k}" axis="0 0 1" range="0 1.5" limited="true" {attributes}/>'
             f'<geom type="box" size=".2 .01 .2" pos=".2 0 0" mass="1"/>{reference}</body>'
         )
         instances.append(f'<instance name="p{k}">{config}</instance>')
@@ -153,14 +151,11 @@ def _callback(model: mujoco.MjModel) -> Callable[[mujoco.MjModel, mujoco.MjData]
 
 
 def _bench_scene(path: Path, progress: Callable[[str], None]) -> list[Row]:
-    profiles = read_profiles(path)
-    if not profiles:
-        raise JodaError(f"{path}: carries no profile; attach one first with: joda attach")
-    progress(f"{path.name}, {len(profiles)} profiles")
-    ours = mujoco.MjModel.from_xml_path(str(path))
+    ours, profiles = open_scene(path)
+    what = f"{path.name}, {len(profiles)} profiles"
+    progress(what)
     native, plain = _without_plugin(path, profiles, True), _without_plugin(path, profiles, False)
     times = _measure([(plain, None), (native, None), (ours, None)])
-    what = f"{path.name}, {len(profiles)} profiles"
     return [
         _row(f"{what} / native elements", times[2], times[1], "<= 1.05 for the kitchen"),
         _row(f"{what} / none", times[2], times[0], ""),

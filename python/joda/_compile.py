@@ -86,7 +86,7 @@ def compile(  # the command's name
     channels = {name: {"combine": combine, "components": parts[name]} for name in CHANNELS}
     profile = Profile(
         joint=found.joint,
-        channels=Channels.model_validate(channels, from_attributes=True),
+        channels=Channels.model_validate(channels),
         joint_limit_hint=read.joint_limit_hint,
     )
     if output is not None:

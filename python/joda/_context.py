@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from joda.model import describe_joint, find_joint, load_model
+from joda.motion import gravity_force
 from joda.profile import Joint
 
 POSITIONS = 21
@@ -96,10 +97,11 @@ def context(model: str | Path, joint: str) -> Context:
     data = mujoco.MjData(m)
     dof, body = m.jnt_dofadr[j], int(m.jnt_bodyid[j])
     positions = np.linspace(*described.range, POSITIONS)
-    inertia, gravity, height = (np.empty(POSITIONS) for _ in range(3))
+    inertia, height = np.empty(POSITIONS), np.empty(POSITIONS)
     for k in reversed(range(POSITIONS)):  # ends with the data at the low end
         data.qpos[m.jnt_qposadr[j]] = positions[k]
-        inertia[k], gravity[k], height[k] = _at_rest(m, data, int(dof), body)
+        inertia[k], height[k] = _inertia_and_height(m, data, int(dof), body)
+    gravity = gravity_force(m, j, positions)
     weight = float(m.body_subtreemass[body] * np.linalg.norm(m.opt.gravity))
     gravity[np.abs(gravity) <= 1e-9 * weight] = 0  # rounding
     parent = int(m.body_parentid[body])
@@ -121,18 +123,17 @@ def context(model: str | Path, joint: str) -> Context:
     )
 
 
-def _at_rest(
+def _inertia_and_height(
     m: mujoco.MjModel, data: mujoco.MjData, dof: int, body: int
-) -> tuple[float, float, float]:
-    """Generalised inertia and gravity force of the dof, and the height of what it moves."""
+) -> tuple[float, float]:
+    """Generalised inertia of the dof, and the height (m) of what it moves."""
     mujoco.mj_fwdPosition(m, data)
-    mass, bias = np.empty((m.nv, m.nv)), np.empty(m.nv)
+    mass = np.empty((m.nv, m.nv))
     mujoco.mj_fullM(m, data, mass)
-    mujoco.mj_rne(m, data, 0, bias)  # at rest, all of it is gravity
     up = -np.asarray(m.opt.gravity)
     length = float(np.linalg.norm(up))
     height = float(data.subtree_com[body] @ up) / length if length else 0.0
-    return float(mass[dof, dof]), float(-bias[dof]), height
+    return float(mass[dof, dof]), height
 
 
 def _upper_end(height: NDArray[np.float64]) -> End | Literal["level"]:

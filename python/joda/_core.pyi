@@ -5,8 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-MUJOCO_VERSION: int
-
 class Channel:
     """A channel of a profile, merged at load."""
 

@@ -8,21 +8,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from joda._attach import attach
-from joda.draw import draw, write_png
+from joda._plot import plot
+from joda.draw import write_png
 from joda.errors import JodaError
-from joda.files import write_bytes, write_text
+from joda.files import make_folder, write_bytes, write_text
 from joda.model import find_joint, load_model
-from joda.motion import Motion, gravity_force, release
-from joda.offscreen import render
-from joda.profile import Profile
+from joda.motion import Motion, release
+from joda.offscreen import Image, render
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Image = NDArray[np.uint8]
 
 START = np.deg2rad(3.0)
 DURATION = 1.0
@@ -78,10 +75,7 @@ def demo(
     folder = Path(output) if output is not None else _fresh("joda_demo")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not force:
         raise JodaError(f"{folder}: exists already; choose another folder with -o or add --force.")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise JodaError(f"{folder}: cannot be made ({error.strerror}).") from None
+    make_folder(folder)
     plain, composed = folder / "microwave.xml", folder / "composed.json"
     progress("writing the microwave and its latch")
     with as_file(files("joda") / "models") as models:
@@ -93,13 +87,7 @@ def demo(
     progress("drawing the profile")
     model, before = load_model(scene), load_model(plain)
     joint = find_joint(model, "door")
-    profile = Profile.read(composed)
-    positions = np.linspace(*profile.joint.range, 101)
-    write_png(
-        draw(profile, (positions, -gravity_force(model, joint, positions))),
-        folder / "profile.png",
-        force=True,
-    )
+    profile = plot(scene, folder / "profile.png", force=True)
 
     progress("letting both doors go at 3 degrees")
     motions = [release(m, joint, START, DURATION) for m in (before, model)]
@@ -112,7 +100,7 @@ def demo(
         plain=plain,
         composed=composed,
         scene=scene,
-        profile=folder / "profile.png",
+        profile=profile,
         picture=picture,
         start=float(START),
         plain_end=float(motions[0].position[-1]),

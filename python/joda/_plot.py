@@ -6,10 +6,10 @@ import numpy as np
 
 from joda.draw import draw, write_png
 from joda.errors import JodaError
-from joda.model import find_joint, load_model
+from joda.model import find_joint
 from joda.motion import gravity_force
 from joda.profile import Profile
-from joda.scene import read_profiles
+from joda.scene import open_scene
 
 
 def plot(
@@ -41,16 +41,14 @@ def plot(
         target = Path(output) if output else source.with_suffix(".png")
         write_png(draw(Profile.read(source)), target, force)
         return target
-    profiles = read_profiles(source)
+    model, profiles = open_scene(source)
     listed = ", ".join(f"'{name}'" for name in profiles)
-    if not profiles:
-        raise JodaError(f"{source}: carries no profile; attach one first with: joda attach")
     if joint is None and len(profiles) > 1:
         raise JodaError(f"{source}: several joints carry a profile; choose with --joint: {listed}.")
     name = next(iter(profiles)) if joint is None else joint
     if name not in profiles:
         raise JodaError(f"{source}: joint '{name}' carries no profile; these do: {listed}.")
-    profile, model = profiles[name], load_model(source)
+    profile = profiles[name]
     positions = np.linspace(*profile.joint.range, 201)
     balance = -gravity_force(model, find_joint(model, name), positions)
     suffix = f".{name}.png" if len(profiles) > 1 else ".png"

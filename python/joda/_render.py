@@ -13,7 +13,7 @@ import numpy as np
 
 from joda.draw import write_png
 from joda.errors import JodaError
-from joda.files import check_target
+from joda.files import check_target, make_folder
 from joda.model import describe_joint, find_joint, load_model
 from joda.offscreen import HEIGHT, WIDTH, Image, Shots, answer, ask
 from joda.profile import Joint
@@ -57,10 +57,7 @@ def render(
     about = describe_joint(compiled, index)
     if not moving(compiled, index):
         raise JodaError(f"{path}: joint '{about.name}' moves no geom that can be seen.")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise JodaError(f"{folder}: cannot be made ({error.strerror}).") from None
+    make_folder(folder)
     fractions = np.linspace(0, 1, count)
     stem = re.sub(r"[^\w.-]+", "_", about.name).strip("_") or "joint"
     digits = max(2, len(str(count - 2)))

@@ -222,7 +222,7 @@ def bench(
     with _progress("bench") as progress:
         rows = run(scene, progress=progress)
     if as_json:
-        _print_json([row.json() for row in rows])
+        _print_json([asdict(row) for row in rows])
         return
     from rich.console import Console
     from rich.table import Table
@@ -260,9 +260,7 @@ def main() -> None:
         status = app(sys.argv[1:] or ["--help"], standalone_mode=False)
     except JodaError as error:
         status = _fail(str(error))
-    except typer.Abort:
-        status = _fail("interrupted.", 130)
-    except KeyboardInterrupt:
+    except (typer.Abort, KeyboardInterrupt):
         status = _fail("interrupted.", 130)
     except typer.TyperException as error:
         status = _fail(error.format_message() + " Try --help.")

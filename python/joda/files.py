@@ -25,6 +25,14 @@ def check_target(path: Path, force: bool) -> None:
         raise JodaError(f"{path}: the folder {path.parent} does not exist; create it first.")
 
 
+def make_folder(path: Path) -> None:
+    """Makes the folder, and those above it, unless it exists; raises JodaError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise JodaError(f"{path}: cannot be made ({error.strerror}).") from None
+
+
 def write_bytes(path: Path, content: bytes) -> None:
     """Writes the whole file or nothing; raises JodaError if the folder does not allow it."""
     try:

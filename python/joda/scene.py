@@ -1,10 +1,11 @@
-"""Profiles as they stand in a scene: the plugin's instances in MJCF, read back."""
+"""Profiles as they stand in a scene: the plugin's instances in MJCF, and in a running mjData."""
 
 from pathlib import Path
 
 import mujoco
 
-from joda.model import describe_joint, load
+from joda.errors import JodaError
+from joda.model import describe_joint, find_joint, load
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
 
@@ -75,7 +76,20 @@ def read_profiles(path: str | Path) -> dict[str, Profile]:
     Raises:
         JodaError: the file cannot be loaded.
     """
-    spec, model = load(Path(path))
+    return profiles_of(*load(Path(path)))
+
+
+def open_scene(path: Path) -> tuple[mujoco.MjModel, dict[str, Profile]]:
+    """A scene and its profiles, as `read_profiles`; raises JodaError also where there are none."""
+    spec, model = load(path)
+    profiles = profiles_of(spec, model)
+    if not profiles:
+        raise JodaError(f"{path}: carries no profile; attach one first with: joda attach")
+    return model, profiles
+
+
+def profiles_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[str, Profile]:
+    """Joint name to profile, of a compiled spec and what it compiled to; raises JodaError."""
     out = {}
     for joint in range(model.njnt):
         found = find_instance(spec, model, int(model.jnt_bodyid[joint]))
@@ -87,3 +101,28 @@ def read_profiles(path: str | Path) -> dict[str, Profile]:
             described = describe_joint(model, joint, limits)  # type: ignore[arg-type]
             out[described.name] = Profile.from_attributes(described, own)
     return out
+
+
+def set_profile(
+    model: mujoco.MjModel, data: mujoco.MjData, joint: int | str, profile: Profile
+) -> None:
+    """Replaces the profile of a joint in one mjData; neither the model nor other data change.
+
+    Args:
+        model: a model whose joint carries a profile already.
+        data: the data to change.
+        joint: id, or name or address as in `joda.model.find_joint`.
+        profile: the new profile; its `joint.range` places it.
+
+    Raises:
+        JodaError: the joint does not exist or carries no profile.
+    """
+    import joda._core as core
+
+    number = joint if isinstance(joint, int) else find_joint(model, joint)
+    attributes = profile.attributes()
+    texts = [attributes.get(key, "") for key in ATTRIBUTES if key != "range"]
+    try:
+        core.set_profile(model._address, data._address, number, *profile.joint.range, texts)
+    except ValueError as error:
+        raise JodaError(str(error)) from None
