@@ -17,7 +17,14 @@ LAYERS = [
     {"scene", "motion", "offscreen", "_schema"},
     {"studio", "_context"},
     {"_attach", "_compile", "draw"},  # stages, never each other
-    {"_plot", "_bench", "_render"},  # what combines them
+    {"_plot", "_bench", "_render", "sheet", "rig", "changes"},  # what combines them
+    {"behaviour", "_templates"},
+    {"wishes"},
+    {"propose"},
+    {"history"},
+    {"session"},
+    {"_generate"},  # the loop
+    {"_generate_all", "_revise"},
     {"_demo"},
     {"cli"},
 ]

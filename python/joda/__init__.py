@@ -16,9 +16,13 @@ if TYPE_CHECKING:
     from joda._compile import compile
     from joda._context import context
     from joda._demo import demo
+    from joda._generate import generate
+    from joda._generate_all import generate_all
     from joda._plot import plot
     from joda._render import render
+    from joda._revise import revise
     from joda._schema import schema
+    from joda._templates import templates
     from joda.profile import Profile
     from joda.scene import read_profiles, set_profile
 
@@ -36,17 +40,34 @@ __all__ = [
     "compile",
     "context",
     "demo",
+    "generate",
+    "generate_all",
     "plot",
     "plugin_path",
     "read_profiles",
     "render",
+    "revise",
     "schema",
     "set_profile",
+    "templates",
 ]
 
-COMMANDS = ("attach", "bench", "compile", "context", "demo", "plot", "render", "schema")
+COMMANDS = (
+    "attach",
+    "bench",
+    "compile",
+    "context",
+    "demo",
+    "generate",
+    "plot",
+    "render",
+    "revise",
+    "schema",
+    "templates",
+)
 _LAZY = {
     "Profile": "joda.profile",
+    "generate_all": "joda._generate_all",
     "read_profiles": "joda.scene",
     "set_profile": "joda.scene",
     **{name: f"joda._{name}" for name in COMMANDS},

@@ -7,7 +7,7 @@ and changing one label or interval changes nothing else.
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -27,8 +27,15 @@ BANDS: dict[Label, tuple[float, float]] = {
 }
 """Multipliers of the reference that a strength label stands for."""
 
-TRAVEL_TIME = 0.5
+TRAVEL_TIME = 1.0
 """Reference time (s) in which the inertial reference force moves a joint through its range."""
+
+HAND_FORCE = 10.0
+"""What a hand calls strong (N), at the end of the lever arm. Small parts would go without it: by
+gravity and inertia alone, the button of a lighter would need a hundredth of a newton."""
+
+HAND_SPEED = 0.5
+"""Reference speed (m/s) at the end of the lever arm."""
 
 
 def compile(  # the command's name
@@ -71,19 +78,11 @@ def compile(  # the command's name
             f"joint '{found.joint.name}' is a {found.joint.type} and the proposal is for a "
             f"{summary.joint_type} joint; set joint_summary.joint_type."
         )
-    library = read_templates(templates)
-    parts: dict[str, list[Component]] = {name: [] for name in CHANNELS}
-    seen: dict[str, int] = {}
-    references = reference_scales(found, read.gravity_can_be_ignored)
-    for effect in read.effect_proposals:
-        template = _find(library, effect)
-        number = seen[effect.effect_name] = seen.get(effect.effect_name, 0) + 1
-        for name in CHANNELS:
-            draw = f"{key}|{found.joint.name}|{effect.effect_name}|{number}|{name}"
-            component = _component(effect, template, name, references[name], draw)
-            if component:
-                parts[name].append(component)
-    channels = {name: {"combine": combine, "components": parts[name]} for name in CHANNELS}
+    parts = contributions(read, found, read_templates(templates), key)
+    channels = {
+        name: {"combine": combine, "components": [part[name] for part in parts if name in part]}
+        for name in CHANNELS
+    }
     profile = Profile(
         joint=found.joint,
         channels=Channels.model_validate(channels),
@@ -94,12 +93,46 @@ def compile(  # the command's name
     return profile
 
 
+def contributions(
+    proposal: Proposal, found: Context, library: Mapping[str, Template], key: str = ""
+) -> list[dict[str, Component]]:
+    """What each effect of a proposal adds to the channels.
+
+    Args:
+        proposal: what to compile.
+        found: the joint's context.
+        library: templates by name.
+        key: as for `compile`.
+
+    Returns:
+        one dict per effect, channel to component; channels that it leaves alone are missing.
+
+    Raises:
+        JodaError: an effect is not in the library.
+    """
+    references = reference_scales(found, proposal.gravity_can_be_ignored)
+    seen: dict[str, int] = {}
+    out = []
+    for effect in proposal.effect_proposals:
+        template = _find(library, effect)
+        number = seen[effect.effect_name] = seen.get(effect.effect_name, 0) + 1
+        added = {}
+        for name in CHANNELS:
+            draw = f"{key}|{found.joint.name}|{effect.effect_name}|{number}|{name}"
+            component = _component(effect, template, name, references[name], draw)
+            if component:
+                added[name] = component
+        out.append(added)
+    return out
+
+
 def reference_scales(found: Context, ignore_gravity: bool = False) -> dict[str, float]:
     """The size that a multiplier of 1 stands for, per channel: N·m or N, N·m·s/rad or N·s/m.
 
-    Force: the larger of gravity's largest force on the joint and the inertial force, which moves it
+    Force: the largest of gravity's largest force on the joint, the inertial force, which moves it
     from rest to rest through its range in TRAVEL_TIME (accelerating for half of it, braking for the
-    other: 4 I range / T^2). Damping: what makes the reference force at the speed range / T.
+    other: 4 I range / T^2), and a hand's force. Damping: what makes the reference force at a hand's
+    speed.
 
     Args:
         found: the joint's context.
@@ -109,16 +142,14 @@ def reference_scales(found: Context, ignore_gravity: bool = False) -> dict[str, 
         channel to reference.
     """
     lo, hi = found.joint.range
+    arm = found.lever_arm
     inertial = 4 * found.equivalent_inertia * (hi - lo) / TRAVEL_TIME**2
-    force = inertial if ignore_gravity else max(inertial, found.gravity_scale)
-    return {
-        "conservative": force,
-        "friction": force,
-        "damping": force * TRAVEL_TIME / (hi - lo),
-    }
+    gravity = 0.0 if ignore_gravity else found.gravity_scale
+    force = max(gravity, inertial, HAND_FORCE * arm)
+    return {"conservative": force, "friction": force, "damping": force * arm / HAND_SPEED}
 
 
-def _find(library: dict[str, Template], effect: EffectProposal) -> Template:
+def _find(library: Mapping[str, Template], effect: EffectProposal) -> Template:
     if effect.effect_name not in library:
         raise JodaError(
             f"effect '{effect.effect_name}' is not in the library; there are: {', '.join(library)}."

@@ -15,6 +15,9 @@ from joda.profile import Joint
 POSITIONS = 21
 """At how many positions, evenly over the range, inertia and gravity are sampled."""
 
+_ACTS_ON_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
+_ACTS_IN_PARENT = int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+
 Vector = tuple[float, float, float]
 End = Literal["low_end", "high_end"]
 
@@ -38,6 +41,12 @@ class Context(BaseModel):
         upper_end: the end at which the moving part lies higher, "level" if neither.
         closed_end: the end at which the joint's reference position lies, "unknown" if it lies at
             neither; opening is the motion away from it.
+        lever_arm: where a hand would take hold. Hinge: distance from the axis to the farthest point
+            of what moves, m; slide: 1. Times a hand's force (N) it gives the generalised force.
+        size: of the box around what moves, along the world's axes, at the low end; m.
+        driven: whether an actuator acts on the joint.
+        names: what the file calls the joint, the child and what moves with it, in this order.
+        around: what it calls the bodies above, nearest first, and the model.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -56,6 +65,11 @@ class Context(BaseModel):
     gravity_scale: float
     upper_end: End | Literal["level"]
     closed_end: End | Literal["unknown"]
+    lever_arm: float
+    size: Vector
+    driven: bool
+    names: tuple[str, ...]
+    around: tuple[str, ...]
 
     def describe(self) -> str:
         """The context in a few lines for a person."""
@@ -69,10 +83,15 @@ class Context(BaseModel):
             "range": f"{lo:g} to {hi:g} {joint.unit}{degrees}",
             "axis": f"{_text(self.axis_local)} in the body, {_text(self.axis_world)} in the world",
             "moving mass": f"{self.moving_mass:.4g} kg",
+            "moving part": " x ".join(f"{x:.3g}" for x in self.size) + " m (world x, y, z)",
+            **({"lever arm": f"{self.lever_arm:.3g} m from the axis"} if hinge else {}),
             "inertia": f"{_span(self.inertia)} {'kg·m²' if hinge else 'kg'}",
             "gravity": f"{_span(self.gravity_force)} {force} (positive drives +q)",
             "upper end": self.upper_end.replace("_", " "),
             "closed end": f"{self.closed_end.replace('_', ' ')}; opening: {opens}",
+            **({"driven by": "an actuator"} if self.driven else {}),
+            "names": ", ".join(self.names[:12]),
+            "part of": ", ".join(self.around),
         }
         return "\n".join(f"{name + ':':12} {text}" for name, text in rows.items())
 
@@ -105,6 +124,7 @@ def context(model: str | Path, joint: str) -> Context:
     weight = float(m.body_subtreemass[body] * np.linalg.norm(m.opt.gravity))
     gravity[np.abs(gravity) <= 1e-9 * weight] = 0  # rounding
     parent = int(m.body_parentid[body])
+    points = _points(m, data, body)
     return Context(
         joint=described,
         parent=_body_name(m, parent),
@@ -120,6 +140,11 @@ def context(model: str | Path, joint: str) -> Context:
         gravity_scale=float(np.abs(gravity).max()),
         upper_end=_upper_end(height),
         closed_end=_closed_end(described, float(m.qpos0[m.jnt_qposadr[j]])),
+        lever_arm=_lever_arm(described, points, data.xanchor[j], data.xaxis[j]),
+        size=_vector(np.ptp(points, axis=0)),
+        driven=_driven(m, j),
+        names=_names(m, j),
+        around=_around(m, j),
     )
 
 
@@ -134,6 +159,67 @@ def _inertia_and_height(
     length = float(np.linalg.norm(up))
     height = float(data.subtree_com[body] @ up) / length if length else 0.0
     return float(mass[dof, dof]), height
+
+
+def _points(m: mujoco.MjModel, data: mujoco.MjData, body: int) -> NDArray[np.float64]:
+    """Corners of the boxes around the geoms that move, and the centre of mass; shape (n, 3), m."""
+    corners = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3)
+    points = [data.subtree_com[body][None]]
+    for geom in np.flatnonzero(_below(m, body)[m.geom_bodyid]):
+        centre, half = np.split(m.geom_aabb[geom], 2)
+        points.append(
+            data.geom_xpos[geom] + (centre + corners * half) @ data.geom_xmat[geom].reshape(3, 3).T
+        )
+    return np.concatenate(points)
+
+
+def _below(m: mujoco.MjModel, body: int) -> NDArray[np.bool_]:
+    """Which bodies move with this one, itself included; shape (nbody,)."""
+    inside = np.zeros(m.nbody, bool)
+    inside[body] = True
+    for k in range(body + 1, m.nbody):
+        inside[k] = inside[m.body_parentid[k]]
+    return inside
+
+
+def _lever_arm(
+    joint: Joint,
+    points: NDArray[np.float64],
+    anchor: NDArray[np.float64],
+    axis: NDArray[np.float64],
+) -> float:
+    if joint.type == "slide":
+        return 1.0
+    away = points - anchor
+    away -= np.outer(away @ axis, axis)
+    return float(np.linalg.norm(away, axis=1).max())
+
+
+def _driven(m: mujoco.MjModel, joint: int) -> bool:
+    acts = np.isin(m.actuator_trntype, (_ACTS_ON_JOINT, _ACTS_IN_PARENT))
+    return bool(np.any(acts & (m.actuator_trnid[:, 0] == joint)))
+
+
+def _names(m: mujoco.MjModel, joint: int) -> tuple[str, ...]:
+    body = int(m.jnt_bodyid[joint])
+    names = [m.joint(joint).name, m.body(body).name]
+    for geom in np.flatnonzero(_below(m, body)[m.geom_bodyid]):
+        names.append(m.body(m.geom_bodyid[geom]).name)
+        names.append(m.geom(geom).name)
+        if m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH and m.geom_dataid[geom] >= 0:
+            names.append(m.mesh(m.geom_dataid[geom]).name)
+        if m.geom_matid[geom] >= 0:
+            names.append(m.mat(m.geom_matid[geom]).name)
+    return tuple(dict.fromkeys(filter(None, names)))
+
+
+def _around(m: mujoco.MjModel, joint: int) -> tuple[str, ...]:
+    names, body = [], int(m.body_parentid[m.jnt_bodyid[joint]])
+    while body:
+        names.append(m.body(body).name)
+        body = int(m.body_parentid[body])
+    names.append(bytes(m.names).split(b"\0")[0].decode())  # the model's own name comes first
+    return tuple(dict.fromkeys(filter(None, names)))
 
 
 def _upper_end(height: NDArray[np.float64]) -> End | Literal["level"]:

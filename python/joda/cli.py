@@ -1,18 +1,24 @@
 """The command line: each command is a Python function of the same name."""
 
 import json
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from math import degrees
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from textwrap import indent
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from joda.errors import JodaError
 from joda.plugin import load
+
+if TYPE_CHECKING:
+    from joda.template import Template
 
 app = typer.Typer(
     help="Joint dynamics for articulated objects in MuJoCo: latches, detents, friction, damping.",
@@ -26,6 +32,9 @@ Force = Annotated[bool, typer.Option("--force", help="Overwrite files that exist
 Model = Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)]
 Joint = Annotated[
     str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
+]
+Templates = Annotated[
+    list[Path] | None, typer.Option("--templates", help="Further folders of templates.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 
@@ -110,9 +119,7 @@ def compile(
     joint: Annotated[
         str | None, typer.Option("--joint", help="The joint, if not the one the proposal names.")
     ] = None,
-    templates: Annotated[
-        list[Path] | None, typer.Option("--templates", help="Further folders of templates.")
-    ] = None,
+    templates: Templates = None,
     key: Annotated[
         str, typer.Option("--key", help="Another key draws other numbers for the same words.")
     ] = "",
@@ -156,6 +163,119 @@ def context(
     print(found.describe())
     if as_json:
         print(as_json)
+
+
+@app.command()
+def generate(
+    model: Annotated[
+        Path, typer.Argument(help="MJCF or URDF file, or a folder of them.", show_default=False)
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder to fill.", show_default=False)
+    ],
+    joint: Annotated[
+        str | None,
+        typer.Option(
+            "--joint", help="A name, body:NAME[:K] or #K; for a folder: only joints of this name."
+        ),
+    ] = None,
+    proposer: Annotated[
+        str | None,
+        typer.Option(
+            help="anthropic, offline or a proposal.json [default: anthropic where "
+            "ANTHROPIC_API_KEY is set, else offline]."
+        ),
+    ] = None,
+    rounds: Annotated[int, typer.Option(min=1, help="At most so many proposals.")] = 3,
+    describe: Annotated[
+        str, typer.Option(help="What the joint should do, in words.", show_default=False)
+    ] = "",
+    templates: Templates = None,
+    key: Annotated[
+        str, typer.Option("--key", help="Another key draws other numbers for the same words.")
+    ] = "",
+    vlm: Annotated[
+        str | None, typer.Option(help="The model that anthropic asks [default: $JODA_VLM].")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what the folder holds.")
+    ] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Give a joint the behaviour of the object: propose, compile, simulate, revise.
+
+    Leaves context.json, pictures, proposal.json, composed.json, profile.png, scene.xml and
+    history.json. A folder of models is done joint by joint. Example:
+
+        joda generate microwave.xml --joint door -o out --describe "it latches shut"
+    """
+    from joda import generate as run
+    from joda import generate_all as run_all
+
+    options: dict[str, Any] = {
+        "proposer": proposer, "rounds": rounds, "describe": describe, "templates": templates or (),
+        "key": key, "vlm": vlm, "resume": resume, "force": force,
+    }  # fmt: skip
+    if model.is_dir():
+        with _bar() as bar:
+            done = run_all(model, output, joint=joint, progress=bar, **options)
+        _tell_all(done, as_json)
+        return
+    with _progress("generate") as progress:
+        result = run(model, joint, output, progress=progress, **options)
+    if as_json:
+        _print_json(result.history.model_dump(mode="json"))
+        return
+    for round in result.history.rounds:
+        _tell_round(round)
+    _tell_cost(result.history)
+    for note in result.notes:
+        print(note)
+    print("Files:")
+    for name in ("profile.png", "scene.xml", "composed.json", "proposal.json", "history.json"):
+        print(f"  {result.folder / name}")
+    print(f"See it move: python -m mujoco.viewer --mjcf={result.folder / 'scene.xml'}")
+
+
+@app.command()
+def revise(
+    folder: Annotated[Path, typer.Argument(help="What joda generate left.", show_default=False)],
+    feedback: Annotated[
+        str, typer.Option(help="What is wrong or wanted, in words.", show_default=False)
+    ],
+    proposer: Annotated[
+        str | None, typer.Option(help="anthropic or offline [default: as for generate].")
+    ] = None,
+    vlm: Annotated[
+        str | None, typer.Option(help="The model that anthropic asks [default: $JODA_VLM].")
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Although composed.json was edited by hand since.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Change a generated profile in words; what is not complained about stays.
+
+    Example:
+
+        joda revise out --feedback "the final closing pull is too strong"
+    """
+    from joda import revise as run
+
+    with _progress("revise") as progress:
+        result = run(folder, feedback, proposer=proposer, vlm=vlm, force=force, progress=progress)
+    if as_json:
+        last = result.history.rounds[-1].model_dump(mode="json")
+        _print_json({"changes": result.changes, "picture": str(result.picture), "round": last})
+        return
+    for change in result.changes or ("Nothing changed.",):
+        print(change)
+    _tell_round(result.history.rounds[-1])
+    _tell_cost(result.history)
+    for note in result.notes:
+        print(note)
+    print(result.picture)
 
 
 @app.command()
@@ -253,6 +373,38 @@ def schema(
     _print_json(run(file))
 
 
+@app.command()
+def templates(
+    name: Annotated[
+        str | None, typer.Argument(help="Only this template.", show_default=False)
+    ] = None,
+    folders: Annotated[
+        list[Path] | None, typer.Option("--templates", help="Further folders of templates.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="PNG to write, with a preview of each."),
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """List the effect templates that a proposal can name, or picture their curves.
+
+    Example:
+
+        joda templates -o templates.png
+    """
+    from joda import templates as run
+
+    found = run(folders or (), output, name=name, force=force)
+    if as_json:
+        _print_json([one.model_dump(mode="json", exclude_none=True) for one in found.values()])
+    elif output:
+        print(output)
+    else:
+        print("\n\n".join(_describe(one) for one in found.values()))
+
+
 def main() -> None:
     """Runs the command line; a user's mistake is one sentence on stderr and exit status 2."""
     try:
@@ -267,6 +419,52 @@ def main() -> None:
     sys.exit(status if isinstance(status, int) else 0)
 
 
+def _tell_round(round: Any) -> None:
+    summary = round.proposal.joint_summary
+    print(f"Round {round.number}, {round.proposer}: {summary.motion_description}")
+    print(f"  {round.proposal.whole_motion_descrptn}")
+    for effect in round.proposal.effect_proposals:
+        where = f"{effect.start_ratio:g} to {effect.end_ratio:g}"
+        print(f"  - {effect.effect_name}, s = {where}: {effect.reason}")
+    print(indent(round.facts, "  "))
+    for sentence in (*round.unmet, *round.notes):
+        print(f"  ! {sentence}")
+
+
+def _tell_cost(history: Any) -> None:
+    usage = history.usage
+    if usage.requests:
+        price = "price unknown" if usage.dollars is None else f"{usage.dollars:.3f} dollars"
+        print(
+            f"Asked {usage.requests} times: {usage.input_tokens} tokens in "
+            f"({usage.cache_read_tokens} from the cache), {usage.output_tokens} out, {price}."
+        )
+
+
+def _tell_all(done: dict[str, Any], as_json: bool) -> None:
+    """A line per joint; raises JodaError if some gave nothing."""
+    failed = {label: result for label, result in done.items() if isinstance(result, JodaError)}
+    if as_json:
+        _print_json(
+            {
+                label: {"error": str(result)}
+                if label in failed
+                else result.history.model_dump(mode="json")
+                for label, result in done.items()
+            }
+        )
+    else:
+        for label, result in done.items():
+            if label in failed:
+                print(f"{label}: {result}")
+                continue
+            last = result.history.rounds[-1]
+            lacking = " ".join(last.unmet) or "as described"
+            print(f"{label}: {last.proposal.joint_summary.motion_description}; {lacking}")
+    if failed:
+        raise JodaError(f"{len(failed)} of {len(done)} joints have no profile; see above.")
+
+
 def _fail(message: str, status: int = 2) -> int:
     print(f"joda: {message}", file=sys.stderr)
     return status
@@ -274,6 +472,19 @@ def _fail(message: str, status: int = 2) -> int:
 
 def _print_json(value: Any) -> None:
     print(json.dumps(value, indent=2, ensure_ascii=False))
+
+
+def _describe(template: "Template") -> str:
+    """A template as a paragraph no wider than the terminal."""
+    present = ", ".join(name for name, curve in template.channels if curve)
+    texts = (
+        template.description,
+        f"Placement: {template.placement}",
+        f"Channels: {present or 'none'}",
+    )
+    width = min(shutil.get_terminal_size((100, 24)).columns, 100)
+    wrap = textwrap.TextWrapper(width, initial_indent="  ", subsequent_indent="  ")
+    return "\n".join((template.name, *map(wrap.fill, texts)))
 
 
 @contextmanager
@@ -287,3 +498,23 @@ def _progress(task: str) -> Iterator[Any]:
         return
     with console.status(task) as status:
         yield lambda what: status.update(f"{task}: {what}")
+
+
+@contextmanager
+def _bar() -> Iterator[Any]:
+    """A progress bar on stderr, silent where stderr is no terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("")
+        yield lambda done, total, what: bar.update(
+            task, completed=done, total=total, description=what
+        )

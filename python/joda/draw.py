@@ -55,7 +55,7 @@ def draw(profile: Profile, gravity: tuple[Array, Array] | None = None) -> "Figur
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with _house_style():
+    with house_style():
         bars = max(1, sum(len(getattr(profile.channels, name).components) for name in CHANNELS))
         strip = min(bars * BAR, MAX_STRIP)
         frame = TOP + BOTTOM + 2 * GAP
@@ -87,10 +87,15 @@ def write_png(figure: "Figure", path: str | Path, force: bool = False) -> None:
     """Writes the figure as PNG; raises JodaError if `path` exists and `force` is off."""
     target = Path(path)
     check_target(target, force)
+    write_bytes(target, png(figure))
+
+
+def png(figure: "Figure") -> bytes:
+    """The figure as a PNG file's content."""
     content = io.BytesIO()
-    with _house_style():
+    with house_style():
         figure.savefig(content, format="png", dpi=figure.dpi)
-    write_bytes(target, content.getvalue())
+    return content.getvalue()
 
 
 def _force_panel(
@@ -232,7 +237,7 @@ def _bar_label(figure: "Figure", axes: "Axes", label: str, a: float, b: float, r
     text = _clean(label)
     side = (
         "in"
-        if _width(figure, text, 7) <= rooms["in"]
+        if text_width(figure, text, 7) <= rooms["in"]
         else max(rooms, key=lambda place: rooms[place])
     )
     text = _shorten(figure, text, 7, rooms[side])
@@ -265,7 +270,7 @@ def _headline(figure: "Figure", profile: Profile) -> None:
     tail = f"{joint.type} · {span}"
     y = 1 - 0.2 / figure.get_figheight()
     common: dict[str, Any] = {"va": "center_baseline", "parse_math": False, "color": INK}
-    room = (WIDTH - LEFT - RIGHT) * DPI - _width(figure, tail, 9) - 0.2 * DPI
+    room = (WIDTH - LEFT - RIGHT) * DPI - text_width(figure, tail, 9) - 0.2 * DPI
     name = _shorten(figure, _clean(joint.name) or "unnamed joint", 11, room, weight="bold")
     figure.text(LEFT / WIDTH, y, name, fontsize=11, weight="bold", **common)
     figure.text(1 - RIGHT / WIDTH, y, tail, fontsize=9, ha="right", **common)
@@ -328,7 +333,7 @@ def _clean(text: str) -> str:
     return " ".join(text.split())[:300]
 
 
-def _width(figure: Any, text: str, size: float, weight: str = "normal") -> float:
+def text_width(figure: Any, text: str, size: float, weight: str = "normal") -> float:
     """Width of a text in pixels."""
     from matplotlib.font_manager import FontProperties
 
@@ -339,15 +344,15 @@ def _width(figure: Any, text: str, size: float, weight: str = "normal") -> float
 
 def _shorten(figure: Any, text: str, size: float, room: float, weight: str = "normal") -> str:
     """The text, or as much of its beginning as fits into `room` pixels, with an ellipsis."""
-    if _width(figure, text, size, weight) <= room:
+    if text_width(figure, text, size, weight) <= room:
         return text
-    while text and _width(figure, text + "…", size, weight) > room:
+    while text and text_width(figure, text + "…", size, weight) > room:
         text = text[:-1].rstrip()
     return text + "…" if text else ""
 
 
 @contextmanager
-def _house_style() -> Iterator[None]:
+def house_style() -> Iterator[None]:
     """Matplotlib's defaults whatever the user's matplotlibrc; no warning for a missing glyph."""
     import matplotlib.style
 

@@ -49,6 +49,20 @@ class File(Frozen):
         except ValidationError as error:
             raise JodaError(f"{path}: {describe(error)}") from None
 
+    def to_json(self) -> str:
+        """The file's text: indented, each list of numbers on one line."""
+        text = json.dumps(self.model_dump(mode="json"), indent=2, ensure_ascii=False)
+        strings_or_lists = re.compile(r'"(?:[^"\\]|\\.)*"|\[[^\[\]{}"]*\]')
+
+        def fold(match: re.Match[str]) -> str:
+            return (
+                match[0]
+                if match[0][0] == '"'
+                else re.sub(r"\s+", " ", match[0]).replace("[ ", "[").replace(" ]", "]")
+            )
+
+        return strings_or_lists.sub(fold, text) + "\n"
+
 
 class Component(Frozen):
     """A local PCHIP curve.
@@ -167,20 +181,6 @@ class Profile(File):
     channels: Channels = Channels()
     effects: tuple[Any, ...] = Field(default=(), max_length=0)
     joint_limit_hint: JointLimitHint = JointLimitHint()
-
-    def to_json(self) -> str:
-        """The file's text: indented, each list of numbers on one line."""
-        text = json.dumps(self.model_dump(mode="json"), indent=2, ensure_ascii=False)
-        strings_or_lists = re.compile(r'"(?:[^"\\]|\\.)*"|\[[^\[\]{}"]*\]')
-
-        def fold(match: re.Match[str]) -> str:
-            return (
-                match[0]
-                if match[0][0] == '"'
-                else re.sub(r"\s+", " ", match[0]).replace("[ ", "[").replace(" ]", "]")
-            )
-
-        return strings_or_lists.sub(fold, text) + "\n"
 
     def attributes(self) -> dict[str, str]:
         """The plugin's attributes for the joint, key to text; empty channels are left out."""

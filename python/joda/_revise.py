@@ -1,0 +1,96 @@
+"""Language-guided revision: what the user complains about changes, the rest stays."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from joda._generate import choose
+from joda.changes import changes, overlay
+from joda.draw import write_png
+from joda.errors import JodaError
+from joda.history import History
+from joda.propose import Proposer
+from joda.session import Session
+
+
+@dataclass(frozen=True)
+class Revised:
+    """What a revision did.
+
+    Attributes:
+        folder: what `joda.generate` left, revised.
+        changes: a line per changed component.
+        picture: the profile before and after, PNG.
+        history: the rounds, this one included.
+        notes: what the user should be told, a sentence each.
+    """
+
+    folder: Path
+    changes: tuple[str, ...]
+    picture: Path
+    history: History
+    notes: tuple[str, ...] = ()
+
+
+def revise(
+    folder: str | Path,
+    feedback: str,
+    *,
+    proposer: str | Proposer | None = None,
+    vlm: str | None = None,
+    force: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> Revised:
+    """Revises a generated profile as the user asks, and writes the folder's files anew.
+
+    Args:
+        folder: what `joda.generate` left.
+        feedback: what is wrong or wanted, in words.
+        proposer: as for `joda.generate`.
+        vlm: name of the model that the anthropic proposer asks.
+        force: go on although composed.json was edited by hand since; the edit is lost.
+        progress: told what is being done.
+
+    Returns:
+        what changed; `before_after.png` in the folder shows it.
+
+    Raises:
+        JodaError: the folder holds no generation, the feedback is not understood, or no revised
+            proposal was to be had.
+    """
+    path = Path(folder)
+    if not feedback.strip():
+        raise JodaError("feedback is empty; say what is wrong, in words.")
+    session = Session.resume(path, progress)
+    if not session.turns:
+        raise JodaError(f"{path}: holds no proposal yet; go on with: joda generate --resume")
+    if session.edited() and not force:
+        raise JodaError(
+            f"{path / 'composed.json'}: was edited since it was generated, and a revision would "
+            "lose that; go on editing it, or add --force."
+        )
+    chosen = choose(proposer, session.history.key, vlm)
+    before = session.turns[-1].profile
+    progress(f"asking {chosen.name}")
+    try:
+        answer = chosen.propose(session.task, session.complain(feedback))
+        if answer.proposal is None:
+            raise JodaError(f"{chosen.name} has nothing to change for '{feedback}'.")
+    except JodaError as error:
+        session.fail(error)
+        raise
+    session.take(answer, chosen.name, feedback)
+    after = session.turns[-1].profile
+    balance = -np.array(session.context.gravity_force)
+    picture = path / "before_after.png"
+    figure = overlay(before, after, (np.array(session.context.positions), balance))
+    write_png(figure, picture, force=True)
+    return Revised(
+        folder=path,
+        changes=tuple(changes(before, after)),
+        picture=picture,
+        history=session.history,
+        notes=tuple(session.notes),
+    )

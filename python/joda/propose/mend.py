@@ -1,0 +1,231 @@
+"""Changes the strengths of a proposal as little as possible, until the forces fulfil its wishes.
+
+Wherever the joint should move by itself or stay, that is an inequality between its drive (the
+conservative force and gravity) and its friction there, and both are linear in the effects'
+strengths. So the least change is a linear program.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._compile import contributions, reference_scales
+from joda._context import Context
+from joda.behaviour import grip
+from joda.field import evaluate
+from joda.profile import Channel
+from joda.proposal import EffectProposal, Proposal
+from joda.template import Template
+from joda.wishes import Wanted
+
+Array = NDArray[np.float64]
+
+SURE = 1.25
+"""How many times the friction a drive should be to move the joint."""
+HELD = 0.8
+"""Up to which share of the friction a drive should be to be held by it."""
+LEAST = 0.02
+"""Least excess of a drive, in units of the reference force."""
+FACTORS = (0.02, 50.0)
+"""How far a strength may be changed in all."""
+LACK = 1e3
+"""What it costs to miss a demand by one reference force; doubling a strength costs 1."""
+
+
+@dataclass(frozen=True)
+class Demand:
+    """Sum over terms of (drive's factor * drive + friction's factor * friction) >= least.
+
+    Attributes:
+        wish: whose it is.
+        terms: share of the way from the closed end, factor of the drive (positive opens) and of the
+            friction there.
+        least: in units of the reference force.
+    """
+
+    wish: str
+    terms: tuple[tuple[float, float, float], ...]
+    least: float = 0.0
+
+
+def mend(
+    proposal: Proposal,
+    context: Context,
+    templates: Mapping[str, Template],
+    wanted: Sequence[Wanted],
+    key: str = "",
+) -> tuple[Proposal, set[str]]:
+    """The proposal with refine factors changed so that the wishes come true.
+
+    Args:
+        proposal: what to mend.
+        context: the joint.
+        templates: by name.
+        wanted: its wishes.
+        key: as for `joda.compile`.
+
+    Returns:
+        the mended proposal, and the names of wishes that no strengths could fulfil.
+    """
+    from scipy.optimize import linprog
+
+    parts = contributions(proposal, context, templates, key)
+    places = [
+        (number, channel)
+        for number, part in enumerate(parts)
+        for channel in ("conservative", "friction")
+        if channel in part
+    ]
+    demands = [d for wish in (Wanted("moves"), *wanted) for d in _demands(wish, proposal, context)]
+    if not places or not demands:
+        return proposal, set()
+    reference = reference_scales(context)["conservative"]
+    sign = -1.0 if context.closed_end == "high_end" else 1.0
+    gravity = sign * np.array(context.gravity_force) / reference
+    grid = np.linspace(0, 1, len(gravity))
+
+    def side(way: float) -> float:
+        return way if sign > 0 else 1 - way
+
+    def share(place: tuple[int, str], s: float, drive: float, friction: float) -> float:
+        number, channel = place
+        component = parts[number][channel]
+        value = float(evaluate(Channel(components=(component,)), np.array([s]))[0][0])
+        return value / reference * (sign * drive if channel == "conservative" else friction)
+
+    rows = np.zeros((len(demands), len(places)))
+    least = np.array([demand.least for demand in demands])
+    for k, demand in enumerate(demands):
+        for way, drive, friction in demand.terms:
+            s = side(way)
+            rows[k] += [share(place, s, drive, friction) for place in places]
+            least[k] -= drive * float(np.interp(s, grid, gravity))
+    n, m = len(places), len(demands)
+    # Unknowns: factors, how far each is from 1, what each demand lacks.
+    cost = np.concatenate([np.zeros(n), np.ones(n), np.full(m, LACK)])
+    identity = np.eye(n)
+    above = np.concatenate(
+        [
+            np.hstack([-rows, np.zeros((m, n)), -np.eye(m)]),
+            np.hstack([identity, -identity, np.zeros((n, m))]),
+            np.hstack([-identity, -identity, np.zeros((n, m))]),
+        ]
+    )
+    bounds = [FACTORS] * n + [(0, None)] * (n + m)
+    limits = np.concatenate([-least, np.ones(n), -np.ones(n)])
+    found = linprog(cost, above, limits, bounds=bounds, method="highs")
+    lacks = {
+        demand.wish for demand, lack in zip(demands, found.x[2 * n :], strict=True) if lack > 1e-6
+    }
+    return _scaled(proposal, dict(zip(places, found.x[:n].tolist(), strict=True))), lacks
+
+
+def _scaled(proposal: Proposal, factors: Mapping[tuple[int, str], float]) -> Proposal:
+    """The proposal with refine factors multiplied, by effect and channel."""
+    effects = list(proposal.effect_proposals)
+    for (number, channel), factor in factors.items():
+        if abs(factor - 1) > 1e-4:
+            effects[number] = rescale(effects[number], channel, factor)
+    return proposal.model_copy(update={"effect_proposals": tuple(effects)})
+
+
+def rescale(effect: EffectProposal, channel: str, factor: float) -> EffectProposal:
+    """The effect with one refine factor multiplied, to three digits and at most 100."""
+    old = effect.refineFactor
+    new = float(f"{min(getattr(old, channel) * factor, 100.0):.3g}")
+    return effect.model_copy(update={"refineFactor": old.model_copy(update={channel: new})})
+
+
+def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]:
+    """What a wish demands of drive and friction."""
+
+    def shut(low: float, high: float) -> list[Demand]:
+        return [_at(wish, way, -1, -SURE, LEAST) for way in np.linspace(low, high, 9)]
+
+    def open_(low: float, high: float) -> list[Demand]:
+        return [_at(wish, way, 1, -SURE, LEAST) for way in np.linspace(low, high, 9)]
+
+    def stay(low: float, high: float) -> list[Demand]:
+        ways = np.linspace(low, high, 15)
+        return [_at(wish, way, sign, HELD) for way in ways for sign in (1, -1)]
+
+    held_shut = [_at(wish, way, -1, HELD, 0.08) for way in (0.0, 0.005)]
+    match wish.name:
+        case "moves":
+            most = 0.6 * grip(context) / reference_scales(context)["conservative"]
+            ways = np.linspace(0, 1, 33)
+            return [_at(wish, way, sign, -1, -most) for way in ways for sign in (1, -1)]
+        case "closes_near":
+            return shut(0.01, 0.045)
+        case "closes_anywhere":
+            return shut(0.02, 1)
+        case "opens_past":
+            return open_(0.48, 0.985)
+        case "held_shut":
+            return held_shut
+        case "latched":
+            return held_shut + _latch(wish, proposal, context)
+        case "stays_put":
+            return stay(0.145, 0.955)
+        case "stays_half":
+            return stay(0.38, 0.62)
+        case "stays_open":
+            return [_at(wish, way, 1, HELD, LEAST) for way in (0.99, 1.0)]
+        case "two_sides":
+            return shut(0.06, 0.42) + open_(0.58, 0.94)
+        case "returns_to_middle":
+            return open_(0.08, 0.42) + shut(0.58, 0.92)
+        case "clicks":
+            return _clicks(wish, proposal, context)
+        case "snaps":
+            return _snap(wish, proposal, context)
+    return []
+
+
+def _at(wish: Wanted, way: float, drive: float, friction: float, least: float = 0.0) -> Demand:
+    return Demand(wish.name, ((float(way), drive, friction),), least)
+
+
+def _places(proposal: Proposal, context: Context, word: str) -> list[tuple[float, float]]:
+    """Where effects with this word in their names are, from the closed end."""
+    out = []
+    for effect in proposal.effect_proposals:
+        if word in effect.effect_name:
+            a, b = effect.start_ratio, effect.end_ratio
+            out.append((1 - b, 1 - a) if context.closed_end == "high_end" else (a, b))
+    return out
+
+
+def _latch(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]:
+    """A barrier before the latch, a hold within it, and no closing from before it."""
+    out = [_at(wish, 0.15, -1, 1)]
+    for a, b in _places(proposal, context, "snap"):
+        width = b - a
+        out.append(_at(wish, a + 0.8 * width, 1, 0, 0.1))
+        out.append(_at(wish, a + 0.15 * width, -1, -SURE, 0.3))
+    return out
+
+
+def _clicks(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]:
+    """Within each detent towards its middle, within each end's spring towards the end."""
+    out = []
+    for a, b in _places(proposal, context, "detent_internal"):
+        for u in (0.12, 0.25, 0.35):
+            out.append(_at(wish, a + u * (b - a), 1, -SURE, LEAST))
+            out.append(_at(wish, b - u * (b - a), -1, -SURE, LEAST))
+    for a, b in _places(proposal, context, "spring_return"):
+        inward = -1 if a < 1e-6 else 1
+        ways = [a + u * (b - a) for u in (0.2, 0.5, 0.9)]
+        out += [_at(wish, way, inward, -SURE, LEAST) for way in ways]
+    return out
+
+
+def _snap(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]:
+    """The resistance against opening falls in the last quarter of a detent."""
+    out = []
+    for a, b in _places(proposal, context, "detent_internal"):
+        peak, after = a + 0.75 * (b - a), b
+        out.append(Demand(wish.name, ((peak, -1, 0), (after, 1, 0)), 0.12))
+    return out

@@ -1,0 +1,183 @@
+"""The proposer that needs no model, key or network: rules over names, motion, gravity and words.
+
+It recognises the kind of joint, proposes what such joints do, and from the second round on mends
+what the simulation did not show. How sure it is stands in each effect's confidence: a kind known by
+its object and part 0.7, by its part alone 0.5, by nothing 0.2.
+"""
+
+from collections.abc import Sequence
+
+from joda._context import Context
+from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
+from joda.propose import Answer, Task, Turn
+from joda.propose.complaints import revise
+from joda.propose.kinds import WISHED, Kind, Part, recognise
+from joda.propose.mend import mend, rescale
+from joda.wishes import SOFT, Wanted, read_wishes, state, unmet
+
+APART = 0.785
+"""Angle (rad) between the positions of a knob, where nobody says how many it has."""
+
+EXCLUSIVE = {
+    "closes_anywhere", "stays_put", "stays_half", "opens_past", "two_sides", "returns_to_middle",
+    "clicks",
+}  # fmt: skip
+"""Wishes about the middle of the way: the user's replace those of the kind."""
+
+
+class Offline:
+    """Proposes by rules."""
+
+    name = "offline"
+
+    def __init__(self, key: str = "") -> None:
+        """Args: key: with which proposals will be compiled."""
+        self.key = key
+
+    def propose(self, task: Task, turns: Sequence[Turn]) -> Answer:
+        """See `joda.propose.Proposer`."""
+        if not turns:
+            return Answer(self._first(task))
+        last = turns[-1]
+        if last.complaint:
+            return Answer(self._revised(task, last))
+        wanted = read_wishes(last.proposal.whole_motion_descrptn)
+        lacking = unmet(wanted, last.behaviour, task.context)
+        if not lacking:
+            return Answer(None)
+        mended = last.proposal
+        if "soft" in lacking:
+            mended = _softer(mended, task.context, last)
+        if lacking.keys() - {"soft"}:
+            mended = self._mended(mended, task, wanted)
+        return Answer(None if mended == last.proposal else mended)
+
+    def _mended(self, proposal: Proposal, task: Task, wanted: Sequence[Wanted]) -> Proposal:
+        """With strengths that fulfil the wishes, and further effects where strengths cannot."""
+        arguments = task.context, task.templates, wanted, self.key
+        mended, hopeless = mend(proposal, *arguments)
+        added = [part for name in sorted(hopeless & WISHED.keys()) for part in WISHED[name]]
+        if added:
+            more = _effects(added, task.context, _number(wanted), 0.3)
+            mended, _ = mend(_with(proposal, more), *arguments)
+        return mended
+
+    def _revised(self, task: Task, last: Turn) -> Proposal:
+        """What the user wishes is added, what the user complains about is changed."""
+        old = read_wishes(last.proposal.whole_motion_descrptn)
+        new = [wish for wish in read_wishes(last.complaint) if wish not in old]
+        if not new:
+            return revise(last.proposal, task.context, last.complaint)
+        names = {wish.name for wish in new}
+        gone = EXCLUSIVE if names & EXCLUSIVE else set()
+        wanted = [wish for wish in old if wish.name not in gone | names] + new
+        said = last.proposal.model_copy(update={"whole_motion_descrptn": state(wanted)})
+        return self._mended(said, task, wanted)
+
+    def _first(self, task: Task) -> Proposal:
+        context = task.context
+        kind, confidence = recognise(context, task.description)
+        wanted, parts = _plan(kind, context, task.description)
+        effects = _effects(parts, context, _number(wanted), confidence)
+        summary = JointSummary(
+            joint_name=context.joint.name,
+            joint_type="revolute" if context.joint.type == "hinge" else "prismatic",
+            motion_description=f"{kind.title}, by its names, motion and gravity",
+            overall_confidence=confidence,
+        )
+        return Proposal(
+            joint_summary=summary, whole_motion_descrptn=state(wanted), effect_proposals=effects
+        )
+
+
+def _plan(kind: Kind, context: Context, description: str) -> tuple[list[Wanted], list[Part]]:
+    """Wishes and parts: the user's, and those of the kind that do not contradict them."""
+    asked = {wish.name: wish for wish in read_wishes(description)}
+    denied = {wish.name for wish in read_wishes(description, refused=True)}
+    dropped = denied | (EXCLUSIVE if asked.keys() & EXCLUSIVE else set())
+    wanted = [Wanted(name) for name in kind.wishes if name not in dropped | asked.keys()]
+    wanted += asked.values()
+    names = {wish.name for wish in wanted}
+    parts = [part for part in kind.parts if not part.serves or names & set(part.serves)]
+    served = {name for part in parts for name in part.serves} | set(kind.wishes) - dropped
+    for name in asked.keys() - served:
+        parts += WISHED.get(name, ())
+    count = _positions(context)
+    return [Wanted(w.name, w.number or count) if w.name == "clicks" else w for w in wanted], parts
+
+
+def _positions(context: Context) -> int:
+    """How many positions a knob has."""
+    lo, hi = context.joint.range
+    return min(max(round((hi - lo) / APART) + 1, 2), 12) if context.joint.type == "hinge" else 3
+
+
+def _number(wanted: Sequence[Wanted]) -> int:
+    return next((wish.number for wish in wanted if wish.name == "clicks"), 0)
+
+
+def _effects(
+    parts: Sequence[Part], context: Context, positions: int, confidence: float
+) -> tuple[EffectProposal, ...]:
+    """Parts placed on the joint's own range."""
+    mirrored = context.closed_end == "high_end"
+    words = {
+        "closed": "high_end" if mirrored else "low_end",
+        "open": "low_end" if mirrored else "high_end",
+        "opening": "negative" if mirrored else "positive",
+        "closing": "positive" if mirrored else "negative",
+    }
+    out = []
+    for part in parts:
+        for name, (a, b) in _spread(part, positions):
+            start, end = (1 - b, 1 - a) if mirrored else (a, b)
+            out.append(
+                EffectProposal(
+                    effect_name=name.format(**words),
+                    start_ratio=round(start, 4),
+                    end_ratio=round(end, 4),
+                    strength=Strength(
+                        conservative=part.conservative,
+                        friction=part.friction,
+                        damping=part.damping,
+                    ),
+                    confidence=confidence,
+                    reason=part.reason,
+                )
+            )
+    return tuple(out)
+
+
+def _spread(part: Part, positions: int) -> list[tuple[str, tuple[float, float]]]:
+    """A part's effects: `detents` are one at each position, springs at the ends of the way."""
+    if part.effect != "detents":
+        return [(part.effect, part.place)]
+    step = 1 / max(positions - 1, 1)
+    inner = [((k - 0.5) * step, (k + 0.5) * step) for k in range(1, positions - 1)]
+    return [
+        ("spring_return_to_{closed}", (0.0, step / 2)),
+        *[("detent_internal", place) for place in inner],
+        ("spring_return_to_{open}", (1 - step / 2, 1.0)),
+    ]
+
+
+def _with(proposal: Proposal, effects: Sequence[EffectProposal]) -> Proposal:
+    return proposal.model_copy(update={"effect_proposals": (*proposal.effect_proposals, *effects)})
+
+
+def _softer(proposal: Proposal, context: Context, last: Turn) -> Proposal:
+    """More damping where it closes; a damper there, if there is none."""
+    fastest = last.behaviour.fastest
+    if fastest is None:
+        return proposal
+    factor = min(1.5 * fastest.speed * context.lever_arm / SOFT, 10.0)
+    closed = 1.0 if context.closed_end == "high_end" else 0.0
+    effects = [
+        rescale(effect, "damping", factor)
+        if effect.strength.damping != "none" and effect.start_ratio <= closed <= effect.end_ratio
+        else effect
+        for effect in proposal.effect_proposals
+    ]
+    if tuple(effects) == proposal.effect_proposals:
+        return _with(proposal, _effects(WISHED["soft"], context, 0, 0.3))
+    return proposal.model_copy(update={"effect_proposals": tuple(effects)})

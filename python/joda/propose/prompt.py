@@ -1,0 +1,329 @@
+"""What a vision-language model is told: a request of the Messages API from a task and its rounds.
+
+What never changes comes first, so that prompt caching pays: the system prompt, the templates'
+picture, then the joint, then the rounds. The answer's schema is the same in all rounds as well,
+because another schema would be another cache; `parse` refuses "complete" where a proposal is due.
+"""
+
+import base64
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from string import Template as Text
+from typing import Any
+
+from pydantic import ValidationError
+
+from joda._compile import BANDS, reference_scales
+from joda._context import Context
+from joda.errors import JodaError
+from joda.profile import CHANNELS, Profile
+from joda.proposal import Proposal
+from joda.propose import Task, Turn
+from joda.template import Template
+
+MAX_TOKENS = 16_000
+"""Room for an answer, reasoning included."""
+
+# Pixels within which a picture's writing remains legible.
+SHEET = (1000, 800)
+PROFILE = (840, 700)
+JOINT, JOINTS = (704, 528), 5  # more pictures than JOINTS share their area
+
+TOKEN_PIXELS = 28
+TOKEN_AREA = 750
+CHARACTERS = 3.2
+"""Per token of text, rather too few than too many."""
+
+UNSUPPORTED = {
+    *("title", "description", "default", "minimum", "maximum", "exclusiveMinimum"),
+    *("exclusiveMaximum", "multipleOf", "minLength", "maxLength", "pattern"),
+    *("minItems", "maxItems"),
+}
+"""Keywords of JSON Schema that structured output does not know, or that `schema.md` says better."""
+
+Block = dict[str, Any]
+CACHED: Block = {"cache_control": {"type": "ephemeral"}}
+
+
+def request(task: Task, turns: Sequence[Turn], sheet: bytes | None = None) -> dict[str, Any]:
+    """A request for the next proposal, but for the model's name.
+
+    Args:
+        task: the joint.
+        turns: the rounds so far, oldest first.
+        sheet: PNG file of the templates' previews.
+
+    Returns:
+        keyword arguments of `client.messages.create`.
+
+    Raises:
+        JodaError: a picture cannot be read.
+    """
+    first: list[Block] = []
+    if sheet is not None:
+        first += [_text("The effect templates:"), _image(sheet, SHEET) | CACHED]
+    first += _joint(task, references=True)
+    messages: list[Block] = [{"role": "user", "content": first}]
+    for number, turn in enumerate(turns, 1):
+        envelope = {"status": "revised", "proposal": turn.proposal.model_dump(mode="json")}
+        reply = json.dumps(envelope, ensure_ascii=False, separators=(",", ":"))
+        messages.append({"role": "assistant", "content": [_text(reply)]})
+        newest = number == len(turns)
+        content = [_text(_round(number, turn)) | (CACHED if newest else {})]
+        if newest:  # the picture last: what precedes it is the next round's prefix
+            content.append(_image(turn.picture, PROFILE))
+        messages.append({"role": "user", "content": content})
+    return {
+        "max_tokens": MAX_TOKENS,
+        "system": [_text(system(task.templates)) | CACHED],
+        "messages": messages,
+        "output_config": {"format": {"type": "json_schema", "schema": schema(task.templates)}},
+    }
+
+
+def ablation(task: Task) -> dict[str, Any]:
+    """A request for raw control points, without templates: the paper's ablation.
+
+    Returns:
+        as `request`; the answer is for `parse_ablation`.
+    """
+    point = _object(s={"type": "number"}, value={"type": "number"})
+    curves = _object(**{name: {"type": "array", "items": point} for name in CHANNELS})
+    return {
+        "max_tokens": MAX_TOKENS,
+        "system": [_text(_read("ablation")) | CACHED],
+        "messages": [{"role": "user", "content": _joint(task, references=False)}],
+        "output_config": {"format": {"type": "json_schema", "schema": curves}},
+    }
+
+
+def repair(asked: Mapping[str, Any], reply: str, wrong: str) -> dict[str, Any]:
+    """The request again, with the reply and what is wrong with it."""
+    content = f"This answer cannot be used: {wrong} Give the whole answer again, with that mended."
+    messages = [
+        *asked["messages"],
+        {"role": "assistant", "content": [_text(reply.strip() or "(no text)")]},
+        {"role": "user", "content": [_text(content)]},
+    ]
+    return {**asked, "messages": messages}
+
+
+def system(templates: Mapping[str, Template]) -> str:
+    """The system prompt: the same for all joints and rounds."""
+    bands = "\n".join(
+        f"- {label}: {'0' if high == 0 else f'{low:g} to {high:g}'}"
+        for label, (low, high) in BANDS.items()
+    )
+    effects = "\n".join(_effect(template) for template in templates.values())
+    return "\n".join(
+        (
+            _read("system", bands=bands),
+            _read("vocabulary", effects=effects),
+            _read("schema"),
+            _read("feedback"),
+        )
+    )
+
+
+def schema(templates: Mapping[str, Template]) -> dict[str, Any]:
+    """The JSON Schema of an answer, within what structured output supports.
+
+    Numbers' bounds cannot be said there; `parse` checks them.
+    """
+    proposal = _strict(Proposal.model_json_schema())
+    parts = proposal.pop("$defs")
+    parts["EffectProposal"]["properties"]["effect_name"]["enum"] = list(templates)
+    envelope = _object(
+        status={"type": "string", "enum": ["revised", "complete"]},
+        proposal={"anyOf": [{"$ref": "#/$defs/Proposal"}, {"type": "null"}]},
+    )
+    return envelope | {"$defs": parts | {"Proposal": proposal}}
+
+
+def parse(reply: str, task: Task, turns: Sequence[Turn]) -> Proposal | None:
+    """The proposal in an answer; None where the last one is complete.
+
+    Raises:
+        JodaError: what is wrong with the answer, in words that can be sent back.
+    """
+    try:
+        answer = json.loads(reply)
+    except ValueError as error:
+        raise JodaError(f"It is not JSON ({error}).") from None
+    if not isinstance(answer, dict) or answer.get("status") not in ("revised", "complete"):
+        raise JodaError('It must be an object whose status is "revised" or "complete".')
+    if answer["status"] == "complete":
+        if turns and not turns[-1].complaint:
+            return None
+        raise JodaError('A proposal is due here; status must be "revised".')
+    try:
+        proposal = Proposal.model_validate_json(json.dumps(answer.get("proposal")))
+    except ValidationError as error:
+        raise JodaError(_wrong(error, "proposal")) from None
+    for number, effect in enumerate(proposal.effect_proposals):
+        if effect.effect_name not in task.templates:
+            raise JodaError(
+                f"proposal.effect_proposals[{number}].effect_name: '{effect.effect_name}' is not "
+                f"in the vocabulary; there are: {', '.join(task.templates)}."
+            )
+    joint = task.context.joint
+    kind = {"hinge": "revolute", "slide": "prismatic"}[joint.type]
+    if proposal.joint_summary.joint_type != kind:
+        raise JodaError(f"proposal.joint_summary.joint_type: the joint is {kind}.")
+    summary = proposal.joint_summary.model_copy(update={"joint_name": joint.name})
+    return proposal.model_copy(update={"joint_summary": summary})
+
+
+def parse_ablation(reply: str, task: Task) -> Profile:
+    """The profile in an answer to `ablation`; raises JodaError as `parse` does."""
+    try:
+        answer = json.loads(reply)
+        channels = {
+            name: {
+                "components": [
+                    {
+                        "label": "control points",
+                        "interval": (0, 1),
+                        "x": [point["s"] for point in answer[name]],
+                        "y": [point["value"] for point in answer[name]],
+                    }
+                ]
+            }
+            for name in CHANNELS
+        }
+        return Profile.model_validate({"joint": task.context.joint, "channels": channels})
+    except ValidationError as error:
+        raise JodaError(_wrong(error)) from None
+    except (ValueError, TypeError, KeyError) as error:
+        raise JodaError(f"It must be JSON with three lists of points ({error}).") from None
+
+
+def tokens(asked: Mapping[str, Any]) -> int:
+    """An upper estimate of a request's input tokens, without asking the service."""
+    texts, images = [json.dumps(asked.get("output_config", {}))], 0
+    for block in _blocks(asked):
+        if block["type"] == "text":
+            texts.append(block["text"])
+        else:
+            width, height = _size(base64.b64decode(block["source"]["data"]))
+            patches = math.ceil(width / TOKEN_PIXELS) * math.ceil(height / TOKEN_PIXELS)
+            images += max(patches, math.ceil(width * height / TOKEN_AREA))
+    return images + math.ceil(sum(map(len, texts)) / CHARACTERS)
+
+
+def _joint(task: Task, references: bool) -> list[Block]:
+    """The pictures of the joint, and last, cached, what is known and wished of it."""
+    share = math.sqrt(JOINTS / max(JOINTS, len(task.pictures)))
+    room = (int(JOINT[0] * share), int(JOINT[1] * share))
+    pictures = [_image(picture, room) for picture in task.pictures]
+    lines = ["# The joint", "", task.context.describe(), _gravity(task.context)]
+    if references:
+        lines.append(_references(task.context))
+    lines += ["", "# The user's wish", "", task.description.strip() or "(none)"]
+    head = [_text("The joint, from its low to its high end:")] if pictures else []
+    return [*head, *pictures, _text("\n".join(lines)) | CACHED]
+
+
+def _gravity(context: Context) -> str:
+    """Gravity along the range, where it acts."""
+    if context.gravity_scale == 0:
+        return "gravity at s:  none anywhere"
+    last = len(context.positions) - 1
+    picked = [round(k * last / 4) for k in range(5)]
+    return "gravity at s: " + ", ".join(
+        f"{k / last:.2g}: {context.gravity_force[k]:.3g}" for k in picked
+    )
+
+
+def _references(context: Context) -> str:
+    force, damping = ("N·m", "N·m·s/rad") if context.joint.type == "hinge" else ("N", "N·s/m")
+    scales = [reference_scales(context, ignored) for ignored in (False, True)]
+    with_gravity, without = (
+        f"{scale['conservative']:.3g} {force} and {scale['damping']:.3g} {damping}"
+        for scale in scales
+    )
+    other = f", or {without} if gravity_can_be_ignored" if without != with_gravity else ""
+    return f"reference:   {with_gravity}{other}"
+
+
+def _round(number: int, turn: Turn) -> str:
+    unmet = [f"- {wish}" for wish in turn.unmet] or ["(none)"]
+    parts = [f"# Result of round {number}", "## Simulated", turn.facts.strip()]
+    parts += ["## Wishes not met", "\n".join(unmet)]
+    if turn.complaint:
+        parts += ["## The user", _read("revision", complaint=turn.complaint.strip())]
+    return "\n\n".join(parts)
+
+
+def _effect(template: Template) -> str:
+    channels = ", ".join(name for name in CHANNELS if getattr(template.channels, name))
+    return f"- {template.name} [{channels}]: {template.description} {template.placement}"
+
+
+def _read(name: str, **filled: str) -> str:
+    text = (files("joda") / "prompts" / f"{name}.md").read_text(encoding="utf-8")
+    return Text(text).substitute(filled) if filled else text
+
+
+def _text(text: str) -> Block:
+    return {"type": "text", "text": text}
+
+
+def _image(png: bytes, room: tuple[int, int]) -> Block:
+    """A picture, made to fit into so many pixels."""
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(png)) as opened:
+            picture = opened.convert("RGB")
+    except OSError:
+        raise JodaError("a picture for the model is no image file; render it again.") from None
+    picture.thumbnail(room, Image.Resampling.LANCZOS)
+    out = io.BytesIO()
+    picture.save(out, format="PNG")
+    data = base64.standard_b64encode(out.getvalue()).decode()
+    source = {"type": "base64", "media_type": "image/png", "data": data}
+    return {"type": "image", "source": source}
+
+
+def _size(png: bytes) -> tuple[int, int]:
+    """Width and height in pixels, from a PNG's header."""
+    return int.from_bytes(png[16:20], "big"), int.from_bytes(png[20:24], "big")
+
+
+def _blocks(asked: Mapping[str, Any]) -> list[Block]:
+    return [*asked["system"], *(b for message in asked["messages"] for b in message["content"])]
+
+
+def _object(**properties: Any) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def _strict(part: Any) -> Any:
+    """A schema without what structured output does not support: all keys required, no others."""
+    if isinstance(part, list):
+        return [_strict(each) for each in part]
+    if not isinstance(part, dict):
+        return part
+    if "properties" in part:
+        kept = {name: _strict(each) for name, each in part["properties"].items()}
+        parts = {name: _strict(each) for name, each in part.get("$defs", {}).items()}
+        return _object(**kept) | ({"$defs": parts} if parts else {})
+    return {key: _strict(each) for key, each in part.items() if key not in UNSUPPORTED}
+
+
+def _wrong(error: ValidationError, root: str = "") -> str:
+    """The first few things wrong with an answer: key and what."""
+    found = []
+    for each in error.errors(include_url=False)[:5]:
+        keys = (f"[{key}]" if isinstance(key, int) else f".{key}" for key in each["loc"])
+        found.append(f"{(root + ''.join(keys)).lstrip('.')}: {each['msg']}")
+    return "; ".join(found) + "."

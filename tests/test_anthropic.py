@@ -1,0 +1,460 @@
+"""Asking a model: pictures go out, proposals come in, a failure is a sentence with its cost."""
+
+import json
+import re
+import subprocess
+import sys
+from io import BytesIO
+
+import anthropic
+import pytest
+from messages_server import error, message, serve
+from PIL import Image
+from test_prompts import TEMPLATES, answers, blank, images, png, task, texts, turn
+
+from joda import JodaError
+from joda.profile import Profile
+from joda.proposal import Proposal
+from joda.propose import anthropic as proposer
+from joda.propose.anthropic import Anthropic, ProposalFailed
+from joda.propose.prompt import MAX_TOKENS
+from joda.sheet import sheet as previews
+
+MODEL = "claude-sonnet-5-5"
+
+
+@pytest.fixture
+def server(monkeypatch):
+    monkeypatch.setattr(anthropic._base_client, "INITIAL_RETRY_DELAY", 0.001)
+    monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-test")
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+    for name in ("ANTHROPIC_BASE_URL", "ANTHROPIC_AUTH_TOKEN", "JODA_VLM", "JODA_VLM_PRICE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("JODA_POLL_S", "0.001")
+    with serve() as state:
+        yield state
+
+
+def reply(name="refrigerator", number=0, **usage):
+    return message(json.dumps(answers(name)[number]), **usage)
+
+
+def spoilt(**values):
+    answer = answers("refrigerator")[0]
+    answer["proposal"]["effect_proposals"][0].update(values)
+    return message(json.dumps(answer))
+
+
+def proposed(name="refrigerator", number=0):
+    return Proposal.model_validate(answers(name)[number]["proposal"])
+
+
+def ask(server, *script, turns=(), asked=None, **options):
+    server.script[:] = script
+    return Anthropic(MODEL, server.url, **options).propose(asked or task(), turns)
+
+
+def fails(server, *script, **options):
+    with pytest.raises(ProposalFailed) as failure:
+        ask(server, *script, **options)
+    assert "\n" not in str(failure.value) and str(failure.value).endswith(".")
+    return failure.value
+
+
+def test_a_proposal_comes_back_and_the_pictures_went_out(server):
+    colours = ["red", "lime", "blue"]
+    pictures = [blank(960, 720, colour) for colour in colours]
+    answer = ask(server, reply(), asked=task(pictures=pictures, description="holds anywhere"))
+    assert answer.proposal == proposed()
+    (sent,) = server.requests
+    assert sent["model"] == MODEL and "holds anywhere" in texts(sent)
+    sheet, *joints = images(sent)
+    with Image.open(BytesIO(png(previews(TEMPLATES)))) as drawn:
+        assert sheet.tobytes() == drawn.convert("RGB").tobytes()
+    assert [each.getpixel((350, 260)) for each in joints] == [
+        (255, 0, 0),
+        (0, 255, 0),
+        (0, 0, 255),
+    ]
+    assert "enum" in json.dumps(sent["output_config"]) and "temperature" not in sent
+
+
+def test_later_rounds_replay_the_conversation_and_end_it(server):
+    first, second = turn(), turn(number=1)
+    answer = ask(server, reply(number=1), turns=[first])
+    assert answer.proposal == proposed(number=1)
+    answer = ask(server, reply(number=2), turns=[first, second])
+    assert answer.proposal is None
+    sent = server.requests[-1]
+    said = [
+        json.loads(m["content"][0]["text"]) for m in sent["messages"] if m["role"] == "assistant"
+    ]
+    assert [Proposal.model_validate(each["proposal"]) for each in said] == [
+        first.proposal,
+        second.proposal,
+    ]
+    assert first.facts in texts(sent) and second.unmet[0] in texts(sent)
+
+
+def test_usage_is_what_was_spent_and_dollars_follow_the_price(server):
+    counts = {
+        "input_tokens": 1_000,
+        "output_tokens": 4_000,
+        "cache_read_input_tokens": 6_000,
+        "cache_creation_input_tokens": 2_000,
+    }
+    usage = ask(server, reply(**counts)).usage
+    assert (usage.requests, usage.input_tokens, usage.output_tokens) == (1, 9_000, 4_000)
+    assert (usage.cache_read_tokens, usage.cache_write_tokens) == (6_000, 2_000)
+    # Sonnet 5.5: 2, 10 and 0.10 dollars per million; writing the cache 1.25 times the input.
+    assert usage.dollars == pytest.approx(0.002 + 0.005 + 0.0006 + 0.04)
+
+
+@pytest.mark.parametrize(
+    "model,price,dollars",
+    [
+        ("claude-haiku-4-5-20251001", None, 0.001 + 0.001),
+        ("claude-of-tomorrow", None, None),
+        ("claude-of-tomorrow", "3/15", 0.003 + 0.003),
+    ],
+)
+def test_prices_are_known_unknown_or_given(server, monkeypatch, model, price, dollars):
+    if price:
+        monkeypatch.setenv("JODA_VLM_PRICE", price)
+    server.script[:] = [reply()]
+    usage = Anthropic(model, server.url).propose(task(), []).usage
+    assert usage.dollars == (dollars and pytest.approx(dollars))
+
+
+@pytest.mark.parametrize("failure", [429, 500, 529])
+def test_passing_failures_are_retried_and_counted(server, failure):
+    bad = error(failure, "overloaded_error", "Overloaded", retry_after_ms=1)
+    answer = ask(server, bad, bad, reply())
+    assert answer.proposal == proposed()
+    assert answer.usage.requests == len(server.requests) == 3
+    assert answer.usage.output_tokens == 200
+
+
+def test_dropped_connections_and_timeouts_are_retried_and_counted(server):
+    answer = ask(server, "drop", "hang", reply(), timeout=0.3)
+    assert answer.proposal == proposed()
+    assert answer.usage.requests == len(server.requests) == 3
+
+
+@pytest.mark.parametrize(
+    "entry,says",
+    [
+        (error(529, "overloaded_error", "Overloaded"), r"529: Overloaded.*try again later"),
+        (error(429, "rate_limit_error", "Slow down"), r"429: Slow down.*batch"),
+        ("drop", "cannot be reached; check network"),
+    ],
+)
+def test_lasting_failures_are_a_sentence_after_five_requests(server, entry, says):
+    failure = fails(server, entry)
+    assert re.search(says, str(failure))
+    assert failure.usage.requests == len(server.requests) == 5
+
+
+def test_no_answer_in_time_is_a_sentence(server, monkeypatch):
+    monkeypatch.setattr(proposer, "MAX_RETRIES", 0)
+    assert "does not answer within 0.2 s" in str(fails(server, "hang", timeout=0.2))
+
+
+@pytest.mark.parametrize(
+    "status,kind,says",
+    [
+        (400, "invalid_request_error", "JODA_VLM"),
+        (402, "billing_error", "credit"),
+        (403, "permission_error", "JODA_VLM"),
+        (404, "not_found_error", f"another model than '{MODEL}'"),
+    ],
+)
+def test_what_cannot_be_retried_says_what_to_do(server, status, kind, says):
+    failure = fails(server, error(status, kind, "No."))
+    assert says in str(failure) and f"({status}: No)" in str(failure)
+    assert failure.usage.requests == 1 and failure.usage.dollars == 0
+
+
+def test_a_wrong_key_is_one_sentence(server, monkeypatch):
+    monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-wrong")
+    failure = fails(server, reply())
+    assert "401" in str(failure) and "ANTHROPIC_API_KEY" in str(failure)
+    assert "sk-wrong" not in str(failure)
+
+
+def test_a_missing_key_is_one_sentence(server, monkeypatch):
+    monkeypatch.delenv("ANTHROPIC_API_KEY")
+    with pytest.raises(JodaError, match="ANTHROPIC_API_KEY is not set"):
+        Anthropic()
+
+
+def test_a_missing_package_is_one_sentence(server, monkeypatch):
+    monkeypatch.setitem(sys.modules, "anthropic", None)
+    with pytest.raises(JodaError, match=re.escape('pip install ".[vlm]"')):
+        Anthropic()
+
+
+def test_importing_does_not_load_the_package():
+    code = "import joda.propose.anthropic, sys; sys.exit('anthropic' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+@pytest.mark.parametrize("name,text", [("JODA_VLM_PRICE", "cheap"), ("JODA_VLM_PRICE", "3")])
+def test_an_unreadable_price_is_one_sentence(server, monkeypatch, name, text):
+    monkeypatch.setenv(name, text)
+    with pytest.raises(JodaError, match=f"{name} is '{text}'"):
+        Anthropic()
+
+
+def test_the_model_is_chosen_by_argument_environment_and_default(server, monkeypatch):
+    assert Anthropic().name == f"anthropic:{proposer.DEFAULT_MODEL}"
+    monkeypatch.setenv("JODA_VLM", "claude-haiku-5-5")
+    assert Anthropic().name == "anthropic:claude-haiku-5-5"
+    assert Anthropic("claude-opus-5").name == "anthropic:claude-opus-5"
+    assert proposer.DEFAULT_MODEL in proposer.PRICES
+
+
+def test_the_default_model_is_one_that_the_package_knows():
+    from typing import get_args
+
+    literal, _ = get_args(anthropic.types.ModelParam)
+    assert set(proposer.PRICES) <= set(get_args(literal))
+
+
+def test_a_refusal_is_a_sentence_and_keeps_its_tokens(server):
+    failure = fails(server, message("", "refusal"))
+    assert "declined" in str(failure) and failure.usage.input_tokens == 1000
+    assert len(server.requests) == 1
+
+
+def test_a_cut_off_answer_is_asked_for_again_with_more_room(server):
+    answer = ask(server, message('{"status": "rev', "max_tokens"), reply())
+    assert answer.proposal == proposed() and answer.usage.output_tokens == 400
+    assert [sent["max_tokens"] for sent in server.requests] == [MAX_TOKENS, 2 * MAX_TOKENS]
+    assert any("cut off" in note for note in answer.notes)
+
+
+def test_an_answer_cut_off_twice_is_a_sentence(server):
+    failure = fails(server, message("{", "max_tokens"))
+    assert "cut off after 32000 tokens" in str(failure)
+    assert failure.usage.requests == 2 and failure.usage.output_tokens == 400
+
+
+@pytest.mark.parametrize(
+    "bad,quoted",
+    [
+        (message("Sure! Here is it:"), "not JSON"),
+        (message(""), "not JSON"),
+        (message('{"status": "complete", "proposal": null}'), "A proposal is due"),
+        (
+            message('{"status": "revised", "proposal": {}}'),
+            "proposal.joint_summary: Field required",
+        ),
+        (spoilt(effect_name="flux_capacitor"), "'flux_capacitor' is not in the vocabulary"),
+        (spoilt(start_ratio=-0.2), "effect_proposals[0].start_ratio"),
+        (spoilt(start_ratio=0.9, end_ratio=0.1), "start_ratio must be less than end_ratio"),
+    ],
+)
+def test_an_invalid_answer_is_repaired_by_quoting_what_is_wrong(server, bad, quoted):
+    answer = ask(server, bad, reply())
+    assert answer.proposal == proposed()
+    assert (answer.usage.requests, answer.usage.input_tokens) == (2, 2000)
+    first, second = server.requests
+    assert second["messages"][:-2] == first["messages"]
+    assert quoted in second["messages"][-1]["content"][0]["text"]
+    said = "".join(b["text"] for b in bad["content"] if b["type"] == "text")
+    assert second["messages"][-2]["content"][0]["text"] == (said or "(no text)")
+    assert len(answer.notes) == 1 and quoted in answer.notes[0]
+
+
+def test_an_answer_that_stays_invalid_is_a_sentence_and_keeps_its_tokens(server):
+    failure = fails(server, spoilt(effect_name="flux_capacitor"))
+    assert "'flux_capacitor' is not in the vocabulary" in str(failure)
+    assert failure.usage.requests == len(server.requests) == 2
+    assert failure.usage.input_tokens == 2000 and failure.usage.dollars > 0
+
+
+def test_tokens_survive_a_failure_after_them(server):
+    failure = fails(server, message("{"), error(403, "permission_error", "No."))
+    assert failure.usage.input_tokens == 1000 and failure.usage.requests == 2
+
+
+def test_another_service_is_a_sentence(server):
+    assert "does not answer as the Messages API does" in str(fails(server, "page"))
+
+
+def test_the_server_refuses_a_bad_request(server, monkeypatch):
+    monkeypatch.setattr(proposer.prompts, "CACHED", {"cache_control": {"type": "forever"}})
+    assert "cache_control: unknown" in str(fails(server, reply()))
+
+
+def test_the_ablation_yields_a_profile(server):
+    flat = [{"s": 0, "value": 0.5}, {"s": 1, "value": 0.5}]
+    curves = {"conservative": flat, "friction": flat, "damping": flat}
+    server.script[:] = [message(json.dumps({**curves, "friction": flat[:1]})), message("{}")]
+    with pytest.raises(ProposalFailed, match="three lists"):
+        Anthropic(MODEL, server.url).ablate(task())
+    server.script[:] = [message(json.dumps(curves))]
+    profile, usage = Anthropic(MODEL, server.url).ablate(task())
+    assert isinstance(profile, Profile) and usage.requests == 1
+    assert profile.channels.damping.components[0].y == (0.5, 0.5)
+
+
+# Batches
+
+
+@pytest.fixture
+def asks():
+    return [("fridge", task(), []), ("oven", task("oven"), [turn("oven")])]
+
+
+def by_joint(entry):
+    """A proposal in round one, complete in round two."""
+    later = len(entry["params"]["messages"]) > 1
+    return {"type": "succeeded", "message": reply("oven", 1) if later else reply()}
+
+
+def batch(server, asks, store, **options):
+    return Anthropic(MODEL, server.url).propose_many(asks, store, **options)
+
+
+def test_a_batch_answers_every_ask_at_half_the_price(server, asks, tmp_path):
+    store, seen, slept = tmp_path / "batch.json", [], []
+    server.results, server.looks = by_joint, 2
+
+    def sleep(seconds):
+        assert store.exists()
+        slept.append(seconds)
+
+    got = batch(server, asks, store, progress=lambda *each: seen.append(each), sleep=sleep)
+    assert list(got) == ["fridge", "oven"]
+    assert got["fridge"].proposal == proposed() and got["oven"].proposal is None
+    # 1000 in and 200 out at 2 and 10 dollars per million, halved.
+    assert got["fridge"].usage.dollars == pytest.approx(0.002)
+    assert got["fridge"].usage.requests == 1
+    assert seen == [(0, 2), (0, 2), (2, 2)]
+    assert slept == [0.001, 0.0015]
+    assert len(server.batches) == 1 and not server.requests and not store.exists()
+    assert [each["params"]["model"] for each in server.batches[0]] == [MODEL] * 2
+
+
+def test_an_interrupted_batch_is_picked_up_and_not_paid_twice(server, asks, tmp_path):
+    store = tmp_path / "batch.json"
+    server.results, server.looks = by_joint, 1
+
+    def interrupt(seconds):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        batch(server, asks, store, sleep=interrupt)
+    kept = json.loads(store.read_text())["batches"]
+    assert [each["id"] for each in kept] == ["batch_0"]
+    assert kept[0]["requests"] == [each["custom_id"] for each in server.batches[0]]
+    got = batch(server, asks, store)
+    assert got["fridge"].proposal == proposed()
+    assert len(server.batches) == 1 and not store.exists()
+
+
+def test_what_is_new_is_asked_beside_what_is_running(server, asks, tmp_path):
+    store = tmp_path / "batch.json"
+    server.results, server.looks = by_joint, 1
+
+    def interrupt(seconds):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        batch(server, asks[:1], store, sleep=interrupt)
+    got = batch(server, asks, store)
+    assert [len(each) for each in server.batches] == [1, 1]
+    assert got["oven"].proposal is None and not store.exists()
+
+
+def test_the_batch_of_other_asks_stays_in_the_store(server, asks, tmp_path):
+    store = tmp_path / "batch.json"
+    store.write_text('{"batches": [{"id": "batch_77", "requests": ["abc"]}]}')
+    server.results = by_joint
+    assert batch(server, asks, store)["fridge"].proposal == proposed()
+    assert [each["id"] for each in json.loads(store.read_text())["batches"]] == ["batch_77"]
+
+
+def test_failures_in_a_batch_are_those_of_their_asks(server, tmp_path):
+    outcomes = {
+        "fine": {"type": "succeeded", "message": reply()},
+        "errored": {
+            "type": "errored",
+            "error": error(400, "invalid_request_error", "Bad.")["body"],
+        },
+        "expired": {"type": "expired"},
+        "canceled": {"type": "canceled"},
+        "refused": {"type": "succeeded", "message": message("", "refusal")},
+    }
+    names = list(outcomes)
+    by_wish = {f"wish of {name}": outcome for name, outcome in outcomes.items()}
+    server.results = lambda entry: next(
+        outcome for wish, outcome in by_wish.items() if wish in texts(entry["params"])
+    )
+    asks = [(name, task(description=f"wish of {name}"), []) for name in names]
+    got = batch(server, asks, tmp_path / "batch.json")
+    assert got["fine"].proposal == proposed()
+    says = {"errored": "Bad", "expired": "expired", "canceled": "cancelled", "refused": "declined"}
+    for name, word in says.items():
+        assert isinstance(got[name], ProposalFailed) and word in str(got[name])
+    assert got["refused"].usage.dollars == pytest.approx(0.002)
+
+
+def test_an_invalid_answer_in_a_batch_is_repaired_directly(server, tmp_path):
+    server.results = lambda entry: {"type": "succeeded", "message": message("{")}
+    server.script[:] = [reply()]
+    got = batch(server, [("fridge", task(), [])], tmp_path / "batch.json")["fridge"]
+    assert got.proposal == proposed() and got.usage.requests == 2
+    assert len(server.batches) == len(server.requests) == 1
+    assert got.usage.dollars == pytest.approx(0.002 + 0.004)
+
+
+def test_large_batches_are_split(server, asks, tmp_path, monkeypatch):
+    server.results = by_joint
+    monkeypatch.setattr(proposer, "BATCH_REQUESTS", 1)
+    assert batch(server, asks, tmp_path / "batch.json")["fridge"].proposal == proposed()
+    assert [len(each) for each in server.batches] == [1, 1]
+    monkeypatch.setattr(proposer, "BATCH_REQUESTS", 100_000)
+    size = max(len(json.dumps(each)) for part in server.batches for each in part)
+    monkeypatch.setattr(proposer, "BATCH_BYTES", int(1.5 * size))
+    assert batch(server, asks, tmp_path / "batch.json")["fridge"].proposal == proposed()
+    assert [len(each) for each in server.batches] == [1, 1, 1, 1]
+
+
+def test_mistakes_with_batches_are_sentences(server, asks, tmp_path, monkeypatch):
+    store = tmp_path / "batch.json"
+    with pytest.raises(JodaError, match="the same name"):
+        batch(server, [asks[0], ("fridge", task("oven"), [])], store)
+    store.write_text("{")
+    with pytest.raises(JodaError, match=r"batch.json: not JSON"):
+        batch(server, asks, store)
+    store.unlink()
+    monkeypatch.setenv("JODA_POLL_S", "soon")
+    with pytest.raises(JodaError, match="JODA_POLL_S is 'soon'"):
+        batch(server, asks, store)
+    assert not server.paths
+
+
+def test_a_batch_of_another_account_is_one_sentence(server, asks, tmp_path):
+    store = tmp_path / "batch.json"
+    server.looks = 1
+
+    def forget(seconds):
+        server.batches.clear()
+
+    with pytest.raises(JodaError, match=r"batch.json: the service does not know batch batch_0"):
+        batch(server, asks, store, sleep=forget)
+    assert store.exists()
+
+
+def test_a_wrong_key_for_a_batch_is_one_sentence(server, asks, tmp_path, monkeypatch):
+    monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-wrong")
+    with pytest.raises(JodaError, match="401"):
+        batch(server, asks, tmp_path / "batch.json")
+
+
+def test_nothing_to_ask_asks_nothing(server, tmp_path):
+    assert batch(server, [], tmp_path / "batch.json") == {}
+    assert not server.paths
