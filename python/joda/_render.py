@@ -1,29 +1,34 @@
 """Pictures of a joint: what it moves, highlighted, from one end of its range to the other.
 
 The camera is chosen by looking: of many directions the one from which most of the moving part, and
-of its motion, can be seen. `render` labels and writes what a child process renders.
+of its motion, can be seen. All the work is done in a child process, see `joda.offscreen`.
 """
 
+import io
 import re
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import mujoco
 import numpy as np
 
-from joda.draw import write_png
 from joda.errors import JodaError
-from joda.files import check_target, make_folder
+from joda.files import check_target, make_folder, write_bytes
 from joda.model import describe_joint, find_joint, load_model
-from joda.offscreen import HEIGHT, WIDTH, Image, Shots, answer, ask
+from joda.offscreen import HEIGHT, Image, answer, ask
 from joda.profile import Joint
-from joda.studio import Array, Marks, Studio, View, moving
+from joda.studio import Array, Studio, View, moving
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+ARROW = (0.95, 0.36, 0.05)
+AXIS = (0.12, 0.12, 0.14)
 
 ELEVATIONS = (-42.0, -22.0)
 FROM_BELOW = -ELEVATIONS[1]
+TRIED = 12
+"""How many of the candidates, the most promising, are rendered."""
 
 
 def render(
@@ -31,8 +36,8 @@ def render(
 ) -> list[Path]:
     """Writes pictures of a joint at evenly spaced positions, from the low to the high end.
 
-    What the joint moves is blue, its axis dark, +q the orange arrow; the other joints are at their
-    reference. All pictures have the same camera.
+    What the joint moves is blue, lighter or darker where it has markings; its axis is dark, +q the
+    orange arrow; the other joints are at their reference. All pictures have the same camera.
 
     Args:
         model: MJCF or URDF file.
@@ -47,34 +52,38 @@ def render(
 
     Raises:
         JodaError: the file cannot be loaded, the joint does not exist, has no range or moves
-            nothing that can be seen, the pictures cannot be written, or nothing can render here.
+            nothing that can be seen, or the pictures cannot be written.
+        NoRenderer: a JodaError; nothing can render here.
     """
-    path, folder = Path(model), Path(output)
     if count < 2:
         raise JodaError(f"count is {count}; give at least 2 pictures, one for each end.")
-    compiled = load_model(path)
-    index = find_joint(compiled, joint)
-    about = describe_joint(compiled, index)
-    if not moving(compiled, index):
-        raise JodaError(f"{path}: joint '{about.name}' moves no geom that can be seen.")
-    make_folder(folder)
+    request = [str(model), joint, str(output), count, force]
+    return [Path(target) for target in ask("joda._render", request)]
+
+
+def _make(request: Any) -> list[str]:
+    """In the child: renders and writes the pictures that `render` is asked for."""
+    path, address, folder, count, force = request
+    model = load_model(Path(path))
+    index = find_joint(model, address)
+    joint = describe_joint(model, index)
+    if not moving(model, index):
+        raise JodaError(f"{path}: joint '{joint.name}' moves no geom that can be seen.")
+    studio = Studio(model, index)
     fractions = np.linspace(0, 1, count)
-    stem = re.sub(r"[^\w.-]+", "_", about.name).strip("_") or "joint"
+    stem = re.sub(r"[^\w.-]+", "_", joint.name).strip("_") or "joint"
     digits = max(2, len(str(count - 2)))
-    targets = [folder / f"{stem}_{s:.{digits}f}.png" for s in fractions]
+    make_folder(Path(folder))
+    targets = [Path(folder) / f"{stem}_{s:.{digits}f}.png" for s in fractions]
     for target in targets:
         check_target(target, force)
-    lo, hi = about.range
-    positions = [lo + s * (hi - lo) for s in fractions]
-    images = ask("joda._render", [str(path), index, positions])
-    if images is None:
-        raise JodaError(
-            "nothing can render here: OpenGL works neither through EGL nor through OSMesa, or not "
-            "as MUJOCO_GL asks; on Debian, install libegl1 and libgl1-mesa-dri, or libosmesa6."
-        )
-    for target, image, q, s in zip(targets, images, positions, fractions, strict=True):
-        write_png(_labelled(image, _label(about, q, s)), target, force)
-    return targets
+    lo, hi = joint.range
+    positions = lo + fractions * (hi - lo)
+    labels = [_label(joint, q, s) for q, s in zip(positions, fractions, strict=True)]
+    # Compressing one picture while the next is rendered.
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(_write, targets, labels, _shots(studio, positions)))
+    return [str(target) for target in targets]
 
 
 def _label(joint: Joint, q: float, s: float) -> str:
@@ -84,16 +93,24 @@ def _label(joint: Joint, q: float, s: float) -> str:
     return text.replace("-", "\N{MINUS SIGN}") if "-" not in joint.name else text
 
 
-def _labelled(image: Image, label: str) -> "Figure":
-    from matplotlib.figure import Figure
+def _write(target: Path, label: str, image: Image) -> None:
+    """Writes the picture as PNG, its label in the lower left corner."""
+    import matplotlib
+    from PIL import Image as Pictures
+    from PIL import ImageDraw, ImageFont
 
-    figure = Figure(figsize=(WIDTH / 100, HEIGHT / 100), dpi=100)
-    figure.figimage(image)
-    box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "boxstyle": "round,pad=0.4"}
-    figure.text(
-        0.02, 0.032, label, fontsize=14, va="bottom", color="#222222", bbox=box, parse_math=False
-    )
-    return figure
+    picture = Pictures.fromarray(image)
+    pen = ImageDraw.Draw(picture, "RGBA")
+    face = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+    font = ImageFont.truetype(str(face), 19)
+    place = (20, HEIGHT - 24)
+    left, top, right, bottom = pen.textbbox(place, label, font, anchor="ls")
+    box = (left - 8, top - 8, right + 8, bottom + 8)
+    pen.rounded_rectangle(box, radius=6, fill=(255, 255, 255, 217))
+    pen.text(place, label, "#222222", font, anchor="ls")
+    content = io.BytesIO()
+    picture.save(content, "png")
+    write_bytes(target, content.getvalue())
 
 
 def _views(kind: str, axis: Array, out: Array) -> Iterator[tuple[View, float]]:
@@ -107,6 +124,44 @@ def _views(kind: str, axis: Array, out: Array) -> Iterator[tuple[View, float]]:
             best, width = (0.55, 0.5) if kind == "hinge" else (0.65, 0.5)
             suits = float(np.exp(-(((along - best) / width) ** 2)))
             yield view, suits * (0.5 if elevation > 0 else 1.0)
+
+
+@dataclass(frozen=True)
+class Marks:
+    """The axis and the arrow towards +q.
+
+    Attributes:
+        line: ends of the axis, shape (2, 3).
+        path: the arrow's corners, shape (n, 3).
+        width: radius of the arrow, m.
+    """
+
+    line: Array
+    path: Array
+    width: float
+
+    def add(self, scene: mujoco.MjvScene) -> None:
+        """Adds them to what the scene draws."""
+        kind = mujoco.mjtGeom
+        _connect(scene, kind.mjGEOM_CAPSULE, 0.45 * self.width, self.line, AXIS)
+        for ends in zip(self.path[:-2], self.path[1:-1], strict=True):
+            _connect(scene, kind.mjGEOM_CAPSULE, self.width, ends, ARROW)
+        _connect(scene, kind.mjGEOM_ARROW, 2.2 * self.width, self.path[-2:], ARROW)
+
+
+def _connect(
+    scene: mujoco.MjvScene,
+    kind: mujoco.mjtGeom,
+    width: float,
+    ends: Array | tuple[Array, Array],
+    colour: tuple[float, float, float],
+) -> None:
+    geom = scene.geoms[scene.ngeom]
+    rgba = np.array([*colour, 1], np.float32)
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
+    mujoco.mjv_connector(geom, kind, width, *ends)
+    geom.emission = 0.35
+    scene.ngeom += 1
 
 
 def _hinge_marks(anchor: Array, axis: Array, span: float, low: Array, union: Array) -> list[Marks]:
@@ -161,17 +216,7 @@ def _slide_marks(axis: Array, low: Array, union: Array) -> list[Marks]:
     return marks
 
 
-def _prepare(request: Any) -> Shots:
-    path, joint, positions = request
-    studio = Studio(Path(path), joint)
-
-    def shots() -> list[Image]:
-        return _shots(studio, positions)
-
-    return shots
-
-
-def _shots(studio: Studio, positions: list[float]) -> list[Image]:
+def _shots(studio: Studio, positions: Array) -> Iterator[Image]:
     """The pictures at these positions, rad or m, all with the same camera."""
     lo, hi = positions[0], positions[-1]
     clouds = []
@@ -191,12 +236,10 @@ def _shots(studio: Studio, positions: list[float]) -> list[Image]:
     view = _choose(studio, _views(kind, axis, out), union, (lo, (lo + hi) / 2, hi))
     # The arrow on the side of the part that is turned to the camera.
     marks = min(options, key=lambda mark: float(mark.path.mean(axis=0) @ view.frame()[2]))
-    camera = view.camera(np.concatenate([union, marks.path]))
-    pictures = []
+    studio.settle(view.camera(np.concatenate([union, marks.path])), marks.add)
     for position in positions:
         studio.pose(position)
-        pictures.append(studio.shoot(camera, marks))
-    return pictures
+        yield studio.shoot()
 
 
 def _choose(
@@ -208,20 +251,24 @@ def _choose(
     """The view that shows most of the part at all positions, rad or m, and most of its motion."""
     views, suits = zip(*candidates, strict=True)
     cameras = [view.camera(union) for view in views]
-    seen, clear = [], []
+    clear = []
     for position in positions:
         studio.pose(position)
-        seen.append(np.stack(studio.scout(cameras)))
         points = studio.points()
         targets = points[np.linspace(0, len(points) - 1, 12).astype(int)]
         clear.append([studio.clear(camera, targets) for camera in cameras])
+    promise = np.array(suits) * (0.1 + np.mean(clear, axis=0))
+    tried = np.argsort(-promise, kind="stable")[:TRIED]
+    seen = []
+    for position in positions:
+        studio.pose(position)
+        seen.append(np.stack(studio.scout([cameras[k] for k in tried])))
     cover = np.stack([masks.mean(axis=(1, 2)) for masks in seen])
     changed = (seen[0] ^ seen[-1]).mean(axis=(1, 2))
     shown = cover.mean(axis=0) + 8 * cover.min(axis=0) + changed
-    score = shown * np.array(suits) * (0.1 + np.mean(clear, axis=0))
-    best: View = views[int(np.argmax(score))]
+    best: View = views[tried[int(np.argmax(shown * promise[tried]))]]
     return best
 
 
 if __name__ == "__main__":
-    answer(_prepare)
+    answer(_make)

@@ -4,12 +4,13 @@ MuJoCo reads its OpenGL backend from the environment when it is imported, and so
 process that asks them in vain. A child process can try one backend after the other.
 """
 
-import io
 import json
 import os
+import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.errors import JodaError
+
 Image = NDArray[np.uint8]
-Shots = Callable[[], list[Image]]
 
 WIDTH, HEIGHT = 960, 720
 
@@ -26,19 +28,38 @@ FAILED = 70
 """Exit status of a child that could render and failed all the same."""
 
 
-def ask(module: str, request: Any) -> list[Image] | None:
-    """Images that a module makes in a child process, with the first OpenGL backend that works.
+class NoRenderer(JodaError):
+    """Nothing can render here; what does not need pictures can go on without."""
+
+    def __init__(self) -> None:
+        """The one sentence; it takes no arguments."""
+        super().__init__(
+            "nothing can render here: OpenGL works neither through EGL nor through OSMesa, or not "
+            "as MUJOCO_GL asks; on Debian, install libegl1 and libgl1-mesa-dri, or libosmesa6."
+        )
+
+
+@contextmanager
+def opening() -> Iterator[None]:
+    """Around the making of an OpenGL context: whatever it raises becomes NoRenderer."""
+    try:
+        yield
+    except Exception as error:
+        raise NoRenderer from error
+
+
+def ask(module: str, request: Any) -> Any:
+    """What a module makes in a child process, with the first OpenGL backend that works.
 
     Args:
         module: to run; it ends in `answer`.
         request: what it reads; anything that JSON can carry.
 
-    Returns:
-        its RGB images, all of one shape (height, width, 3), or None where nothing can render:
-        neither EGL nor OSMesa works here, nor what the environment variable MUJOCO_GL asks for.
-
     Raises:
-        RuntimeError: the module failed although the backend works.
+        NoRenderer: neither EGL nor OSMesa works here, nor what the environment variable MUJOCO_GL
+            asks for.
+        JodaError: the module raised it.
+        RuntimeError: the module failed otherwise although the backend works.
     """
     asked = os.environ.get("MUJOCO_GL")
     for backend in [asked] if asked else ["egl", "osmesa"]:
@@ -49,29 +70,35 @@ def ask(module: str, request: Any) -> list[Image] | None:
             env={**os.environ, "MUJOCO_GL": backend},
         )
         if result.stdout and result.returncode == 0:
-            return list(np.load(io.BytesIO(result.stdout)))
+            made = pickle.loads(result.stdout)
+            if isinstance(made, JodaError):
+                raise made
+            return made
         if result.returncode == FAILED:
             raise RuntimeError(f"{module} failed:\n{result.stderr.decode(errors='replace')}")
-    return None
+    raise NoRenderer
 
 
-def answer(prepare: Callable[[Any], Shots]) -> None:
-    """The child: the request as JSON on stdin, the images' bytes on stdout.
+def answer(make: Callable[[Any], Any]) -> None:
+    """The child: the request as JSON on stdin, what is made of it, or a JodaError, on stdout.
 
     Args:
-        prepare: given the request, makes the OpenGL context; what it returns makes the images.
+        make: given the request, makes the OpenGL context within `opening`, and then the rest.
     """
     # MuJoCo prints its warnings to stdout; they go where the errors go.
     with os.fdopen(os.dup(1), "wb") as stdout:
         os.dup2(2, 1)
-        shots = prepare(json.load(sys.stdin))
+        made: Any
         try:
-            content = io.BytesIO()
-            np.save(content, np.stack(shots()))
-            stdout.write(content.getvalue())
+            made = make(json.load(sys.stdin))
+        except NoRenderer:
+            raise
+        except JodaError as error:
+            made = error
         except Exception:
             sys.excepthook(*sys.exc_info())
             sys.exit(FAILED)
+        stdout.write(pickle.dumps(made))
 
 
 def render(
@@ -86,30 +113,32 @@ def render(
         positions: rad or m.
 
     Returns:
-        RGB images, shape (720, 960, 3), or None where nothing can render, as `ask`.
+        RGB images, shape (720, 960, 3), or None where nothing can render.
     """
-    return ask("joda.offscreen", [str(path), camera, joint, list(map(float, positions))])
+    request = [str(path), camera, joint, list(map(float, positions))]
+    try:
+        images: list[Image] = ask("joda.offscreen", request)
+    except NoRenderer:
+        return None
+    return images
 
 
-def _prepare(request: Any) -> Shots:
+def _make(request: Any) -> list[Image]:
     path, camera, joint, positions = request
     model = mujoco.MjModel.from_xml_path(path)
     data = mujoco.MjData(model)
     model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, HEIGHT
-    renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
-
-    def shots() -> list[Image]:
-        images = []
-        with renderer:
-            for position in positions:
-                data.joint(joint).qpos[0] = position
-                mujoco.mj_forward(model, data)
-                renderer.update_scene(data, camera=camera)
-                images.append(renderer.render())
-        return images
-
-    return shots
+    with opening():
+        renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
+    images = []
+    with renderer:
+        for position in positions:
+            data.joint(joint).qpos[0] = position
+            mujoco.mj_forward(model, data)
+            renderer.update_scene(data, camera=camera)
+            images.append(renderer.render())
+    return images
 
 
 if __name__ == "__main__":
-    answer(_prepare)
+    answer(_make)

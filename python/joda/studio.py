@@ -3,15 +3,14 @@
 Runs in the child process of `joda.offscreen`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.model import load
-from joda.offscreen import HEIGHT, WIDTH, Image
+from joda.offscreen import HEIGHT, WIDTH, Image, opening
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -21,9 +20,13 @@ MARGIN = 0.88
 """Share of the frame, in width or height, that the motion takes."""
 
 HIGHLIGHT = (0.08, 0.40, 0.95)
-ARROW = (0.95, 0.36, 0.05)
-AXIS = (0.12, 0.12, 0.14)
 BACKGROUND = (0.91, 0.92, 0.93)
+
+LIGHTER, DARKER, TINGE = 0.6, 0.65, 0.85
+"""How far white markings on a black part lighten the highlight, black ones on a white part darken
+it, and coloured ones colour it."""
+
+AMBIENT, DIFFUSE = 0.48, 0.50
 
 THROUGH = 0.35
 """How much of the axis and the arrow shows through what stands before them."""
@@ -67,17 +70,29 @@ def moving(model: mujoco.MjModel, joint: int) -> list[int]:
 
 
 def _outline(model: mujoco.MjModel, geom: int) -> Array:
-    """Points in the geom's frame that it lies within, a mesh nearly; shape (n, 3)."""
-    if model.geom_type[geom] != int(mujoco.mjtGeom.mjGEOM_MESH):
-        box = model.geom_aabb[geom]
-        return np.asarray(
-            box[:3] + np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(-1, 3) * box[3:]
-        )
-    mesh = int(model.geom_dataid[geom])
-    first, number = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    vertices = model.mesh_vert[first : first + number].astype(float)
-    directions = np.random.default_rng(0).normal(size=(3, 100))
-    return np.asarray(vertices[np.unique(np.argmax(vertices @ directions, axis=0))])
+    """Points in the geom's frame that it nearly lies within, shape (n, 3)."""
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    directions = np.random.default_rng(0).normal(size=(200, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    end = np.outer(np.sign(directions[:, 2]), [0, 0, 1])
+    if kind == int(mujoco.mjtGeom.mjGEOM_MESH):
+        mesh = int(model.geom_dataid[geom])
+        first, number = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        vertices = model.mesh_vert[first : first + number].astype(float)
+        return np.asarray(vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))])
+    if kind == int(mujoco.mjtGeom.mjGEOM_SPHERE):
+        return np.asarray(size[0] * directions)
+    if kind == int(mujoco.mjtGeom.mjGEOM_ELLIPSOID):
+        return np.asarray(size * directions)
+    if kind == int(mujoco.mjtGeom.mjGEOM_CAPSULE):
+        return np.asarray(size[0] * directions + size[1] * end)
+    if kind == int(mujoco.mjtGeom.mjGEOM_CYLINDER):
+        flat = directions * [1, 1, 0]
+        rim = flat / np.linalg.norm(flat, axis=1, keepdims=True)
+        return np.asarray(size[0] * rim + size[1] * end)
+    centre, half = np.split(model.geom_aabb[geom], 2)
+    corners = np.stack(np.meshgrid(*[[-1, 1]] * 3), -1).reshape(-1, 3)
+    return np.asarray(centre + corners * half)
 
 
 @dataclass(frozen=True)
@@ -122,46 +137,39 @@ class Studio:
         part: geoms that the joint moves.
     """
 
-    def __init__(self, path: Path, joint: int) -> None:
-        """Loads the model and makes the OpenGL context; raises what its backend raises."""
-        self.model = model = _with_sky(path)
-        self.data = mujoco.MjData(model)
+    def __init__(self, model: mujoco.MjModel, joint: int) -> None:
+        """Makes the OpenGL context; raises NoRenderer."""
+        self.model, self.data = model, mujoco.MjData(model)
         self.joint, self.part = joint, moving(model, joint)
         self._outlines = [_outline(model, g) for g in self.part]
-        self._dress()
-        self._gl = mujoco.GLContext(WIDTH, HEIGHT)
-        self._gl.make_current()
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        self._prepare()
+        with opening():
+            self._gl = mujoco.GLContext(WIDTH, HEIGHT)
+            self._gl.make_current()
+            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._scene = mujoco.MjvScene(model, maxgeom=4 * model.ngeom + 2000)
-        for flag in ("SHADOW", "REFLECTION", "HAZE"):
+        for flag in ("SHADOW", "REFLECTION", "HAZE", "SKYBOX"):
             self._scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = False
         self._option = mujoco.MjvOption()
         self._option.sitegroup[:] = 0
         for group in _groups(model, joint):
             self._option.geomgroup[group] = 1
 
-    def _dress(self) -> None:
-        """Highlights the part, evens out background and light, and sizes the frame."""
-        model, alpha = self.model, _alpha(self.model)
-        for texture in np.flatnonzero(model.tex_type == int(mujoco.mjtTexture.mjTEXTURE_SKYBOX)):
-            channels, first = int(model.tex_nchannel[texture]), int(model.tex_adr[texture])
-            size = int(model.tex_width[texture] * model.tex_height[texture]) * channels
-            pixel = [round(255 * c) for c in (*BACKGROUND, 1.0)][:channels]
-            model.tex_data[first : first + size].reshape(-1, channels)[:] = pixel
-        for g in self.part:
-            material = int(model.geom_matid[g])
-            plain = model.mat_rgba[material] if material >= 0 else model.geom_rgba[g]
-            shade = 0.8 + 0.2 * float(plain[:3].mean())
-            model.geom_rgba[g] = [*(shade * c for c in HIGHLIGHT), max(0.35, alpha[g])]
-            model.geom_matid[g] = -1
+    def _prepare(self) -> None:
+        """Evens out the light, and sizes the frame for scouting."""
+        model = self.model
+        # Textures are slow to upload, and scouting needs none of them.
+        self._texture_sizes = model.tex_width.copy(), model.tex_height.copy()
+        flat = model.tex_type == int(mujoco.mjtTexture.mjTEXTURE_2D)
+        model.tex_width[:], model.tex_height[:] = 1, np.where(flat, 1, 6)
         model.light_active[:] = 0
         model.vis.headlight.active = 1
-        model.vis.headlight.ambient[:] = 0.48
-        model.vis.headlight.diffuse[:] = 0.50
+        model.vis.headlight.ambient[:] = AMBIENT
+        model.vis.headlight.diffuse[:] = DIFFUSE
         model.vis.headlight.specular[:] = 0.08
         model.vis.global_.fovy = FOVY
-        model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, HEIGHT
+        model.vis.global_.offwidth, model.vis.global_.offheight = SCOUT
         model.vis.quality.offsamples = 4
         model.vis.quality.shadowsize = 0
 
@@ -211,9 +219,7 @@ class Studio:
     def scout(self, cameras: list[mujoco.MjvCamera]) -> list[Mask]:
         """Where each camera sees the part in this pose, shape (72, 96)."""
         self._update(cameras[0])
-        shown = self._scene.geoms[: self._scene.ngeom]
-        geom, part = int(mujoco.mjtObj.mjOBJ_GEOM), set(self.part)
-        ids = [g.segid + 1 for g in shown if g.objtype == geom and g.objid in part]
+        ids = [geom.segid + 1 for geom, inside in self._drawn() if inside]
         masks = []
         for camera in cameras:
             mujoco.mjv_updateCamera(self.model, self.data, camera, self._scene)
@@ -221,18 +227,100 @@ class Studio:
             masks.append(np.isin(pixels @ [1, 256, 65536], ids))
         return masks
 
-    def shoot(self, camera: mujoco.MjvCamera, marks: "Marks") -> Image:
-        """The picture in this pose; marks that stand behind something show through faintly."""
+    def settle(self, camera: mujoco.MjvCamera, mark: Callable[[mujoco.MjvScene], None]) -> None:
+        """Fixes the camera, what adds the marks, and which of the part's colours is usual."""
+        self._camera, self._mark = camera, mark
+        self._forget(camera)
+        mask = self.scout([camera])[0]
+        self._usual = np.full(3, 0.5)
+        if mask.any():
+            self._usual = np.median(self._bare(*SCOUT)[mask], axis=0) / 255
+        materials = [g.matid for g, inside in self._drawn() if inside and g.matid >= 0]
+        self._textured = bool(np.any(self.model.mat_texid[materials] >= 0))
+        mujoco.mjr_resizeOffscreen(WIDTH, HEIGHT, self._context)
         self._update(camera)
         self._scene.ngeom = 0
-        marks.add(self._scene)
-        alone = self._read(WIDTH, HEIGHT).astype(float)
-        self._update(camera)
-        marks.add(self._scene)
-        picture = self._read(WIDTH, HEIGHT).astype(float)
-        marked = np.abs(alone - 255 * np.array(BACKGROUND)).max(axis=2, keepdims=True) > 8
-        picture += THROUGH * marked * (alone - picture)
-        return np.clip(np.round(picture), 0, 255).astype(np.uint8)
+        self._add_backdrop()
+        mark(self._scene)
+        alone = self._read(WIDTH, HEIGHT)
+        self._through = _differs(alone, BACKGROUND, 8)
+        self._faint = alone[self._through].astype(float)
+
+    def _forget(self, camera: mujoco.MjvCamera) -> None:
+        """Hides the geoms that the camera cannot see, and uploads the textures of the others."""
+        model = self.model
+        forward = View(camera.azimuth, camera.elevation).frame()[2]
+        way = self.data.geom_xpos - (camera.lookat - camera.distance * forward)
+        depth = way @ forward
+        aside = np.linalg.norm(way - np.outer(depth, forward), axis=1)
+        angle = np.arctan(np.tan(np.deg2rad(FOVY / 2)) * np.hypot(1, WIDTH / HEIGHT))
+        away = aside * np.cos(angle) - depth * np.sin(angle) > model.geom_rbound
+        away &= model.geom_rbound > 0  # a plane has no bound
+        away[self.part] = False
+        others = (model.geom_matid[~away], model.skin_matid, model.flex_matid, model.tendon_matid)
+        unused = set(model.geom_matid[away]).difference(*others)
+        model.geom_matid[away], model.geom_rgba[away] = -1, 0
+        model.tex_width[:], model.tex_height[:] = self._texture_sizes
+        used = [k for k in range(model.nmat) if k not in unused]
+        for texture in set(model.mat_texid[used].ravel()) - {-1}:
+            mujoco.mjr_uploadTexture(model, self._context, texture)
+
+    def shoot(self) -> Image:
+        """The picture in this pose; marks that stand behind something show through faintly."""
+        self._update(self._camera)
+        for geom, inside in self._drawn():
+            if inside:
+                geom.matid, geom.emission, geom.specular = -1, 0, 0.5
+                change = 0 * self._usual if self._textured else geom.rgba[:3] - self._usual
+                geom.rgba = [*_tint(np.array(HIGHLIGHT), change), max(0.35, geom.rgba[3])]
+        self._add_backdrop()
+        self._mark(self._scene)
+        picture = self._read(WIDTH, HEIGHT)
+        if self._textured:
+            own = self._bare(WIDTH, HEIGHT)
+            differs = _differs(own, self._usual, 4)
+            tinted = _tint(picture[differs] / 255, own[differs] / 255 - self._usual)
+            picture[differs] = np.round(255 * tinted)
+        through = picture[self._through].astype(float)
+        through += THROUGH * (self._faint - through)
+        picture[self._through] = np.round(through)
+        return picture
+
+    def _bare(self, width: int, height: int) -> Image:
+        """The part in its own colours, unlit; all else in the colour that is usual on it."""
+        self._update(self._camera)
+        for geom, inside in self._drawn():
+            geom.emission = 0
+            if inside:
+                geom.rgba[3] = max(0.35, geom.rgba[3])
+            else:
+                geom.matid = -1
+                geom.rgba[:3] = self._usual
+        self._add_backdrop()
+        self._scene.geoms[self._scene.ngeom - 1].rgba[:3] = self._usual
+        light = self._scene.lights[0]
+        light.ambient[:], light.diffuse[:], light.specular[:] = 1, 0, 0
+        return self._read(width, height)
+
+    def _drawn(self) -> list[tuple[mujoco.MjvGeom, bool]]:
+        """What the scene draws, and whether it is of the part."""
+        geom, part = int(mujoco.mjtObj.mjOBJ_GEOM), set(self.part)
+        shown = self._scene.geoms[: self._scene.ngeom]
+        return [(g, g.objtype == geom and g.objid in part) for g in shown]
+
+    def _add_backdrop(self) -> None:
+        """A plain background; MuJoCo has none for a model without a sky."""
+        frame = View(self._camera.azimuth, self._camera.elevation).frame()
+        far = 0.9 * self.model.vis.map.zfar * self.model.stat.extent
+        centre = self._camera.lookat + (far - self._camera.distance) * frame[2]
+        geom = self._scene.geoms[self._scene.ngeom]
+        rotation = (frame * [[1], [1], [-1]]).T.ravel()
+        lit = AMBIENT + DIFFUSE * float(frame[2] @ self._scene.lights[0].dir)
+        rgba = np.array([*(c / lit for c in BACKGROUND), 1], np.float32)
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        mujoco.mjv_initGeom(geom, plane, np.full(3, far), centre, rotation, rgba)
+        geom.specular = 0
+        self._scene.ngeom += 1
 
     def _update(self, camera: mujoco.MjvCamera) -> None:
         everything = mujoco.mjtCatBit.mjCAT_ALL.value
@@ -242,7 +330,8 @@ class Studio:
         right, up, forward = View(camera.azimuth, camera.elevation).frame()
         light = scene.lights[0]
         light.headlight = 0
-        light.dir[:] = forward - 0.55 * up + 0.35 * right
+        way = forward - 0.55 * up + 0.35 * right
+        light.dir[:] = way / np.linalg.norm(way)
 
     def _read(self, width: int, height: int, segments: bool = False) -> Image:
         for flag in (mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR):
@@ -254,53 +343,17 @@ class Studio:
         return image[::-1]
 
 
-def _with_sky(path: Path) -> mujoco.MjModel:
-    """The model, given a background if it has none; raises JodaError."""
-    spec, model = load(path)
-    if int(mujoco.mjtTexture.mjTEXTURE_SKYBOX) in model.tex_type:
-        return model
-    if spec.compiler.discardvisual:  # it discards textures too, as for URDF; do the rest by hand
-        spec.compiler.discardvisual = False
-        for geom in [g for g in spec.geoms if not (g.contype or g.conaffinity)]:
-            spec.delete(geom)
-    sky = spec.add_texture(name="joda_sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX)
-    sky.builtin, sky.width, sky.height = mujoco.mjtBuiltin.mjBUILTIN_FLAT, 8, 48
-    return spec.compile()
+def _tint(colour: Array, change: Array) -> Array:
+    """The highlight's colour where the part's own is changed by this; both RGB, shape (..., 3)."""
+    grey = change.mean(axis=-1, keepdims=True)
+    lit = colour + LIGHTER * np.maximum(grey, 0) * (1 - colour)
+    lit += DARKER * np.minimum(grey, 0) * colour
+    return np.asarray(np.clip(lit + TINGE * (change - grey), 0, 1))
 
 
-@dataclass(frozen=True)
-class Marks:
-    """The axis and the arrow towards +q.
-
-    Attributes:
-        line: ends of the axis, shape (2, 3).
-        path: the arrow's corners, shape (n, 3).
-        width: radius of the arrow, m.
-    """
-
-    line: Array
-    path: Array
-    width: float
-
-    def add(self, scene: mujoco.MjvScene) -> None:
-        """Adds them to what the scene draws."""
-        kind = mujoco.mjtGeom
-        _connect(scene, kind.mjGEOM_CAPSULE, 0.45 * self.width, self.line, AXIS)
-        for ends in zip(self.path[:-2], self.path[1:-1], strict=True):
-            _connect(scene, kind.mjGEOM_CAPSULE, self.width, ends, ARROW)
-        _connect(scene, kind.mjGEOM_ARROW, 2.2 * self.width, self.path[-2:], ARROW)
-
-
-def _connect(
-    scene: mujoco.MjvScene,
-    kind: mujoco.mjtGeom,
-    width: float,
-    ends: Array | tuple[Array, Array],
-    colour: tuple[float, float, float],
-) -> None:
-    geom = scene.geoms[scene.ngeom]
-    rgba = np.array([*colour, 1], np.float32)
-    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
-    mujoco.mjv_connector(geom, kind, width, *ends)
-    geom.emission = 0.35
-    scene.ngeom += 1
+def _differs(image: Image, colour: Array | tuple[float, ...], by: int) -> Mask:
+    """Which pixels differ from the colour, 0 to 1, by more than this in a channel, 0 to 255."""
+    middle = np.round(255 * np.array(colour))
+    low, high = (np.clip(middle + k, 0, 255).astype(np.uint8) for k in (-by, by))
+    far = (image < low) | (image > high)
+    return np.asarray(far[..., 0] | far[..., 1] | far[..., 2])
