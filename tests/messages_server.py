@@ -126,6 +126,7 @@ class Server:
         batches: bodies of the requests for a batch.
         results: function of a batch's entry to its result.
         looks: how many looks at a batch it takes until it has ended.
+        deaf: whether it hangs up on whoever looks at a batch.
     """
 
     def __init__(self):
@@ -133,6 +134,7 @@ class Server:
         self.requests, self.batches = [], []
         self.looks, self.seen, self.paths = 0, 0, []
         self.results = lambda entry: {"type": "succeeded", "message": message("{}")}
+        self.deaf = False
         self.released = threading.Event()
         self.url = ""
 
@@ -195,6 +197,9 @@ class Handler(BaseHTTPRequestHandler):
     def do_GET(self):
         state = self.server.state
         state.paths.append(self.path)
+        if state.deaf:
+            self.close_connection = True
+            return
         if not self.entitled():
             return
         found = re.fullmatch(r"/v1/messages/batches/batch_(\d+)(/results)?", self.path)

@@ -1,21 +1,26 @@
 """Asking a model: pictures go out, proposals come in, a failure is a sentence with its cost."""
 
 import json
+import os
 import re
 import subprocess
 import sys
 from io import BytesIO
+from pathlib import Path
 
 import anthropic
 import pytest
 from messages_server import error, message, serve
 from PIL import Image
-from test_prompts import TEMPLATES, answers, blank, images, png, task, texts, turn
+from test_prompts import TEMPLATES, answers, blank, images, task, texts, turn
 
 from joda import JodaError
+from joda.draw import png
 from joda.profile import Profile
 from joda.proposal import Proposal
+from joda.propose import Ask, BatchProposer, price
 from joda.propose import anthropic as proposer
+from joda.propose import batch as batches
 from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.prompt import MAX_TOKENS
 from joda.sheet import sheet as previews
@@ -211,14 +216,14 @@ def test_the_model_is_chosen_by_argument_environment_and_default(server, monkeyp
     monkeypatch.setenv("JODA_VLM", "claude-haiku-5-5")
     assert Anthropic().name == "anthropic:claude-haiku-5-5"
     assert Anthropic("claude-opus-5").name == "anthropic:claude-opus-5"
-    assert proposer.DEFAULT_MODEL in proposer.PRICES
+    assert proposer.DEFAULT_MODEL in price.PRICES
 
 
 def test_the_default_model_is_one_that_the_package_knows():
     from typing import get_args
 
     literal, _ = get_args(anthropic.types.ModelParam)
-    assert set(proposer.PRICES) <= set(get_args(literal))
+    assert set(price.PRICES) <= set(get_args(literal))
 
 
 def test_a_refusal_is_a_sentence_and_keeps_its_tokens(server):
@@ -279,6 +284,20 @@ def test_tokens_survive_a_failure_after_them(server):
     assert failure.usage.input_tokens == 1000 and failure.usage.requests == 2
 
 
+def test_tokens_survive_an_interruption_after_them(server, monkeypatch):
+    def hear(asked, text, wrong):
+        monkeypatch.setattr(proposer.Tally, "sent", stop)
+        return asked
+
+    def stop(tally, request, send):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(proposer.prompts, "repair", hear)
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        ask(server, message("{"))
+    assert stopped.value.usage.input_tokens == 1000
+
+
 def test_another_service_is_a_sentence(server):
     assert "does not answer as the Messages API does" in str(fails(server, "page"))
 
@@ -305,7 +324,7 @@ def test_the_ablation_yields_a_profile(server):
 
 @pytest.fixture
 def asks():
-    return [("fridge", task(), []), ("oven", task("oven"), [turn("oven")])]
+    return [Ask("fridge", task(), []), Ask("oven", task("oven"), [turn("oven")])]
 
 
 def by_joint(entry):
@@ -315,7 +334,9 @@ def by_joint(entry):
 
 
 def batch(server, asks, store, **options):
-    return Anthropic(MODEL, server.url).propose_many(asks, store, **options)
+    got = list(Anthropic(MODEL, server.url).propose_many(asks, store, **options))
+    assert sorted(name for name, _ in got) == sorted(ask.name for ask in asks)
+    return dict(got)
 
 
 def test_a_batch_answers_every_ask_at_half_the_price(server, asks, tmp_path):
@@ -327,7 +348,6 @@ def test_a_batch_answers_every_ask_at_half_the_price(server, asks, tmp_path):
         slept.append(seconds)
 
     got = batch(server, asks, store, progress=lambda *each: seen.append(each), sleep=sleep)
-    assert list(got) == ["fridge", "oven"]
     assert got["fridge"].proposal == proposed() and got["oven"].proposal is None
     # 1000 in and 200 out at 2 and 10 dollars per million, halved.
     assert got["fridge"].usage.dollars == pytest.approx(0.002)
@@ -353,6 +373,75 @@ def test_an_interrupted_batch_is_picked_up_and_not_paid_twice(server, asks, tmp_
     got = batch(server, asks, store)
     assert got["fridge"].proposal == proposed()
     assert len(server.batches) == 1 and not store.exists()
+
+
+def test_what_was_not_taken_before_an_interruption_comes_again(server, asks, tmp_path):
+    store = tmp_path / "batch.json"
+    server.results = by_joint
+    interrupted = Anthropic(MODEL, server.url).propose_many(asks, store)
+    first, _ = next(interrupted)
+    second, _ = next(interrupted)  # the first is taken
+    interrupted.close()
+    (kept,) = json.loads(store.read_text())["batches"]
+    assert len(kept["requests"]) == 1
+    again = [ask for ask in asks if ask.name == second]
+    assert list(batch(server, again, store)) == [second]
+    assert len(server.batches) == 1 and not store.exists()
+    assert first != second
+
+
+def test_a_failure_that_was_taken_is_asked_anew_and_not_counted_twice(server, asks, tmp_path):
+    store = tmp_path / "batch.json"
+    server.results = lambda entry: {"type": "succeeded", "message": message("", "refusal")}
+    interrupted = Anthropic(MODEL, server.url).propose_many(asks, store)
+    next(interrupted)
+    next(interrupted)
+    interrupted.close()
+    server.results = by_joint
+    got = batch(server, asks, store)
+    assert not any(isinstance(answer, JodaError) for answer in got.values())
+    (anew,) = server.batches[1]
+    assert len(server.batches[0]) == 2 and not store.exists()
+    assert anew["custom_id"] in {entry["custom_id"] for entry in server.batches[0]}
+
+
+def test_a_picture_that_is_none_fails_alone(server, asks, tmp_path):
+    server.results = by_joint
+    bad = Ask("bad", task(pictures=[b"no picture"]), [])
+    got = batch(server, [bad, *asks], tmp_path / "batch.json")
+    assert "is no image file" in str(got["bad"])
+    assert got["fridge"].proposal == proposed() and len(server.batches[0]) == 2
+
+
+def test_proposers_say_whether_they_take_batches(server):
+    from joda.propose.offline import Offline
+
+    assert isinstance(Anthropic(), BatchProposer)
+    assert not isinstance(Offline(), BatchProposer)
+
+
+def test_a_request_is_the_same_bytes_in_another_process(server, tmp_path):
+    """By its bytes a batch's request is known again: the pictures in it are drawn anew."""
+    code = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from test_prompts import answers, task, turn
+from joda.propose.anthropic import Anthropic, _key
+asked = Anthropic("claude-sonnet-5-5")._request(task("oven"), [turn("oven")])
+print(_key("oven", asked))
+"""
+    (tmp_path / "matplotlibrc").write_text(
+        "savefig.bbox: tight\nfont.size: 30\nfigure.dpi: 30\nsavefig.facecolor: red\n"
+    )
+    here = proposer._key("oven", Anthropic(MODEL)._request(task("oven"), [turn("oven")]))
+    run = subprocess.run(
+        [sys.executable, "-c", code, str(Path(__file__).parent)],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONHASHSEED": "2", "MPLBACKEND": "svg"},
+    )
+    assert run.stdout.strip() == here, run.stderr
 
 
 def test_what_is_new_is_asked_beside_what_is_running(server, asks, tmp_path):
@@ -393,7 +482,7 @@ def test_failures_in_a_batch_are_those_of_their_asks(server, tmp_path):
     server.results = lambda entry: next(
         outcome for wish, outcome in by_wish.items() if wish in texts(entry["params"])
     )
-    asks = [(name, task(description=f"wish of {name}"), []) for name in names]
+    asks = [Ask(name, task(description=f"wish of {name}"), []) for name in names]
     got = batch(server, asks, tmp_path / "batch.json")
     assert got["fine"].proposal == proposed()
     says = {"errored": "Bad", "expired": "expired", "canceled": "cancelled", "refused": "declined"}
@@ -405,7 +494,7 @@ def test_failures_in_a_batch_are_those_of_their_asks(server, tmp_path):
 def test_an_invalid_answer_in_a_batch_is_repaired_directly(server, tmp_path):
     server.results = lambda entry: {"type": "succeeded", "message": message("{")}
     server.script[:] = [reply()]
-    got = batch(server, [("fridge", task(), [])], tmp_path / "batch.json")["fridge"]
+    got = batch(server, [Ask("fridge", task(), [])], tmp_path / "batch.json")["fridge"]
     assert got.proposal == proposed() and got.usage.requests == 2
     assert len(server.batches) == len(server.requests) == 1
     assert got.usage.dollars == pytest.approx(0.002 + 0.004)
@@ -413,12 +502,12 @@ def test_an_invalid_answer_in_a_batch_is_repaired_directly(server, tmp_path):
 
 def test_large_batches_are_split(server, asks, tmp_path, monkeypatch):
     server.results = by_joint
-    monkeypatch.setattr(proposer, "BATCH_REQUESTS", 1)
+    monkeypatch.setattr(batches, "MAX_REQUESTS", 1)
     assert batch(server, asks, tmp_path / "batch.json")["fridge"].proposal == proposed()
     assert [len(each) for each in server.batches] == [1, 1]
-    monkeypatch.setattr(proposer, "BATCH_REQUESTS", 100_000)
+    monkeypatch.setattr(batches, "MAX_REQUESTS", 100_000)
     size = max(len(json.dumps(each)) for part in server.batches for each in part)
-    monkeypatch.setattr(proposer, "BATCH_BYTES", int(1.5 * size))
+    monkeypatch.setattr(batches, "MAX_BYTES", int(1.5 * size))
     assert batch(server, asks, tmp_path / "batch.json")["fridge"].proposal == proposed()
     assert [len(each) for each in server.batches] == [1, 1, 1, 1]
 
@@ -426,7 +515,7 @@ def test_large_batches_are_split(server, asks, tmp_path, monkeypatch):
 def test_mistakes_with_batches_are_sentences(server, asks, tmp_path, monkeypatch):
     store = tmp_path / "batch.json"
     with pytest.raises(JodaError, match="the same name"):
-        batch(server, [asks[0], ("fridge", task("oven"), [])], store)
+        batch(server, [asks[0], Ask("fridge", task("oven"), [])], store)
     store.write_text("{")
     with pytest.raises(JodaError, match=r"batch.json: not JSON"):
         batch(server, asks, store)

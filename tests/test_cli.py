@@ -14,6 +14,7 @@ from joda import COMMANDS, JodaError, Profile, bench, demo, plot
 from joda._bench import _without_plugin, hinges
 
 MODELS = Path(__file__).parents[1] / "models"
+LATCH = Path(__file__).parent / "microwave.latch.json"
 
 
 def joda(*arguments, cwd=None, **environment):
@@ -39,8 +40,8 @@ def fails(*arguments, cwd=None) -> str:
 
 @pytest.fixture
 def folder(tmp_path):
-    for name in ("microwave.xml", "microwave.latch.json"):
-        (tmp_path / name).write_bytes((MODELS / name).read_bytes())
+    for path in (MODELS / "microwave.xml", LATCH):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
     return tmp_path
 
 
@@ -107,7 +108,7 @@ def test_the_schema_describes_the_file():
     schema = json.loads(joda("schema", "composed").stdout)
     jsonschema.Draft202012Validator.check_schema(schema)
     validator = jsonschema.Draft202012Validator(schema)
-    good = json.loads((MODELS / "microwave.latch.json").read_text())
+    good = json.loads(LATCH.read_text())
     validator.validate(good)
     with pytest.raises(jsonschema.ValidationError):
         validator.validate({**good, "chanels": {}})
@@ -132,22 +133,26 @@ def test_a_hand_written_file_with_only_the_fixed_keys_is_valid(tmp_path):
 
 
 class TestDemo:
-    def test_the_door_with_the_latch_shuts_and_the_other_stays(self, tmp_path):
+    def test_the_door_stays_half_way_and_shuts_itself_and_the_plain_one_falls_open(self, tmp_path):
         result = demo(tmp_path / "out")
-        assert result.plain_end == pytest.approx(result.start, abs=1e-6)
-        assert abs(result.joda_end) < 0.002
-        assert 0 < result.shut_after < 1
-        for path in (result.plain, result.composed, result.scene, result.profile, result.picture):
+        assert result.plain_ends == pytest.approx((1.57, 1.57), abs=0.02)
+        half, nearly = result.joda_ends
+        assert half == pytest.approx(result.starts[0], abs=0.002)
+        assert abs(nearly) < 0.002
+        assert result.plain_force < 0 < result.joda_force
+        assert len(result.history.rounds) >= 2  # there was something to mend
+        assert not result.history.rounds[-1].unmet
+        for path in (result.plain, result.scene, result.picture, result.folder / "profile.png"):
             assert path.is_file()
 
     def test_it_prints_what_happened_as_json(self, tmp_path):
         result = joda("demo", "-o", tmp_path / "out", "--json")
-        assert json.loads(result.stdout)["shut_after"] < 1
+        assert json.loads(result.stdout)["joda_ends"][1] < 0.002
 
     def test_it_works_where_nothing_can_render(self, tmp_path):
         result = joda("demo", "-o", tmp_path / "out", MUJOCO_GL="disabled")
         assert result.returncode == 0
-        assert "shut itself" in result.stdout
+        assert "2.5 s later: without a profile at 90.0" in result.stdout
 
     def test_it_overwrites_only_when_told_to(self, tmp_path):
         (tmp_path / "mine.txt").write_text("mine")
@@ -175,7 +180,7 @@ class TestBench:
 
         joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
         native = _without_plugin(folder / "scene.xml", read_profiles(folder / "scene.xml"), True)
-        assert (native.nplugin, native.neq, native.njnt) == (0, 0, 1)
+        assert (native.nplugin, native.neq, native.njnt) == (0, 0, 4)
         assert native.dof_damping[0] > 0.1
         assert native.dof_frictionloss[0] == pytest.approx(0.07, rel=1e-6)
 

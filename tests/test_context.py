@@ -72,6 +72,74 @@ def test_inertia_of_a_joint_that_carries_a_linkage_varies(tmp_path):
     assert found.gravity_force == pytest.approx(-3 * G * 2 * np.cos(found.positions))
 
 
+ARM = """
+<mujoco model="workshop"><compiler angle="radian"/><asset><material name="brass"/></asset>
+<worldbody><body name="room"><body name="frame"><geom size=".1"/>
+  <body name="door" pos="1 2 3"><joint name="turn" pos="{anchor}" axis="0 0 1" range="0 2"/>
+    <geom name="leaf" type="box" size=".4 .02 .9" pos=".4 0 0" mass="2"/>
+    <body name="handle" pos=".8 .1 0"><joint name="press" axis="0 1 0" range="0 1"/>
+      <geom name="grip" type="box" size=".05 .03 .01" pos="0 .02 0" mass=".1" material="brass"/>
+    </body>
+  </body>
+</body></body></worldbody>
+<actuator>{actuators}</actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(("anchor", "x", "y"), [("0 0 0", 0, 0), ("-.3 .5 7", -0.3, 0.5)])
+def test_the_lever_arm_reaches_to_the_farthest_corner_from_the_axis(tmp_path, anchor, x, y):
+    """Of the grip: x from 0.75 to 0.85 m, y from 0.09 to 0.15 m, whatever the height; or leaf."""
+    found = context(write(tmp_path, ARM.format(anchor=anchor, actuators="")), "turn")
+    corners = [(0.85, 0.15), (0.85, 0.09), (0.8, -0.02), (0.8, 0.02)]
+    assert found.lever_arm == pytest.approx(max(np.hypot(a - x, b - y) for a, b in corners))
+    assert found.size == pytest.approx((0.85, 0.17, 1.8))
+
+
+def test_the_lever_arm_is_of_boxes_as_they_are_turned(tmp_path):
+    """A square plate of side 2 a, turned by 45 degrees, on a hinge in its corner: 2 a sqrt 2."""
+    text = """
+    <mujoco><worldbody><body><joint name="j" axis="0 1 0" range="0 90"/>
+      <geom type="box" size=".3 .1 .3" pos="0 0 {0}" euler="0 45 0"/></body></worldbody></mujoco>"""
+    found = context(write(tmp_path, text.format(0.3 * np.sqrt(2))), "j")
+    assert found.lever_arm == pytest.approx(0.6 * np.sqrt(2))
+    assert found.size == pytest.approx((0.6 * np.sqrt(2), 0.2, 0.6 * np.sqrt(2)))
+
+
+def test_a_slide_has_a_lever_arm_of_one_whatever_its_size(tmp_path):
+    text = LID.replace('name="lid" axis', 'name="lid" type="slide" axis')
+    found = context(write(tmp_path, text), "lid")
+    assert (found.lever_arm, found.size) == (1, pytest.approx((0.4, 0.3, 0.02)))
+
+
+@pytest.mark.parametrize(
+    ("actuator", "driven"),
+    [
+        ('<motor joint="turn"/>', True),
+        ('<motor jointinparent="turn"/>', True),
+        ('<motor joint="press"/>', False),
+    ],
+)
+def test_a_joint_is_driven_by_an_actuator_that_acts_on_it(tmp_path, actuator, driven):
+    found = context(write(tmp_path, ARM.format(anchor="0 0 0", actuators=actuator)), "turn")
+    assert found.driven is driven
+    assert ("driven by:" in found.describe()) is driven
+
+
+def test_an_actuator_on_a_tendon_of_the_same_number_does_not_drive_the_joint(tmp_path):
+    text = ARM.format(anchor="0 0 0", actuators='<motor tendon="t"/>')
+    tendon = '<tendon><fixed name="t"><joint joint="press" coef="1"/></fixed></tendon></mujoco>'
+    found = context(write(tmp_path, text.replace("</mujoco>", tendon)), "turn")
+    assert found.driven is False
+
+
+def test_names_begin_with_the_joint_and_its_body_and_surroundings_with_the_nearest(tmp_path):
+    path = write(tmp_path, ARM.format(anchor="0 0 0", actuators=""))
+    turn, press = context(path, "turn"), context(path, "press")
+    assert turn.names == ("turn", "door", "leaf", "handle", "grip", "brass")
+    assert turn.around == ("frame", "room", "workshop")
+    assert press.names == ("press", "handle", "grip", "brass")
+    assert press.around == ("door", "frame", "room", "workshop")
+
+
 def test_the_closed_end_may_be_the_high_one(tmp_path):
     path = write(tmp_path, LID.replace('range="0 2"', 'range="-2 0"'))
     assert context(path, "lid").closed_end == "high_end"

@@ -12,12 +12,13 @@ PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 LAYERS = [
     {"errors", "_build", "_core"},
     {"files", "plugin"},
+    {"runs"},
     {"profile"},
     {"field", "model", "mjcf", "template", "proposal"},
     {"scene", "motion", "offscreen", "_schema"},
     {"studio", "_context"},
     {"_attach", "_compile", "draw"},  # stages, never each other
-    {"_plot", "_bench", "_render", "sheet", "rig", "changes"},  # what combines them
+    {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx"},  # what combines them
     {"behaviour", "_templates"},
     {"wishes"},
     {"propose"},

@@ -9,18 +9,22 @@ import numpy as np
 import pytest
 from joints import warnings
 
-from joda import context
+from joda import context, generate
 
 MODELS = Path(__file__).parents[1] / "models"
 
 
 class Expected(NamedTuple):
-    """What a model is to be: the mass is that of the moving part in kg, the span in rad or m."""
+    """What a model is to be: the mass is that of the moving part in kg, the span in rad or m.
+
+    The joints of a robot arm, if there is one, come after the joint of the object.
+    """
 
     joint: str
     mass: tuple[float, float]
     span: float
     gravity: Literal["opens", "closes below 90 degrees", "none"]
+    arm: tuple[str, ...] = ()
 
 
 EXPECTED = {
@@ -30,7 +34,7 @@ EXPECTED = {
     "knob": Expected("knob", (0.015, 0.035), 4.71, "none"),
     "laptop": Expected("lid", (0.3, 0.7), 2.3, "closes below 90 degrees"),
     "lighter": Expected("button", (0.001, 0.003), 0.006, "opens"),
-    "microwave": Expected("door", (1, 2.5), 1.92, "none"),
+    "microwave": Expected("door", (1, 2.5), 1.92, "none", ("arm_pan", "arm_shoulder", "arm_elbow")),
     "oven": Expected("door", (4, 8), 1.57, "opens"),
     "refrigerator": Expected("door", (9, 15), 2.1, "none"),
     "switch": Expected("rocker", (0.008, 0.016), 0.4, "none"),
@@ -61,15 +65,19 @@ def test_every_model_is_listed():
 
 
 @each
-def test_the_one_joint_is_bare(name):
+def test_the_joint_is_bare(name):
     model, _ = load(name)
-    assert (model.njnt, model.nq, model.nv) == (1, 1, 1)
-    assert model.joint(0).name == EXPECTED[name].joint
+    names = (EXPECTED[name].joint, *EXPECTED[name].arm)
+    assert tuple(model.joint(k).name for k in range(model.njnt)) == names
+    assert (model.nq, model.nv) == (model.njnt, model.njnt)
     assert model.jnt_limited[0]
     assert model.jnt_range[0] == pytest.approx((0, EXPECTED[name].span))
     native = (model.dof_damping, model.dof_frictionloss, model.dof_armature, model.jnt_stiffness)
-    assert not np.any(native)
-    assert (model.nu, model.ntendon, model.neq) == (0, 0, 0)
+    assert not np.any(native, where=np.arange(model.nv) == 0)
+    driven = [model.joint(joint).name for joint in model.actuator_trnid[:, 0]]
+    assert driven == list(EXPECTED[name].arm)
+    assert (model.ntendon, model.neq) == (0, 0)
+    assert np.all(model.body_rootid[model.jnt_bodyid[1:]] != model.body_rootid[model.jnt_bodyid[0]])
 
 
 @each
@@ -149,3 +157,109 @@ def test_the_front_camera_sees_what_moves(name):
         x, y, z = data.cam_xmat[camera].reshape(3, 3).T @ away
         assert z < 0
         assert np.hypot(x, y) < -z * tangent
+
+
+RELEASED = np.pi / 3
+"""Where the microwave's door is when the arm comes, rad."""
+
+HOME, AWAY = (0.0, 0.0, 0.0), (0.93, 1.12, -1.41)
+SLIGHT_PUSH = (
+    (0.0, HOME),
+    (1.0, (0.61, 0.79, -0.89)),  # beside the door's top, at its outside
+    (1.3, (0.91, 1.06, -1.32)),  # the door is at 0.6 rad, and moves at 2 rad/s
+    (1.53, (1.13, 1.23, -1.6)),  # at 0.14 rad, where the latch begins: the tip stops
+    (1.7, (1.13, 1.23, -1.6)),
+    (2.2, AWAY),
+)
+ADDITIONAL_PUSH = (
+    (4.0, AWAY),
+    (5.0, (1.21, 1.27, -1.67)),  # 7 mm beyond the closed door's surface
+    (5.2, (1.21, 1.27, -1.67)),
+    (5.7, AWAY),
+    (6.7, HOME),
+)
+"""Times in s and the arm's targets in rad; linear in between."""
+
+
+def pushed(model, *pushes):
+    """The door's positions, rad, one per step, while the arm pushes and for two seconds more."""
+    path = np.array([(time, *target) for push in pushes for time, target in push])
+    data = mujoco.MjData(model)
+    data.joint("door").qpos = RELEASED
+    positions = []
+    for _ in range(round((path[-1, 0] + 2) / model.opt.timestep)):
+        data.ctrl = [np.interp(data.time, path[:, 0], target) for target in path.T[1:]]
+        mujoco.mj_step(model, data)
+        touching = {model.geom(k).name for contact in data.contact for k in contact.geom}
+        assert touching in (set(), {"arm_tip", "door_panel"})
+        positions.append(data.joint("door").qpos[0])
+    assert warnings(data) == 0
+    return np.array(positions)
+
+
+@pytest.fixture(scope="module", params=["", "1", "2", "3", "4"])
+def latched(request, tmp_path_factory):
+    """The microwave with the offline proposer's profile, compiled with one of several keys."""
+    folder = tmp_path_factory.mktemp("microwave")
+    generate(path("microwave"), "door", folder, proposer="offline", key=request.param)
+    return mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+
+
+def test_the_arm_stays_at_home():
+    """Home is where the model starts, targets of 0 hold it, and the door swings past it freely."""
+    model, data = load("microwave")
+    assert model.key("home").qpos == pytest.approx(model.qpos0)
+    assert np.all(model.key("home").ctrl == 0)
+    tip = model.site("arm_tip").id
+    mujoco.mj_forward(model, data)
+    start = data.site_xpos[tip].copy()
+    for speed in (4, -4):
+        data.joint("door").qvel = speed
+        for _ in range(round(1 / model.opt.timestep)):
+            mujoco.mj_step(model, data)
+            assert data.ncon == 0
+            assert data.site_xpos[tip] == pytest.approx(start, abs=1e-4)
+
+
+def test_the_door_clears_the_arm_at_home():
+    """By two centimetres at least, wherever the door is."""
+    model, data = load("microwave")
+    arm = [k for k in range(model.ngeom) if model.geom(k).name.startswith("arm_")]
+    door = [model.geom(name).id for name in ("door_panel", "door_handle")]
+    assert len(arm) == 6
+    for data.qpos[0] in np.linspace(*model.jnt_range[0], 101):
+        mujoco.mj_forward(model, data)
+        assert all(
+            mujoco.mj_geomDistance(model, data, a, b, 1, None) > 0.02 for a in arm for b in door
+        )
+
+
+def test_a_slight_push_does_not_latch_the_microwave(latched):
+    """The door leaves the tip, comes to the latch, and rests or is thrown back there."""
+    s = pushed(latched, SLIGHT_PUSH) / EXPECTED["microwave"].span
+    assert np.all(s > 0.04)
+    assert 0.06 < s[-1] < 0.1
+    assert np.all(s[-1000:] == pytest.approx(s[-1], abs=1e-3))
+
+
+def test_an_additional_push_latches_the_microwave(latched):
+    """It is still latched when the arm has gone home."""
+    s = pushed(latched, SLIGHT_PUSH, ADDITIONAL_PUSH) / EXPECTED["microwave"].span
+    assert np.all(np.abs(s[-1000:]) < 0.005)
+    assert s[round(4 / latched.opt.timestep)] > 0.06
+
+
+@pytest.mark.parametrize("latched", [""], indirect=True)
+def test_the_latch_throws_the_slightly_pushed_door_back(latched):
+    s = pushed(latched, SLIGHT_PUSH) / EXPECTED["microwave"].span
+    assert s[-1] > s.min() + 0.01
+
+
+def test_with_constant_damping_alone_the_slight_push_shuts_the_microwave():
+    model, _ = load("microwave")
+    model.dof_damping[0] = 0.3
+    s = pushed(model, SLIGHT_PUSH) / EXPECTED["microwave"].span
+    left = round(1.55 / model.opt.timestep)
+    assert s[left] > 0.03
+    assert s.min() <= 0
+    assert s[-1] < 0.03

@@ -14,23 +14,18 @@ from PIL import Image
 
 from joda import JodaError, compile, context, render
 from joda.behaviour import behaviour
-from joda.draw import draw
+from joda.draw import draw, png
 from joda.profile import Profile
 from joda.proposal import EffectProposal, JointSummary, Proposal, RefineFactor, Strength
 from joda.propose import Task, Turn, prompt
 from joda.propose.file import FileProposer
+from joda.propose.price import tokens
 from joda.sheet import sheet
 from joda.template import read_templates
 
 MODELS = Path(__file__).parents[1] / "models"
 EXCHANGES = Path(__file__).parent / "exchanges"
 TEMPLATES = read_templates()
-
-
-def png(figure):
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=figure.dpi)
-    return out.getvalue()
 
 
 def blank(width, height, colour="white"):
@@ -175,7 +170,7 @@ def test_three_rounds_stay_within_twelve_thousand_tokens(pictures, previews):
     for rounds in range(3):
         asked = prompt.request(asked_of, turns[:rounds], previews)
         check(body(asked))
-        assert 6_000 < prompt.tokens(asked) <= 12_000
+        assert 6_000 < tokens(asked) <= 12_000
         assert sum("cache_control" in json.dumps(message) for message in asked["messages"]) >= 1
 
 
@@ -197,13 +192,13 @@ def test_more_pictures_are_smaller_ones():
     few = prompt.request(task(pictures=[blank(960, 720)] * 5), [])
     many = prompt.request(task(pictures=[blank(960, 720)] * 20), [])
     assert images(many)[0].size == (352, 264)
-    assert prompt.tokens(many) < 1.1 * prompt.tokens(few)
+    assert tokens(many) < 1.1 * tokens(few)
 
 
 def test_tokens_of_a_picture_are_its_patches():
-    without = prompt.tokens(prompt.request(task(), []))
+    without = tokens(prompt.request(task(), []))
     asked = prompt.request(task(pictures=[blank(280, 56)]), [])
-    assert 20 < prompt.tokens(asked) - without < 20 + 60  # 10 x 2 patches, and the words above
+    assert 20 < tokens(asked) - without < 20 + 60  # 10 x 2 patches, and the words above
 
 
 def test_system_and_sheet_are_the_same_bytes_for_all_joints(previews):

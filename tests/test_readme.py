@@ -34,7 +34,8 @@ def folder(tmp_path_factory):
 
 
 def test_there_are_commands():
-    assert {"demo", "attach", "plot", "bench", "schema"} <= {line.split()[1] for line in COMMANDS}
+    named = {"demo", "generate", "revise", "attach", "plot", "bench", "schema"}
+    assert named <= {line.split()[1] for line in COMMANDS}
 
 
 @pytest.mark.parametrize("command", COMMANDS)

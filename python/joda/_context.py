@@ -42,7 +42,8 @@ class Context(BaseModel):
         closed_end: the end at which the joint's reference position lies, "unknown" if it lies at
             neither; opening is the motion away from it.
         lever_arm: where a hand would take hold. Hinge: distance from the axis to the farthest point
-            of what moves, m; slide: 1. Times a hand's force (N) it gives the generalised force.
+            of what moves (of a body without geoms, its radius of gyration), m; slide: 1. Times a
+            hand's force (N) it gives the generalised force.
         size: of the box around what moves, along the world's axes, at the low end; m.
         driven: whether an actuator acts on the joint.
         names: what the file calls the joint, the child and what moves with it, in this order.
@@ -140,7 +141,8 @@ def context(model: str | Path, joint: str) -> Context:
         gravity_scale=float(np.abs(gravity).max()),
         upper_end=_upper_end(height),
         closed_end=_closed_end(described, float(m.qpos0[m.jnt_qposadr[j]])),
-        lever_arm=_lever_arm(described, points, data.xanchor[j], data.xaxis[j]),
+        lever_arm=_lever_arm(described, points, data.xanchor[j], data.xaxis[j])
+        or float(np.sqrt(inertia.mean() / m.body_subtreemass[body])),
         size=_vector(np.ptp(points, axis=0)),
         driven=_driven(m, j),
         names=_names(m, j),

@@ -1,28 +1,33 @@
-"""The first contact: a microwave that shuts itself, beside the same one without a profile."""
+"""The first contact: an oven door gets its behaviour, beside the same door without a profile."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from joda._attach import attach
-from joda._plot import plot
-from joda.draw import write_png
+from joda._context import context
+from joda._generate import generate
+from joda.behaviour import FIRMNESS, SLOW, grip
+from joda.draw import house_style, write_png
 from joda.errors import JodaError
-from joda.files import make_folder, write_bytes, write_text
+from joda.files import make_folder, write_bytes
+from joda.history import History
 from joda.model import find_joint, load_model
-from joda.motion import Motion, release
+from joda.motion import Motion, pull, release
 from joda.offscreen import Image, render
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-START = np.deg2rad(3.0)
-DURATION = 1.0
+MODEL, JOINT = "oven.xml", "door"
+STARTS = (np.deg2rad(45.0), np.deg2rad(5.0))
+DURATION = 2.5
+NAMES = ("without a profile", "with its profile")
+COLOURS = ("#888888", "#c8202f")
 
 
 @dataclass(frozen=True)
@@ -30,25 +35,26 @@ class Demo:
     """What the demo left behind, and what it saw.
 
     Attributes:
-        plain: the microwave as it comes.
-        composed: its profile.
-        scene: the microwave with the profile.
-        profile: picture of the profile.
-        picture: both doors, released nearly closed.
-        start: where they were let go, rad.
-        plain_end, joda_end: where they were after `duration` seconds, rad.
-        shut_after: when the door with the profile reached 0, s.
+        folder: with the oven, and all that `joda.generate` leaves.
+        plain, scene: the oven as it comes, and with the profile.
+        picture: both doors beside each other.
+        history: the rounds of the generation.
+        starts: where the doors were let go, rad: half-way and nearly closed.
+        plain_ends, joda_ends: where they were `duration` seconds later, rad.
+        plain_force, joda_force: what a hand that opens them slowly needs most, N·m; negative where
+            it holds the door back.
     """
 
+    folder: Path
     plain: Path
-    composed: Path
     scene: Path
-    profile: Path
     picture: Path
-    start: float
-    plain_end: float
-    joda_end: float
-    shut_after: float
+    history: History
+    starts: tuple[float, float]
+    plain_ends: tuple[float, float]
+    joda_ends: tuple[float, float]
+    plain_force: float
+    joda_force: float
     duration: float
 
 
@@ -58,7 +64,7 @@ def demo(
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Demo:
-    """Attaches the bundled latch to the bundled microwave and lets both doors go at 3 degrees.
+    """The main job on the bundled oven: `joda.generate` offline, then both doors in motion.
 
     Args:
         output: folder for everything that is made; created if missing. By default joda_demo, or
@@ -76,36 +82,38 @@ def demo(
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not force:
         raise JodaError(f"{folder}: exists already; choose another folder with -o or add --force.")
     make_folder(folder)
-    plain, composed = folder / "microwave.xml", folder / "composed.json"
-    progress("writing the microwave and its latch")
+    plain, scene = folder / MODEL, folder / "scene.xml"
     with as_file(files("joda") / "models") as models:
-        write_bytes(plain, (models / "microwave.xml").read_bytes())
-        write_text(composed, (models / "microwave.latch.json").read_text("utf-8"))
-    scene = folder / "scene.xml"
-    attach(plain, composed, scene, force=True)
+        write_bytes(plain, (models / MODEL).read_bytes())
+    made = generate(plain, JOINT, folder, proposer="offline", force=True, progress=progress)
 
-    progress("drawing the profile")
-    model, before = load_model(scene), load_model(plain)
-    joint = find_joint(model, "door")
-    profile = plot(scene, folder / "profile.png", force=True)
-
-    progress("letting both doors go at 3 degrees")
-    motions = [release(m, joint, START, DURATION) for m in (before, model)]
-    picture = folder / "release.png"
+    progress("letting both doors go, opening both by hand")
+    both = [load_model(path) for path in (plain, scene)]
+    joint = find_joint(both[0], JOINT)
+    let_go = [[release(model, joint, start, DURATION) for model in both] for start in STARTS]
+    found = context(plain, JOINT)
+    hand = grip(found), FIRMNESS * found.lever_arm**2, SLOW
+    opened = [pull(model, joint, *found.joint.range, *hand) for model in both]
     progress("drawing both doors")
-    views = render(scene, "front", "door", [motion.position[-1] for motion in motions])
-    write_png(_picture(motions, views or []), picture, force=True)
-    shut = motions[1].time[motions[1].position <= 0]
+    ends = [float(motion.position[-1]) for motion in let_go[0]]
+    views = render(scene, "front", JOINT, [float(STARTS[0]), *ends])
+    picture = folder / "demo.png"
+    write_png(_picture(let_go, opened, views or []), picture, force=True)
+    plain_ends, joda_ends = zip(
+        *[[float(m.position[-1]) for m in pair] for pair in let_go], strict=True
+    )
+    forces = [float(motion.force[np.argmax(np.abs(motion.force))]) for motion in opened]
     return Demo(
+        folder=folder,
         plain=plain,
-        composed=composed,
         scene=scene,
-        profile=profile,
         picture=picture,
-        start=float(START),
-        plain_end=float(motions[0].position[-1]),
-        joda_end=float(motions[1].position[-1]),
-        shut_after=float(shut[0]) if len(shut) else float("nan"),
+        history=made.history,
+        starts=(float(STARTS[0]), float(STARTS[1])),
+        plain_ends=plain_ends,
+        joda_ends=joda_ends,
+        plain_force=forces[0],
+        joda_force=forces[1],
         duration=DURATION,
     )
 
@@ -115,35 +123,46 @@ def _fresh(name: str) -> Path:
     return next(path for path in candidates if not path.exists())
 
 
-def _picture(motions: list[Motion], views: Sequence[Image]) -> "Figure":
+def _picture(let_go: list[list[Motion]], opened: list[Motion], views: Sequence[Image]) -> "Figure":
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 5.2 if views else 4), dpi=130, layout="constrained")
-    names = ("without a profile", "with the latch profile")
-    colours = ("#888888", "#c8202f")
-    grid = figure.add_gridspec(
-        len(views) or 1, 2 if views else 1, width_ratios=[2, 1] if views else None
-    )
-    axes = figure.add_subplot(grid[:, 0])
-    for motion, name, colour in zip(motions, names, colours, strict=True):
-        axes.plot(motion.time, np.rad2deg(motion.position), color=colour, lw=2.2, label=name)
-    axes.axhline(0, color="#333333", lw=0.8)
-    axes.annotate(
-        "closed",
-        (DURATION, 0),
-        ha="right",
-        va="bottom",
-        fontsize=9,
-        xytext=(0, 2),
-        textcoords="offset points",
-    )
-    axes.set(xlabel="time (s)", ylabel="door angle (degrees)", xlim=(0, DURATION))
-    axes.set_title("A microwave door, let go at 3 degrees", loc="left")
-    axes.legend(frameon=False)
-    axes.spines[["top", "right"]].set_visible(False)
-    for k, (view, name) in enumerate(zip(views, names, strict=False)):
-        image = figure.add_subplot(grid[k, 1])
-        image.imshow(view)
-        image.set_title(f"{name}, after {DURATION:g} s", fontsize=9)
-        image.axis("off")
-    return figure
+    with house_style():
+        figure = Figure(figsize=(12, 7.2 if views else 3.8), dpi=120, layout="constrained")
+        grid: Any = figure.add_gridspec(
+            2 if views else 1, 3, height_ratios=[1, 0.9][: 1 + bool(views)]
+        )
+        upper = [figure.add_subplot(grid[0, k]) for k in range(3)]
+        for axes, pair, start in zip(upper, let_go, STARTS, strict=False):
+            for motion, name, colour in zip(pair, NAMES, COLOURS, strict=True):
+                axes.plot(
+                    motion.time, np.rad2deg(motion.position), color=colour, lw=2.2, label=name
+                )
+            axes.set(xlabel="time (s)", ylabel="door angle (degrees)", ylim=(-4, 100))
+            axes.axhline(0, color="#333333", lw=0.8)
+            axes.set_title(f"let go at {np.rad2deg(start):.0f} degrees", loc="left", fontsize=11)
+        for motion, name, colour in zip(opened, NAMES, COLOURS, strict=True):
+            angle = np.rad2deg(motion.position)
+            upper[2].plot(angle, motion.force, color=colour, lw=2.2, label=name)
+        upper[2].axhline(0, color="#333333", lw=0.8)
+        upper[2].set(xlabel="door angle (degrees)", ylabel="torque of the hand (N·m)")
+        upper[2].set_title("opened slowly by hand", loc="left", fontsize=11)
+        for text, height, base in (("it pulls", 0.98, "top"), ("it holds back", 0.02, "bottom")):
+            upper[2].text(
+                0.98,
+                height,
+                text,
+                transform=upper[2].transAxes,
+                ha="right",
+                va=base,
+                color="#777777",
+            )
+        upper[0].legend(frameon=False, loc="lower right")
+        for axes in upper:
+            axes.spines[["top", "right"]].set_visible(False)
+        titles = ("let go here", *(f"{name}, {DURATION:g} s later" for name in NAMES))
+        for k, (view, title) in enumerate(zip(views, titles, strict=False)):
+            axes = figure.add_subplot(grid[1, k])
+            axes.imshow(view)
+            axes.set_title(title, fontsize=11, loc="left")
+            axes.axis("off")
+        return figure

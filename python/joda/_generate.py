@@ -1,14 +1,18 @@
 """The main job: from a joint to a profile that behaves like the object, in rounds."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import mujoco
+
 from joda.errors import JodaError
 from joda.history import History
+from joda.model import find_joint, joint_name, joint_type, load_model
+from joda.proposal import Proposal
 from joda.propose import Proposer
-from joda.session import Session
+from joda.session import Progress, Session, relative, silent
 
 ROUNDS = 3
 
@@ -31,10 +35,10 @@ class Generated:
 
 def generate(
     model: str | Path,
-    joint: str | None = None,
-    output: str | Path | None = None,
+    joint: str | None,
+    output: str | Path,
     *,
-    proposer: str | Proposer | None = None,
+    proposer: str | Path | Proposer | None = None,
     rounds: int = ROUNDS,
     describe: str = "",
     templates: Sequence[str | Path] = (),
@@ -42,23 +46,26 @@ def generate(
     vlm: str | None = None,
     resume: bool = False,
     force: bool = False,
-    progress: Callable[[str], None] = lambda what: None,
+    progress: Progress = silent,
 ) -> Generated:
     """Proposes a joint's effects, compiles and simulates them, and revises until they fit.
 
     Args:
         model: MJCF or URDF file.
-        joint: a hinge or slide with a range, as `joda.model.find_joint` takes it.
+        joint: a hinge or slide with a range, as `joda.model.find_joint` takes it. None: the only
+            one of the model.
         output: folder to fill; made if missing.
         proposer: "anthropic", "offline", the path of a proposal.json, or an object with a
             `propose` of its own. By default anthropic where ANTHROPIC_API_KEY is set, else offline.
-        rounds: at most so many proposals.
+        rounds: at most so many proposals, those of before included.
         describe: what the joint should do, in words.
         templates: further folders of effect templates.
         key: another key draws other strengths within the labels' bands.
         vlm: name of the model that the anthropic proposer asks.
-        resume: go on with what the folder holds, where its last round left it.
-        force: overwrite what another generation left in the folder.
+        resume: go on with what the folder holds, where its last round left it; `describe`,
+            `templates` and `key` are those of before.
+        force: overwrite what another generation left in the folder; with `resume`, go on although
+            composed.json was edited by hand since, the edit is lost.
         progress: told what is being done.
 
     Returns:
@@ -68,44 +75,71 @@ def generate(
         JodaError: a file cannot be read or written, the joint does not fit, or no proposal was to
             be had; what was made and spent until then is in the folder.
     """
-    if rounds < 1:
-        raise JodaError(f"rounds is {rounds}; give at least 1.")
-    if joint is None or output is None:
-        raise JodaError("give a joint and a folder, with --joint and -o.")
-    chosen = choose(proposer, key, vlm)
-    folder = Path(output)
-    if resume and (folder / "history.json").is_file():
-        session = Session.resume(folder, progress)
-        _check_same(session, Path(model), joint)
-    else:
+    check_rounds(rounds)
+    folder, source = Path(output), Path(model)
+    name = joint if joint is not None else _only_joint(source)
+    further = [Path(path) for path in templates]
+    if not resume or not (folder / "history.json").is_file():
         _check_free(folder, force)
-        further = [Path(path) for path in templates]
-        session = Session.start(folder, Path(model), joint, describe, further, key, progress)
-    run(session, chosen, rounds)
+        choose(proposer, key, vlm)  # a mistake in it is found before anything is made
+    session = begin(folder, source, name, describe, further, key, resume, progress)
+    run(session, choose(proposer, session.history.key, vlm), rounds, force)
     return Generated(folder, session.history, tuple(session.notes))
 
 
-def run(session: Session, proposer: Proposer, rounds: int) -> None:
+def run(session: Session, proposer: Proposer, rounds: int, force: bool = False) -> None:
     """Asks the proposer until it has nothing to change, or `rounds` proposals are made.
 
     Raises:
-        JodaError: no proposal was to be had; what it cost is kept.
+        JodaError: no proposal was to be had; what it cost is kept. Or composed.json was edited and
+            `force` is off.
     """
-    while not session.history.complete and len(session.history.rounds) < rounds:
-        session.progress(f"round {len(session.history.rounds) + 1}: asking {proposer.name}")
-        try:
-            answer = proposer.propose(session.task, session.turns)
-        except JodaError as error:
-            session.fail(error)
-            raise
-        session.take(answer, proposer.name)
+    if session.pending(rounds) and not force:
+        session.check_unedited()
+    while session.pending(rounds):
+        session.ask(proposer)
 
 
-def choose(proposer: str | Proposer | None, key: str = "", vlm: str | None = None) -> Proposer:
+def begin(
+    folder: Path,
+    model: Path,
+    joint: str,
+    describe: str,
+    templates: Sequence[Path],
+    key: str,
+    resume: bool,
+    progress: Progress = silent,
+) -> Session:
+    """The session that a folder holds, if it is to be resumed, or a new one; raises JodaError."""
+    if not resume or not (folder / "history.json").is_file():
+        return Session.start(folder, model, joint, describe, templates, key, progress)
+    history = History.read(folder / "history.json")
+    if history.model != relative(model, folder) or not _same(model, joint, history.joint):
+        raise JodaError(
+            f"{folder}: holds joint '{history.joint}' of {(folder / history.model).resolve()}; "
+            "resume with the same, or choose another folder with -o."
+        )
+    given = {
+        "describe": (describe, history.description),
+        "templates": (tuple(relative(path, folder) for path in templates), history.templates),
+        "key": (key, history.key),
+    }
+    for option, (now, then) in given.items():
+        if now and now != then:
+            raise JodaError(
+                f"{folder}: was begun with another --{option}; leave it out to go on with that, or "
+                "choose another folder with -o."
+            )
+    return Session.resume(folder, progress)
+
+
+def choose(
+    proposer: str | Path | Proposer | None, key: str = "", vlm: str | None = None
+) -> Proposer:
     """The proposer that is meant; see `generate`. Raises JodaError."""
-    if proposer is not None and not isinstance(proposer, str):
+    if proposer is not None and not isinstance(proposer, str | Path):
         return proposer
-    name = proposer or ("anthropic" if os.environ.get("ANTHROPIC_API_KEY") else "offline")
+    name = str(proposer or ("anthropic" if os.environ.get("ANTHROPIC_API_KEY") else "offline"))
     if name == "offline":
         from joda.propose.offline import Offline
 
@@ -118,20 +152,55 @@ def choose(proposer: str | Proposer | None, key: str = "", vlm: str | None = Non
         raise JodaError(f"{name}: no such proposer or file; give anthropic, offline or a file.")
     from joda.propose.file import FileProposer
 
+    Proposal.read(name)
     return FileProposer(Path(name))
 
 
+def check_rounds(rounds: int) -> None:
+    """Raises JodaError if there are none."""
+    if rounds < 1:
+        raise JodaError(f"rounds is {rounds}; give at least 1.")
+
+
 def _check_free(folder: Path, force: bool) -> None:
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not force:
-        more = " or go on with --resume" if (folder / "history.json").is_file() else ""
-        raise JodaError(
-            f"{folder}: exists already; choose another folder with -o, add --force{more}."
-        )
+    """Raises JodaError if the folder holds anything but a generation that came to nothing."""
+    if force or not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+        return
+    path = folder / "history.json"
+    if path.is_file():
+        history = History.read(path)
+        if not history.rounds and not history.failures:
+            return
+    more = " or go on with --resume" if path.is_file() else ""
+    raise JodaError(f"{folder}: exists already; choose another folder with -o, add --force{more}.")
 
 
-def _check_same(session: Session, model: Path, joint: str) -> None:
-    if session.model.resolve() != model.resolve() or session.history.joint != joint:
-        raise JodaError(
-            f"{session.folder}: holds joint '{session.history.joint}' of {session.model}; resume "
-            "with the same, or choose another folder with -o."
-        )
+def _only_joint(path: Path) -> str:
+    """The model's only hinge or slide with a range; raises JodaError if it has several or none."""
+    names = ranged(load_model(path))
+    if len(names) == 1:
+        return names[0]
+    listed = ", ".join(f"'{name}'" for name in names)
+    raise JodaError(
+        f"{path}: choose a joint with --joint: {listed}."
+        if names
+        else f'{path}: holds no hinge or slide with a range; add range="lo hi" to the joint.'
+    )
+
+
+def ranged(model: mujoco.MjModel) -> list[str]:
+    """Names of the joints that can have a profile."""
+    return [
+        joint_name(model, k)
+        for k in range(model.njnt)
+        if joint_type(model, k) in ("hinge", "slide")
+        and model.jnt_range[k][0] < model.jnt_range[k][1]
+    ]
+
+
+def _same(path: Path, one: str, other: str) -> bool:
+    """Whether two addresses mean the same joint."""
+    if one == other:
+        return True
+    model = load_model(path)
+    return find_joint(model, one) == find_joint(model, other)

@@ -3,15 +3,25 @@
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-from joda._generate import ROUNDS, Generated, choose, run
+from joda._generate import ROUNDS, Generated, begin, check_rounds, choose, ranged, run
 from joda.errors import JodaError
-from joda.files import make_folder
-from joda.model import joint_name, joint_type, load_model
-from joda.propose import Proposer
+from joda.files import make_folder, read_text
+from joda.model import load_model
+from joda.propose import Ask, BatchProposer, Proposer
 from joda.session import Session
 
 Advance = Callable[[int, int, str], None]
+Results = dict[str, Generated | JodaError]
+
+
+class _Job(NamedTuple):
+    """A joint, and the folder for it."""
+
+    model: Path
+    joint: str
+    folder: Path
 
 
 def generate_all(
@@ -19,7 +29,7 @@ def generate_all(
     output: str | Path,
     *,
     joint: str | None = None,
-    proposer: str | Proposer | None = None,
+    proposer: str | Path | Proposer | None = None,
     rounds: int = ROUNDS,
     describe: str = "",
     templates: Sequence[str | Path] = (),
@@ -28,117 +38,170 @@ def generate_all(
     resume: bool = False,
     force: bool = False,
     progress: Advance = lambda done, total, what: None,
-) -> dict[str, Generated | JodaError]:
+) -> Results:
     """`joda.generate` for all hinges and slides with a range, of all models below a folder.
 
-    A proposer with a `propose_many`, as anthropic's with its Message Batches, is asked for a round
+    A `joda.propose.BatchProposer`, as anthropic's with its Message Batches, is asked for a round
     of all joints at once. Interrupted, the same call with `resume` goes on.
 
     Args:
-        models: folder with MJCF and URDF files; those that cannot be loaded by themselves, being
-            included by others, are passed over.
+        models: folder with MJCF and URDF files; those that are only parts of others, and cannot be
+            loaded by themselves, are passed over.
         output: folder to fill, with a folder per model and in it one per joint.
         joint: only the joints of this name.
         proposer, rounds, describe, templates, key, vlm: as for `joda.generate`.
         resume: go on with what the folder holds; what is complete stays.
-        force: overwrite what another generation left in the folder.
+        force: overwrite what another generation left in the folder, with `resume` profiles that
+            were edited by hand.
         progress: told how many joints are done, of how many, and what is being done.
 
     Returns:
-        "model/joint" to what was made, or to the reason why nothing was.
+        "model/joint" to what was made, or to the reason why nothing was; "model" to the reason why
+        it cannot be loaded.
 
     Raises:
-        JodaError: no joint is found, or the folder holds files already.
+        JodaError: no joint is found, the folder holds files already, or the proposer is not to be
+            had.
     """
+    check_rounds(rounds)
     source, target = Path(models), Path(output)
-    if target.exists() and any(target.iterdir()) and not (force or resume):
-        raise JodaError(
-            f"{target}: exists already; choose another folder with -o, add --force or go on with "
-            "--resume."
-        )
+    _check_target(target, force or resume)
     chosen = choose(proposer, key, vlm)
-    found = [item for item in _joints(source) if joint in (None, item[1])]
-    if not found:
-        raise JodaError(f"{source}: holds no model with a hinge or slide that has a range.")
+    done: Results = {}
+    jobs = _jobs(source, target, joint, done)
     make_folder(target)
-    out: dict[str, Generated | JodaError] = {}
-    sessions: dict[str, Session] = {}
     further = [Path(path) for path in templates]
-    many = hasattr(chosen, "propose_many")
-    for number, (path, name) in enumerate(found):
-        label = f"{path.relative_to(source).with_suffix('').as_posix()}/{name}"
-        folder = target / path.relative_to(source).with_suffix("") / _file_name(name)
-        progress(number, len(found), label)
+    sessions: dict[str, Session] = {}
+    batched = chosen if isinstance(chosen, BatchProposer) else None
+    for number, (label, job) in enumerate(jobs.items()):
+        progress(number, len(jobs), label)
         try:
-            if resume and (folder / "history.json").is_file():
-                session = Session.resume(folder)
-            else:
-                session = Session.start(folder, path, name, describe, further, key)
+            session = begin(job.folder, job.model, job.joint, describe, further, key, resume)
+            if batched is None:
+                run(session, choose(proposer, session.history.key, vlm), rounds, force)
+            elif session.pending(rounds) and not force:
+                session.check_unedited()
             sessions[label] = session
-            if not many:
-                run(session, chosen, rounds)
         except JodaError as error:
-            out[label] = error
-    if many:
-        _run_many(sessions, chosen, rounds, target / "batch.json", out, progress)
+            done[label] = error
+    if batched is not None:
+        _run_many(sessions, batched, rounds, target / "batch.json", done, progress)
     for label, session in sessions.items():
-        if label not in out:
-            out[label] = Generated(session.folder, session.history, tuple(session.notes))
-    progress(len(found), len(found), "done")
-    return out
+        if label not in done:
+            done[label] = Generated(session.folder, session.history, tuple(session.notes))
+    progress(len(jobs), len(jobs), "done")
+    return dict(sorted(done.items()))
 
 
 def _run_many(
     sessions: dict[str, Session],
-    proposer: Proposer,
+    proposer: BatchProposer,
     rounds: int,
     store: Path,
-    failed: dict[str, Generated | JodaError],
+    failed: Results,
     progress: Advance,
 ) -> None:
     """Rounds of all sessions at once, until all are complete or have failed."""
     while True:
-        open_ = {
+        left = {
             label: session
             for label, session in sessions.items()
-            if label not in failed
-            and not session.history.complete
-            and len(session.history.rounds) < rounds
+            if label not in failed and session.pending(rounds)
         }
-        if not open_:
+        if not left:
             return
-        closed = len(sessions) - len(open_)
+        closed = len(sessions) - len(left)
 
         def told(done: int, total: int, closed: int = closed) -> None:
-            progress(closed + done, len(sessions), f"asking {proposer.name}")
+            progress(closed, len(sessions), f"asking {proposer.name}, {done} of {total} answered")
 
-        asks = [(label, session.task, session.turns) for label, session in open_.items()]
-        for label, answer in proposer.propose_many(asks, store, told).items():  # type: ignore[attr-defined]
+        asks = [Ask(label, session.task, session.turns) for label, session in left.items()]
+        for label, answer in proposer.propose_many(asks, store, told):
+            progress(closed, len(sessions), f"simulating {label}")
             try:
-                if isinstance(answer, JodaError):
-                    open_[label].fail(answer)
-                    raise answer
-                open_[label].take(answer, proposer.name)
+                left[label].take(answer, proposer.name)
             except JodaError as error:
                 failed[label] = error
 
 
-def _joints(folder: Path) -> Iterator[tuple[Path, str]]:
-    """Models below the folder that load, and their joints that can have a profile."""
-    if not folder.is_dir():
-        raise JodaError(f"{folder}: no such folder.")
-    for path in sorted(folder.rglob("*")):
-        if path.suffix.lower() not in (".xml", ".urdf"):
-            continue
+def _check_target(folder: Path, allowed: bool) -> None:
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not allowed)):
+        raise JodaError(
+            f"{folder}: exists already; choose another folder with -o, add --force or go on with "
+            "--resume."
+        )
+
+
+def _jobs(source: Path, target: Path, joint: str | None, failed: Results) -> dict[str, _Job]:
+    """The joints to be done, by label; models that cannot be loaded are added to `failed`."""
+    jobs: dict[str, _Job] = {}
+    others = set()
+    for path, stem, part in _models(source, target):
         try:
-            model = load_model(path)
-        except JodaError:
+            names = ranged(load_model(path))
+        except JodaError as error:
+            if not part:
+                failed[stem] = error
             continue
-        for k in range(model.njnt):
-            lo, hi = model.jnt_range[k]
-            if joint_type(model, k) in ("hinge", "slide") and lo < hi:
-                yield path, joint_name(model, k)
+        taken: set[str] = set()
+        for name in names:
+            folder = target / stem / _unique(_file_name(name), taken)
+            if joint in (None, name):
+                jobs[f"{stem}/{name}"] = _Job(path, name, folder)
+            else:
+                others.add(name)
+    if not jobs and others:
+        listed = ", ".join(f"'{name}'" for name in sorted(others))
+        raise JodaError(f"{source}: no model has a joint '{joint}'; there are: {listed}.")
+    if not jobs:
+        reasons = " ".join(map(str, failed.values()))
+        raise JodaError(
+            reasons or f"{source}: holds no model with a hinge or slide that has a range."
+        )
+    return jobs
+
+
+def _models(source: Path, target: Path) -> Iterator[tuple[Path, str, bool]]:
+    """MJCF and URDF files below the folder, but for what joda made there.
+
+    Yields:
+        path, a name of its own (the path without its ending, where that is the only one), and
+        whether another file includes it.
+    """
+    if not source.is_dir():
+        raise JodaError(f"{source}: no such folder.")
+    made = target.resolve()
+    texts = {
+        path: _text(path)
+        for path in sorted(source.rglob("*"))
+        if path.suffix.lower() in (".xml", ".urdf") and made not in path.resolve().parents
+    }
+    includes = re.compile(r"<include\s[^>]*\bfile\s*=\s*[\"']([^\"']*)")
+    parts = {Path(file).name for text in texts.values() for file in includes.findall(text)}
+    taken: set[str] = set()
+    for path, text in texts.items():
+        if re.search(r"<(?:mujoco|robot)\b", text):
+            stem = path.relative_to(source).with_suffix("").as_posix()
+            yield path, _unique(stem, taken), path.name in parts
+
+
+def _text(path: Path) -> str:
+    """What the file says but for comments; where it cannot be read, that it is a model."""
+    try:
+        return re.sub(r"<!--.*?-->", "", read_text(path), flags=re.DOTALL)
+    except JodaError:
+        return "<mujoco>"
+
+
+def _unique(name: str, taken: set[str]) -> str:
+    """The name, or the first of name_2, name_3, ... that is not taken; it then is."""
+    number, free = 1, name
+    while free.lower() in taken:
+        number += 1
+        free = f"{name}_{number}"
+    taken.add(free.lower())
+    return free
 
 
 def _file_name(joint: str) -> str:
-    return re.sub(r"[^\w.-]+", "_", joint).strip("_") or "joint"
+    return re.sub(r"[^\w.-]+", "_", joint).strip("._") or "joint"

@@ -1,6 +1,5 @@
 """Language-guided revision: what the user complains about changes, the rest stays."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from joda.draw import write_png
 from joda.errors import JodaError
 from joda.history import History
 from joda.propose import Proposer
-from joda.session import Session
+from joda.session import Progress, Session, silent
 
 
 @dataclass(frozen=True)
@@ -38,10 +37,10 @@ def revise(
     folder: str | Path,
     feedback: str,
     *,
-    proposer: str | Proposer | None = None,
+    proposer: str | Path | Proposer | None = None,
     vlm: str | None = None,
     force: bool = False,
-    progress: Callable[[str], None] = lambda what: None,
+    progress: Progress = silent,
 ) -> Revised:
     """Revises a generated profile as the user asks, and writes the folder's files anew.
 
@@ -66,22 +65,11 @@ def revise(
     session = Session.resume(path, progress)
     if not session.turns:
         raise JodaError(f"{path}: holds no proposal yet; go on with: joda generate --resume")
-    if session.edited() and not force:
-        raise JodaError(
-            f"{path / 'composed.json'}: was edited since it was generated, and a revision would "
-            "lose that; go on editing it, or add --force."
-        )
+    if not force:
+        session.check_unedited()
     chosen = choose(proposer, session.history.key, vlm)
     before = session.turns[-1].profile
-    progress(f"asking {chosen.name}")
-    try:
-        answer = chosen.propose(session.task, session.complain(feedback))
-        if answer.proposal is None:
-            raise JodaError(f"{chosen.name} has nothing to change for '{feedback}'.")
-    except JodaError as error:
-        session.fail(error)
-        raise
-    session.take(answer, chosen.name, feedback)
+    session.ask(chosen, feedback.strip())
     after = session.turns[-1].profile
     balance = -np.array(session.context.gravity_force)
     picture = path / "before_after.png"

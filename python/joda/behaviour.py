@@ -234,7 +234,7 @@ def _pull(model: mujoco.MjModel, start: float, end: float, context: Context) -> 
     return Pull(
         arrived=bool(way[-1] >= 0.99),
         force=_number(force[most]),
-        at=_number((motion.position[most] - lo) / (hi - lo)),
+        at=_number(np.clip((motion.position[most] - lo) / (hi - lo), 0, 1)),
         first=_number(force[way <= 0.15].max()),
         middle=_number(np.median(middle)) if len(middle) else 0.0,
         last=_number(last.max()) if len(last) else 0.0,
@@ -259,12 +259,25 @@ def _fastest(motions: list[Motion], rests: Array, closed: End, context: Context)
             continue
         s = (motion.position - lo) / (hi - lo)
         there = int(np.argmax(s <= AT_END if closed == "low_end" else s >= 1 - AT_END))
-        speed = float(np.abs(motion.velocity[: there + 1]).max())
+        end = lo + (AT_END if closed == "low_end" else 1 - AT_END) * (hi - lo)
+        speed = _speed_at(motion, there, end)
         if best is None or speed > best.speed:
             best = Closing(
                 start=_number(start), seconds=_number(motion.time[there]), speed=_number(speed)
             )
     return best
+
+
+def _speed_at(motion: Motion, sample: int, position: float) -> float:
+    """Speed at a position, from the two samples before this one, which may have hit the stop.
+
+    The square of the speed is taken as linear in position, as it is under a constant force.
+    """
+    if sample < 2:
+        return float(abs(motion.velocity[sample]))
+    (a, b), (u, v) = motion.position[sample - 2 : sample], motion.velocity[sample - 2 : sample]
+    slope = (v * v - u * u) / (b - a) if b != a else 0.0
+    return float(np.sqrt(max(v * v + slope * (position - b), 0.0)))
 
 
 def _number(value: float) -> float:

@@ -1,5 +1,7 @@
 """What changed from one profile of a joint to the next: as a list, and as a picture."""
 
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-Parts = dict[tuple[str, str, int], Component]
 
 NOUNS = {"conservative": "force", "friction": "friction", "damping": "damping"}
 
@@ -23,30 +24,22 @@ def changes(before: Profile, after: Profile) -> list[str]:
 
     Args:
         before, after: profiles of one joint; components of the same label and channel are taken
-            for the same, in their order.
+            for the same, in their order, those that did not change first.
     """
-    old, new = _parts(before), _parts(after)
     out = []
-    for key in dict.fromkeys((*old, *new)):
-        channel, label, _ = key
+    for channel in CHANNELS:
+        old, new = getattr(before.channels, channel), getattr(after.channels, channel)
         unit = _unit(channel, after)
-        if key not in new:
-            out.append(f"{_where(label, old[key])}: {NOUNS[channel]} removed")
-        elif key not in old:
-            out.append(
-                f"{_where(label, new[key])}: {NOUNS[channel]} {_peak(new[key])} {unit} added"
-            )
-        elif old[key] != new[key]:
-            where = _where(label, new[key])
-            if old[key].interval != new[key].interval:
-                a, b = old[key].interval
-                where += f", before {a:g} to {b:g}"
-            peaks = _peak(old[key]), _peak(new[key])
-            sizes = f"{peaks[0]} → {peaks[1]} {unit}" if peaks[0] != peaks[1] else "as strong"
-            out.append(f"{where}: {NOUNS[channel]} {sizes}")
+        for pair in _pairs(old.components, new.components):
+            out.append(_line(*pair, NOUNS[channel], unit))
+        if old.combine != new.combine:
+            out.append(f"{NOUNS[channel]}: components combined by {new.combine}, not {old.combine}")
     if before.joint_limit_hint != after.joint_limit_hint:
         hint = after.joint_limit_hint
-        out.append(f"end stops: {hint.elasticity} elasticity at {hint.selected_side}")
+        given = "none" not in (hint.selected_side, hint.elasticity)
+        side = hint.selected_side.replace("_", " ")
+        how = f"{hint.elasticity} elasticity at the {side}" if given else "as the model has them"
+        out.append(f"end stops: {how}")
     return out
 
 
@@ -88,24 +81,44 @@ def overlay(
         return figure
 
 
-def _parts(profile: Profile) -> Parts:
-    """Components by channel, label and which of that label."""
-    out: Parts = {}
-    for channel in CHANNELS:
-        seen: dict[str, int] = {}
-        for component in getattr(profile.channels, channel).components:
-            number = seen[component.label] = seen.get(component.label, 0) + 1
-            out[channel, component.label, number] = component
-    return out
+def _pairs(
+    before: Sequence[Component], after: Sequence[Component]
+) -> Iterator[tuple[Component | None, Component | None]]:
+    """What changed: components of the same label, None where there is none any more or yet."""
+    for label in dict.fromkeys(component.label for component in (*before, *after)):
+        old = [component for component in before if component.label == label]
+        new = [component for component in after if component.label == label]
+        for component in tuple(old):
+            if component in new:
+                old.remove(component)
+                new.remove(component)
+        yield from zip_longest(old, new)
 
 
-def _where(label: str, component: Component) -> str:
+def _line(old: Component | None, new: Component | None, noun: str, unit: str) -> str:
+    if new is None:
+        assert old is not None
+        return f"{_where(old)}: {noun} removed"
+    if old is None:
+        return f"{_where(new)}: {noun} {_peak(new)} {unit} added"
+    where = _where(new)
+    if old.interval != new.interval:
+        a, b = old.interval
+        where += f", before {a:g} to {b:g}"
+    if _peak(old) != _peak(new):
+        return f"{where}: {noun} {_peak(old)} → {_peak(new)} {unit}"
+    shape = "as strong" if (old.x, old.y) == (new.x, new.y) else "another curve, as strong"
+    return f"{where}: {noun} {shape}"
+
+
+def _where(component: Component) -> str:
     a, b = component.interval
-    return f"{label or 'component'} at s = {a:g} to {b:g}"
+    return f"{component.label or 'component'} at s = {a:g} to {b:g}"
 
 
 def _peak(component: Component) -> str:
-    return f"{max(map(abs, component.y)):.3g}"
+    """The value of the largest magnitude, with its sign."""
+    return f"{max(component.y, key=abs):.3g}"
 
 
 def _unit(channel: str, profile: Profile) -> str:

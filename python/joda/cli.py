@@ -47,7 +47,7 @@ def demo(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Let a microwave door go nearly closed, with a latch profile and without.
+    """Give an oven door its behaviour, and compare it with the same door without.
 
     Needs no key and no network. Example:
 
@@ -58,17 +58,36 @@ def demo(
     with _progress("demo") as progress:
         result = run(output, force=force, progress=progress)
     if as_json:
-        _print_json(
-            {key: str(v) if isinstance(v, Path) else v for key, v in asdict(result).items()}
-        )
+        told = {key: value for key, value in vars(result).items() if key != "history"}
+        told = {key: str(v) if isinstance(v, Path) else v for key, v in told.items()}
+        _print_json({**told, "rounds": len(result.history.rounds)})
         return
-    start, end = degrees(result.start), degrees(result.plain_end)
-    print(f"Both doors were let go at rest, {start:.1f} degrees open.")
-    print(f"  without a profile: after {result.duration:g} s still {end:.1f} degrees open")
-    print(f"  with the latch:    shut itself after {result.shut_after:.2f} s")
+    for round in result.history.rounds:
+        _tell_round(round)
+    rows = zip(result.starts, result.plain_ends, result.joda_ends, strict=True)
+    for start, plain, ours in rows:
+        print(
+            f"Let go at {degrees(start):.0f} degrees, {result.duration:g} s later: without a "
+            f"profile at {degrees(plain):.1f}, with it at {abs(degrees(ours)):.1f} degrees."
+        )
+    forces = zip(
+        ("without a profile", "with it"), (result.plain_force, result.joda_force), strict=True
+    )
+    told_forces = [
+        f"{name} it {'pulls' if force > 0 else 'holds back'} with up to {abs(force):.1f} N·m"
+        for name, force in forces
+    ]
+    print(f"Opened slowly by hand: {', '.join(told_forces)}.")
     print("Files:")
-    for what in ("picture", "profile", "scene", "composed", "plain"):
-        print(f"  {getattr(result, what)}")
+    for name in (
+        "demo.png",
+        "profile.png",
+        "scene.xml",
+        "composed.json",
+        "history.json",
+        "oven.xml",
+    ):
+        print(f"  {result.folder / name}")
     print(f"See it move: python -m mujoco.viewer --mjcf={result.scene}")
 
 
@@ -176,7 +195,9 @@ def generate(
     joint: Annotated[
         str | None,
         typer.Option(
-            "--joint", help="A name, body:NAME[:K] or #K; for a folder: only joints of this name."
+            "--joint",
+            help="A name, body:NAME[:K] or #K; not needed if there is only one. For a folder: only "
+            "joints of this name.",
         ),
     ] = None,
     proposer: Annotated[
@@ -225,11 +246,11 @@ def generate(
     with _progress("generate") as progress:
         result = run(model, joint, output, progress=progress, **options)
     if as_json:
-        _print_json(result.history.model_dump(mode="json"))
+        _print_json(_generated(result))
         return
     for round in result.history.rounds:
         _tell_round(round)
-    _tell_cost(result.history)
+    _tell_cost(result.history.usage)
     for note in result.notes:
         print(note)
     print("Files:")
@@ -272,7 +293,7 @@ def revise(
     for change in result.changes or ("Nothing changed.",):
         print(change)
     _tell_round(result.history.rounds[-1])
-    _tell_cost(result.history)
+    _tell_cost(result.history.usage)
     for note in result.notes:
         print(note)
     print(result.picture)
@@ -415,7 +436,7 @@ def main() -> None:
     except (typer.Abort, KeyboardInterrupt):
         status = _fail("interrupted.", 130)
     except typer.TyperException as error:
-        status = _fail(error.format_message() + " Try --help.")
+        status = _fail(error.format_message().rstrip(".") + ". Try --help.")
     sys.exit(status if isinstance(status, int) else 0)
 
 
@@ -431,8 +452,12 @@ def _tell_round(round: Any) -> None:
         print(f"  ! {sentence}")
 
 
-def _tell_cost(history: Any) -> None:
-    usage = history.usage
+def _generated(result: Any) -> dict[str, Any]:
+    told: dict[str, Any] = result.history.model_dump(mode="json")
+    return {**told, "usage": result.history.usage.model_dump(mode="json"), "notes": result.notes}
+
+
+def _tell_cost(usage: Any) -> None:
     if usage.requests:
         price = "price unknown" if usage.dollars is None else f"{usage.dollars:.3f} dollars"
         print(
@@ -443,13 +468,13 @@ def _tell_cost(history: Any) -> None:
 
 def _tell_all(done: dict[str, Any], as_json: bool) -> None:
     """A line per joint; raises JodaError if some gave nothing."""
+    from joda.propose import total
+
     failed = {label: result for label, result in done.items() if isinstance(result, JodaError)}
     if as_json:
         _print_json(
             {
-                label: {"error": str(result)}
-                if label in failed
-                else result.history.model_dump(mode="json")
+                label: {"error": str(result)} if label in failed else _generated(result)
                 for label, result in done.items()
             }
         )
@@ -461,8 +486,11 @@ def _tell_all(done: dict[str, Any], as_json: bool) -> None:
             last = result.history.rounds[-1]
             lacking = " ".join(last.unmet) or "as described"
             print(f"{label}: {last.proposal.joint_summary.motion_description}; {lacking}")
+            for note in result.notes:
+                print(f"  {note}")
+        _tell_cost(total(r.history.usage for r in done.values() if not isinstance(r, JodaError)))
     if failed:
-        raise JodaError(f"{len(failed)} of {len(done)} joints have no profile; see above.")
+        raise JodaError(f"{len(failed)} of {len(done)} have no profile; see above.")
 
 
 def _fail(message: str, status: int = 2) -> int:

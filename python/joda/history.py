@@ -50,6 +50,7 @@ class History(File):
         description: what the user wants of the joint, in words.
         templates: further folders of templates, relative as the model.
         key: with which proposals are compiled.
+        pictures: names of the joint's pictures in `pictures/`; none where nothing could render.
         complete: whether the proposer had nothing to change any more.
         rounds: oldest first.
         failures: requests that gave nothing.
@@ -62,6 +63,7 @@ class History(File):
     description: str = ""
     templates: tuple[str, ...] = ()
     key: str = ""
+    pictures: tuple[str, ...] | None = None
     complete: bool = False
     rounds: tuple[Round, ...] = ()
     failures: tuple[Failure, ...] = ()

@@ -147,5 +147,6 @@ def gravity_force(model: mujoco.MjModel, joint: int, positions: Array) -> Array:
         data.qpos[model.jnt_qposadr[joint]] = position
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_rne(model, data, 0, bias)  # at rest, all of it is gravity
-        out[k] = -bias[model.jnt_dofadr[joint]]
+        mujoco.mj_passive(model, data)
+        out[k] = (data.qfrc_gravcomp - bias)[model.jnt_dofadr[joint]]
     return out

@@ -14,6 +14,10 @@ Ratio = Annotated[float, Field(ge=0, le=1)]
 Factor = Annotated[float, Field(ge=0, le=100)]
 
 
+NARROWEST = 1e-3
+"""Narrowest interval of an effect, in normalised position."""
+
+
 class JointSummary(Frozen):
     """The joint as the proposer understood it."""
 
@@ -62,6 +66,8 @@ class EffectProposal(Frozen):
     def _check(self) -> Self:
         if not self.start_ratio < self.end_ratio:
             raise ValueError("start_ratio must be less than end_ratio")
+        if self.end_ratio - self.start_ratio < NARROWEST:
+            raise ValueError("end_ratio must be at least 0.001 greater than start_ratio")
         return self
 
 

@@ -69,6 +69,13 @@ def _closes_anywhere(seen: Seen) -> str:
     return _each(seen, np.linspace(0.05, 0.98, 32), "closes")
 
 
+def _left_open(seen: Seen) -> str:
+    closes = [way for way in np.linspace(0.05, 0.98, 32) if seen.goes(way) == "closes"]
+    return _unless(
+        not closes, f"let go at {max(closes, default=0) * 100:.0f} % of the way it closes"
+    )
+
+
 def _opens_past(seen: Seen) -> str:
     return _each(seen, (0.5, 0.6, 0.7, 0.8, 0.9), "opens")
 
@@ -105,11 +112,18 @@ def _stays_open(seen: Seen) -> str:
 
 
 def _clicks(seen: Seen) -> str:
-    low = seen.behaviour.let_go
-    ends = sum(any(stretch.goes == end for stretch in low) for end in ("low_end", "high_end"))
-    found = len(seen.behaviour.settles_at) + ends
-    wanted = max(seen.number, 1)
-    return _unless(found >= wanted, f"it rests by itself at {found} positions, not {wanted}")
+    reached = {stretch.goes for stretch in seen.behaviour.let_go}
+    ends = [place for place, end in ((0.0, "low_end"), (1.0, "high_end")) if end in reached]
+    rests = np.sort([*seen.behaviour.settles_at, *ends])
+    apart = 0.5 / max(seen.number - 1, 1)
+    groups = np.split(rests, np.flatnonzero(np.diff(rests) > apart) + 1) if len(rests) else []
+    if len(groups) != seen.number and (seen.number or not groups):
+        return f"it rests by itself at {len(groups)} positions, not {max(seen.number, 1)}"
+    loose = max(groups, key=np.ptp)
+    return _unless(
+        np.ptp(loose) <= 0.5 * apart,
+        f"it comes to rest loosely, at s = {loose[0]:.2f} to {loose[-1]:.2f}",
+    )
 
 
 def _two_sides(seen: Seen) -> str:
@@ -153,27 +167,47 @@ class Wish:
         says: the sentence that states it; {number} where it needs one.
         phrases: regular expression of the ways to say it; a group `number` where it needs one.
         check: empty if the joint does it, else what it does instead.
+        denies: whether it is said with a "not", which the phrases leave out.
     """
 
     says: str
     phrases: str
     check: Check
+    denies: bool = False
 
 
 _CLOSE = r"(?:clos|shut)\w*"
+_SELF = r"\b(?:itself|its own|automatically)"
+_NEAR = r"\b(?:when|once|if|from|for|over|in|within|near\w*|almost|last|final)\b"
+_MIDDLE = r"(?:to|towards|into) (?:the |its )?(?:middle|cent\w+|neutral)"
+_COUNTS = (
+    *("", "", "two", "three", "four", "five", "six"),
+    *("seven", "eight", "nine", "ten", "eleven", "twelve"),
+)
+_COUNT = rf"\d+|{'|'.join(_COUNTS[2:])}"
 WISHES: dict[str, Wish] = {
     "moves": Wish("can be opened and closed by hand", r"(?!)", _moves),
     "closes_near": Wish(
         "closes by itself when nearly closed",
-        rf"(?:{_CLOSE}|pull\w* (?:itself )?(?:in|shut|closed)|self-?clos\w*|snaps? (?:in|shut))"
-        r"[^.;]*\b(?:when|once|from|if|for|over|in|within)[^.;]*\b(?:near|almost|last|few|final|slightly|little)",
+        rf"(?:{_CLOSE}|pull\w* (?:itself |it |the \w+ )?(?:in|shut|closed)|self-?clos\w*|"
+        r"snaps? (?:in|shut))[^.;]*\b(?:when|once|from|if|for|over|in|within)"
+        r"[^.;]*\b(?:near|almost|last|few|final|slightly|little)",
         _closes_near,
     ),
     "closes_anywhere": Wish(
         "goes back by itself from anywhere",
-        r"(?:go(?:es)?|spring\w*|return\w*|com(?:es?|ing)|swing\w*|clos\w*|shuts?|fall\w*)"
-        r"[^.;]*\bfrom (?:any\w*|every\w*)|spring\w* back|self-?closing door",
+        rf"^(?!.*\b{_MIDDLE}).*(?:"
+        r"(?:go(?:es)?|spring\w*|return\w*|com(?:es?|ing)|swing\w*|clos\w*|shuts?|fall\w*|pull\w*)"
+        r"[^.;]*\bfrom (?:any\w*|every\w*)|spring\w* back|"
+        rf"(?:clos\w*|shuts?)(?![^.;]*{_NEAR})[^.;]*{_SELF}|self[- ]?clos\w*(?![^.;]*{_NEAR})|"
+        rf"automatically clos\w*(?![^.;]*{_NEAR}))",
         _closes_anywhere,
+    ),
+    "left_open": Wish(
+        "does not close by itself",
+        rf"(?:clos|shut|swing|fall)(?![^.;]*\bfrom\b)[^.;]*{_SELF}|self[- ]?clos\w*",
+        _left_open,
+        denies=True,
     ),
     "opens_past": Wish(
         "opens by itself from half-way on",
@@ -188,7 +222,8 @@ WISHES: dict[str, Wish] = {
     ),
     "latched": Wish(
         "latches shut and needs a push to latch",
-        r"\blatch(?:es|ing)\b|needs? (?:a|an extra) push to",
+        r"\blatch(?:es|ing)\b|\b(?:not|n't|to|must|should|never) latch\b|"
+        r"needs? (?:a|an extra) push to",
         _latched,
     ),
     "stays_put": Wish(
@@ -205,23 +240,26 @@ WISHES: dict[str, Wish] = {
     "stays_open": Wish(
         "stays fully open",
         r"(?:stays?|holds?|held|rests?|remains?)\b[^.;]*\b(?:fully|wide|completely) open|"
-        r"stays open",
+        r"stays? open(?![^.;]*\b(?:half|middle|mid-|intermediate))",
         _stays_open,
     ),
     "clicks": Wish(
         "clicks into {number} positions",
-        r"(?:clicks?|detents?|snaps?|settles?|indexes)\b[^.;]*?(?P<number>\d+)\s+(?:\w+\s+)?"
-        r"(?:positions?|places|detents|stops|steps)|(?P<number2>\d+)\s+(?:detents|click)",
+        rf"(?:clicks?|detents?|snaps?|settles?|indexes)\b[^.;]*?\b(?P<number>{_COUNT})\s+"
+        rf"(?:\w+\s+)?(?:positions?|places|detents|stops|steps)|"
+        rf"\b(?P<number2>{_COUNT})\s+(?:detents|clicks?|notches|positions|settings)\b|"
+        r"\b(?:has|have|with|no|without) (?:any |many |distinct )?(?:detents|notches|clicks)\b|"
+        r"(?:not|n't|never) click\b",
         _clicks,
     ),
     "two_sides": Wish(
         "has two stable sides and flips over between them",
-        r"either side|bi-?stable|flips? over|two stable",
+        r"(?<!from )either side|bi-?stable|flips? over|two stable",
         _two_sides,
     ),
     "returns_to_middle": Wish(
         "returns to the middle when let go",
-        r"(?:returns?|springs?|comes?|goes)\b[^.;]*\bto (?:the|its) (?:middle|cent\w+|neutral)",
+        rf"(?:returns?|springs?|comes?|goes)\b[^.;]*\b{_MIDDLE}",
         _returns_to_middle,
     ),
     "snaps": Wish(
@@ -231,12 +269,18 @@ WISHES: dict[str, Wish] = {
     ),
     "soft": Wish(
         "closes softly",
-        r"(?:clos|shut)\w*\b[^.;]*\b(?:soft|gentl|quiet|slow)\w*|soft-?clos\w*|"
+        r"(?:clos|shut)\w*\b[^.;]*\b(?:soft|gentl|quiet|slow)\w*|soft[- ]?clos\w*|"
         r"(?:soft|gentl|quiet|slow)ly\b[^.;]*\b(?:clos|shut)",
         _soft,
     ),
 }
 
+_VERBS = r"stays|holds|closes|shuts|returns|springs|clicks|latches|snaps|goes|falls|opens|remains"
+_AND = re.compile(
+    r"[.!](?:\s|$)|[;\n]|, (?:and|but)\b|\bbut\b|"
+    rf"\band (?=(?:it |then |otherwise )?(?:{_VERBS})\b)"
+)
+_SLAM = re.compile(r"(?:without|never|not|n't) (?:\w+ )?slam\w*")
 NOT = re.compile(r"\b(?:not|never|no|without|cannot|nor|neither)\b|n't\b")
 
 
@@ -261,14 +305,16 @@ def read_wishes(text: str, *, refused: bool = False) -> list[Wanted]:
         refused: those that it denies instead ("does not close by itself").
     """
     found: dict[str, Wanted] = {}
-    for clause in re.split(r"[.!](?:\s|$)|[;\n]|, (?:and|but)\b|\bbut\b", text.lower()):
-        if bool(NOT.search(clause)) != refused:
-            continue
+    for clause in _AND.split(_SLAM.sub("closes softly", text.lower())):
+        denied = bool(NOT.search(clause))
         for name, wish in WISHES.items():
+            if denied != (refused or wish.denies) or (refused and wish.denies):
+                continue
             if match := re.search(wish.phrases, clause):
                 groups = match.groupdict()
-                number = groups.get("number") or groups.get("number2") or 0
-                found.setdefault(name, Wanted(name, int(number)))
+                number = groups.get("number") or groups.get("number2") or "0"
+                count = _COUNTS.index(number) if number in _COUNTS else int(number)
+                found.setdefault(name, Wanted(name, count))
     return list(found.values())
 
 

@@ -4,12 +4,14 @@ A proposer is asked once per round. It is given the task and what came of its ea
 answers with a proposal, or with None: the last one is complete.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from pathlib import Path
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from joda._context import Context
 from joda.behaviour import Behaviour
+from joda.errors import JodaError
 from joda.profile import Frozen, Profile
 from joda.proposal import Proposal
 from joda.template import Template
@@ -104,6 +106,44 @@ class Proposer(Protocol):
 
         Raises:
             JodaError: no usable answer was to be had.
+        """
+        ...
+
+
+class Ask(NamedTuple):
+    """One of many joints to propose for: a name of one's own, the task and its rounds."""
+
+    name: str
+    task: Task
+    turns: Sequence[Turn]
+
+
+@runtime_checkable
+class BatchProposer(Proposer, Protocol):
+    """A proposer that can be asked for many joints at once."""
+
+    def propose_many(
+        self,
+        asks: Sequence[Ask],
+        store: Path,
+        progress: Callable[[int, int], None] = ...,
+    ) -> Iterator[tuple[str, Answer | JodaError]]:
+        """The next proposals of many joints, in any order.
+
+        Interrupted, the same call picks up what is running or done and pays for nothing twice: an
+        answer remains in the store until the next one is asked for.
+
+        Args:
+            asks: as for `propose`, each with a name.
+            store: JSON file for what is paid for and not yet collected.
+            progress: called with how many are done, and of how many.
+
+        Returns:
+            each ask's name, with its answer or the failure to get one.
+
+        Raises:
+            JodaError: two asks have the same name, the store cannot be read or written, or the
+                service cannot be reached.
         """
         ...
 

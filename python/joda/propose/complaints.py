@@ -4,14 +4,21 @@ Only what was complained about changes; everything else of the proposal stays as
 """
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from joda._compile import contributions
 from joda._context import Context
 from joda.errors import JodaError
+from joda.field import evaluate
 from joda.profile import CHANNELS
+from joda.profile import Channel as Curves
 from joda.proposal import EffectProposal, Proposal, Strength
 from joda.propose.mend import rescale
+from joda.template import Template
 
 Channel = Literal["conservative", "friction", "damping"]
 Side = Literal["closing", "opening", "any"]
@@ -70,46 +77,120 @@ SUBJECTS = (
 )
 
 
-def revise(proposal: Proposal, context: Context, complaint: str) -> Proposal:
+PULL, FRICTION = SUBJECTS[2], SUBJECTS[-1]
+SYMPTOMS: tuple[tuple[str, tuple[Subject, ...], bool], ...] = (
+    (FAST, (Subject("", "damping"),), True),
+    (SLOW, (Subject("", "damping"),), False),
+    (r"(?:hard|difficult|heavy) to (?:open|pull)|force to open", (PULL, FRICTION), False),
+    (r"(?:hard|difficult|heavy) to (?:move|turn|slide|close)", (FRICTION,), False),
+    (r"drifts?\b|too easily|too freely", (FRICTION,), True),
+)
+"""What a complaint describes instead of naming it: which subject (the first that the profile has)
+should get stronger or weaker."""
+
+
+def revise(
+    proposal: Proposal,
+    context: Context,
+    templates: Mapping[str, Template],
+    complaint: str,
+    key: str = "",
+) -> Proposal:
     """The proposal with what was complained about changed.
+
+    An effect within the region that is meant gets weaker or stronger as a whole. Of one that
+    reaches beyond it the rest stays: it is weakened by an opposite force there, or helped by
+    friction or damping there.
 
     Args:
         proposal: what was proposed.
         context: the joint.
+        templates: by name.
         complaint: in English, one or several sentences.
+        key: as for `joda.compile`.
 
     Raises:
         JodaError: it was not understood, or there is no such effect to change.
     """
-    effects = list(proposal.effect_proposals)
     for clause in filter(str.strip, re.split(r"[.!](?:\s|$)|[;\n]|,? and ", complaint.lower())):
-        subject, factor = _read(clause, complaint)
-        region = _region(clause) or subject.region
-        within, beyond = _meant(effects, subject, region, context)
-        chosen = within or (beyond if factor < 1 or subject.channel == "conservative" else [])
-        if not chosen and (factor < 1 or subject.channel == "conservative"):
+        subjects, factor = _read(clause, complaint)
+        effects = list(proposal.effect_proposals)
+        for subject in subjects:
+            region = _region(clause) or subject.region
+            within, beyond = _meant(effects, subject, region, context)
+            if within or beyond:
+                break
+        force = subject.channel == "conservative"
+        if not within and not beyond and (factor < 1 or force):
             raise JodaError(
                 f"'{clause.strip()}': the profile has no {subject.channel} effect there; "
                 f"it has: {', '.join(effect.effect_name for effect in effects)}."
             )
-        for number in chosen:
+        size, sign = _strength(proposal, context, templates, beyond, subject.channel, region, key)
+        for number in within or ([] if force or factor > 1 else beyond):
             effects[number] = rescale(effects[number], subject.channel, factor)
-        if not chosen:
-            effects.append(_local(subject, region, context, clause))
+        if within or (factor < 1 and not force):
+            proposal = _put(proposal, effects)
+            continue
+        name = f"constant_{subject.channel}_hinge"
+        if force:
+            towards = sign if factor > 1 else -sign
+            name = f"constant_{'positive' if towards > 0 else 'negative'}_conservative_hinge"
+        effects.append(_local(name, subject.channel, region, context, clause))
+        proposal = _put(proposal, effects)
+        wanted = abs(factor - 1) * size
+        if wanted > 0:
+            proposal = _sized(proposal, context, templates, subject.channel, wanted, key)
+    return proposal
+
+
+def _put(proposal: Proposal, effects: Sequence[EffectProposal]) -> Proposal:
     return proposal.model_copy(update={"effect_proposals": tuple(effects)})
 
 
-def _read(clause: str, complaint: str) -> tuple[Subject, float]:
-    """What a clause is about, and by how much it should change."""
+def _strength(
+    proposal: Proposal,
+    context: Context,
+    templates: Mapping[str, Template],
+    numbers: Sequence[int],
+    channel: Channel,
+    region: Region,
+    key: str,
+) -> tuple[float, float]:
+    """Magnitude and sign of what these effects do together in the middle of a region."""
+    parts = contributions(proposal, context, templates, key)
+    components = tuple(parts[number][channel] for number in numbers if channel in parts[number])
+    way = sum(region) / 2
+    s = 1 - way if context.closed_end == "high_end" else way
+    value = float(evaluate(Curves(components=components), np.array([s]))[0][0])
+    return abs(value), 1.0 if value >= 0 else -1.0
+
+
+def _sized(
+    proposal: Proposal,
+    context: Context,
+    templates: Mapping[str, Template],
+    channel: Channel,
+    peak: float,
+    key: str,
+) -> Proposal:
+    """The proposal with the last effect's refine factor such that it compiles to this peak."""
+    *effects, last = proposal.effect_proposals
+    component = contributions(proposal, context, templates, key)[-1][channel]
+    now = max(map(abs, component.y))
+    return _put(proposal, [*effects, rescale(last, channel, peak / now)])
+
+
+def _read(clause: str, complaint: str) -> tuple[tuple[Subject, ...], float]:
+    """What a clause is about, and the factor by which it should change."""
     amount = 1.6
     if re.search(r"\b(?:much|far|way|a lot|very)\b(?! enough)", clause):
         amount = 2.5
     elif re.search(r"slight|\ba bit|\ba little|somewhat", clause):
         amount = 1.25
-    if re.search(FAST, clause):
-        return Subject("", "damping"), amount
-    if re.search(SLOW, clause):
-        return Subject("", "damping"), 1 / amount
+    for words, subjects, stronger in SYMPTOMS:
+        if re.search(words, clause):
+            return subjects, amount if stronger else 1 / amount
     subject = next((s for s in SUBJECTS if re.search(s.words, clause)), None)
     more, less = re.search(MORE, clause), re.search(LESS, clause)
     if subject is None or bool(more) == bool(less):
@@ -119,7 +200,7 @@ def _read(clause: str, complaint: str) -> tuple[Subject, float]:
             "slams', 'the clicks are too weak'; for free text use --proposer anthropic."
         )
     eased = subject.channel == "friction" and re.search(r"easier|easily", clause)
-    return subject, 1 / amount if less or eased else amount
+    return (subject,), 1 / amount if less or eased else amount
 
 
 def _region(clause: str) -> Region | None:
@@ -174,12 +255,14 @@ def _sides(effect: EffectProposal, context: Context) -> set[Side]:
     return {"closing", "opening"}
 
 
-def _local(subject: Subject, region: Region, context: Context, reason: str) -> EffectProposal:
-    """More friction or damping in a region that has none of its own."""
+def _local(
+    name: str, channel: Channel, region: Region, context: Context, reason: str
+) -> EffectProposal:
+    """An effect of one channel in a region."""
     a, b = region if context.closed_end != "high_end" else (1 - region[1], 1 - region[0])
-    strengths = {name: "medium" if name == subject.channel else "none" for name in CHANNELS}
+    strengths = {each: "medium" if each == channel else "none" for each in CHANNELS}
     return EffectProposal(
-        effect_name=f"constant_{subject.channel}_hinge",
+        effect_name=name,
         start_ratio=round(a, 4),
         end_ratio=round(b, 4),
         strength=Strength.model_validate(strengths),

@@ -150,7 +150,6 @@ KINDS = (
                 (0, 1),
                 "springs carry its weight",
                 "strong",
-                serves=("stays_half",),
             ),
             _catch("medium", 0.12, "a catch pulls it shut"),
             Part("constant_friction_hinge", (0, 1), "the springs' ropes rub", friction="medium"),
@@ -193,7 +192,7 @@ KINDS = (
                 "constant_friction_hinge",
                 (0, 1),
                 "a friction hinge holds it at any angle",
-                friction="dominant",
+                friction="medium",
                 serves=("stays_put",),
             ),
             DAMPING,
@@ -337,6 +336,9 @@ WISHED: dict[str, tuple[Part, ...]] = {
     "closes_near": (_catch("strong", 0.1, "it is to close by itself"),),
     "held_shut": (_catch("strong", 0.1, "it is to stay shut"),),
     "closes_anywhere": (Part(SPRING, (0, 1), "it is to return from anywhere", "medium"),),
+    "left_open": (
+        Part("constant_friction_hinge", (0, 1), "it is not to close by itself", friction="weak"),
+    ),
     "opens_past": (
         Part("constant_{opening}_conservative_hinge", (0.4, 1), "it is to open", "medium"),
     ),
@@ -354,7 +356,7 @@ WISHED: dict[str, tuple[Part, ...]] = {
     "two_sides": (Part("bistable_mechanism", (0, 1), "it is to have two sides", "strong"),),
     "returns_to_middle": (Part("detent_internal", (0, 1), "it is to return", "strong"),),
     "snaps": (Part("detent_internal", (0.3, 0.7), "it is to snap through", "medium"),),
-    "soft": (Part("constant_damping_hinge", (0, 0.3), "it is to close softly", damping="strong"),),
+    "soft": (Part("constant_damping_hinge", (0, 0.3), "it is to close softly", damping="medium"),),
 }
 """What is added for a wish that the kind does not have."""
 
@@ -388,10 +390,15 @@ def recognise(context: Context, description: str = "") -> tuple[Kind, float]:
         if kind.objects and not kind.alone and not object_known:
             continue
         score = 4 * _in(kind.own, near) + 3 * _in(kind.objects, everything)
-        score += 10 * _in(kind.objects, said) + 5 * _in(kind.own, said)
+        score += 10 * _in(kind.objects, said) + 5 * _in(_word(kind.own), said)
         if score > most:
             best, most = kind, score
     return best, {0: 0.2, 3: 0.4, 4: 0.5}.get(most, 0.7)
+
+
+def _word(words: str) -> str:
+    """As nouns: what latches, or needs a push to latch, is not a latch."""
+    return rf"(?<!to )\b(?:{words})s?\b" if words else ""
 
 
 def _in(words: str, text: str) -> bool:

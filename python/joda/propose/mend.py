@@ -142,10 +142,10 @@ def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]
     """What a wish demands of drive and friction."""
 
     def shut(low: float, high: float) -> list[Demand]:
-        return [_at(wish, way, -1, -SURE, LEAST) for way in np.linspace(low, high, 9)]
+        return [_at(wish, way, -1, -SURE, LEAST) for way in _over(low, high)]
 
     def open_(low: float, high: float) -> list[Demand]:
-        return [_at(wish, way, 1, -SURE, LEAST) for way in np.linspace(low, high, 9)]
+        return [_at(wish, way, 1, -SURE, LEAST) for way in _over(low, high)]
 
     def stay(low: float, high: float) -> list[Demand]:
         ways = np.linspace(low, high, 15)
@@ -161,6 +161,8 @@ def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]
             return shut(0.01, 0.045)
         case "closes_anywhere":
             return shut(0.02, 1)
+        case "left_open":
+            return [_at(wish, way, 1, HELD) for way in np.linspace(0.012, 1, 41)]
         case "opens_past":
             return open_(0.48, 0.985)
         case "held_shut":
@@ -182,6 +184,11 @@ def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]
         case "snaps":
             return _snap(wish, proposal, context)
     return []
+
+
+def _over(low: float, high: float) -> Array:
+    """Places from low to high, no farther apart than a latch is wide."""
+    return np.linspace(low, high, max(9, round(50 * (high - low)) + 1))
 
 
 def _at(wish: Wanted, way: float, drive: float, friction: float, least: float = 0.0) -> Demand:
@@ -212,12 +219,12 @@ def _clicks(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]:
     """Within each detent towards its middle, within each end's spring towards the end."""
     out = []
     for a, b in _places(proposal, context, "detent_internal"):
-        for u in (0.12, 0.25, 0.35):
+        for u in (0.12, 0.25, 0.35, 0.43):
             out.append(_at(wish, a + u * (b - a), 1, -SURE, LEAST))
             out.append(_at(wish, b - u * (b - a), -1, -SURE, LEAST))
     for a, b in _places(proposal, context, "spring_return"):
         inward = -1 if a < 1e-6 else 1
-        ways = [a + u * (b - a) for u in (0.2, 0.5, 0.9)]
+        ways = [a + u * (b - a) for u in (0.03, 0.2, 0.5, 0.9)]
         out += [_at(wish, way, inward, -SURE, LEAST) for way in ways]
     return out
 

@@ -5,18 +5,26 @@ what the simulation did not show. How sure it is stands in each effect's confide
 its object and part 0.7, by its part alone 0.5, by nothing 0.2.
 """
 
+import re
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 
 from joda._context import Context
+from joda.errors import JodaError
 from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
 from joda.propose import Answer, Task, Turn
 from joda.propose.complaints import revise
 from joda.propose.kinds import WISHED, Kind, Part, recognise
 from joda.propose.mend import mend, rescale
-from joda.wishes import SOFT, Wanted, read_wishes, state, unmet
+from joda.wishes import SOFT, WISHES, Wanted, read_wishes, state, unmet
 
 APART = 0.785
 """Angle (rad) between the positions of a knob, where nobody says how many it has."""
+
+FORBIDS = re.compile(r"\b(?:should|must|may)(?: not|n't)\b|\bnever\b")
+
+CLICKS = re.compile(r"detent_internal|spring_return")
+"""Effects that make a joint click into positions."""
 
 EXCLUSIVE = {
     "closes_anywhere", "stays_put", "stays_half", "opens_past", "two_sides", "returns_to_middle",
@@ -63,16 +71,32 @@ class Offline:
         return mended
 
     def _revised(self, task: Task, last: Turn) -> Proposal:
-        """What the user wishes is added, what the user complains about is changed."""
+        """What the user complains about is changed; else what the user wishes is added."""
+        arguments = task.context, task.templates, last.complaint, self.key
+        try:
+            return revise(last.proposal, *arguments)
+        except JodaError:
+            said = last.complaint
+            # "It does not stay open" asks for just that; "it should not" for the opposite.
+            asked = read_wishes(said)
+            if not FORBIDS.search(said.lower()):
+                asked = [wish for wish in asked if not WISHES[wish.name].denies]
+                asked += read_wishes(said, refused=True)
+            if not asked:
+                raise
+        asked = _counted(asked, task.context)
+        names = {wish.name for wish in asked}
+        gone = names | _conflicting(names)
         old = read_wishes(last.proposal.whole_motion_descrptn)
-        new = [wish for wish in read_wishes(last.complaint) if wish not in old]
-        if not new:
-            return revise(last.proposal, task.context, last.complaint)
-        names = {wish.name for wish in new}
-        gone = EXCLUSIVE if names & EXCLUSIVE else set()
-        wanted = [wish for wish in old if wish.name not in gone | names] + new
-        said = last.proposal.model_copy(update={"whole_motion_descrptn": state(wanted)})
-        return self._mended(said, task, wanted)
+        wanted = [wish for wish in old if wish.name not in gone] + asked
+        stated = last.proposal.model_copy(update={"whole_motion_descrptn": state(wanted)})
+        if not unmet(asked, last.behaviour, task.context):
+            raise JodaError(f"in simulation {state(asked).lower().rstrip('.')} already.")
+        if "clicks" in names:  # as many as are asked for, not besides those that there are
+            others = [e for e in stated.effect_proposals if not CLICKS.search(e.effect_name)]
+            clicks = _effects(WISHED["clicks"], task.context, _number(wanted), 0.3)
+            stated = _with(stated.model_copy(update={"effect_proposals": tuple(others)}), clicks)
+        return self._mended(stated, task, wanted)
 
     def _first(self, task: Task) -> Proposal:
         context = task.context
@@ -94,7 +118,7 @@ def _plan(kind: Kind, context: Context, description: str) -> tuple[list[Wanted],
     """Wishes and parts: the user's, and those of the kind that do not contradict them."""
     asked = {wish.name: wish for wish in read_wishes(description)}
     denied = {wish.name for wish in read_wishes(description, refused=True)}
-    dropped = denied | (EXCLUSIVE if asked.keys() & EXCLUSIVE else set())
+    dropped = denied | _conflicting(asked.keys())
     wanted = [Wanted(name) for name in kind.wishes if name not in dropped | asked.keys()]
     wanted += asked.values()
     names = {wish.name for wish in wanted}
@@ -102,8 +126,23 @@ def _plan(kind: Kind, context: Context, description: str) -> tuple[list[Wanted],
     served = {name for part in parts for name in part.serves} | set(kind.wishes) - dropped
     for name in asked.keys() - served:
         parts += WISHED.get(name, ())
+    return _counted(wanted, context), parts
+
+
+def _counted(wanted: Sequence[Wanted], context: Context) -> list[Wanted]:
+    """With a number of positions, where nobody says how many."""
     count = _positions(context)
-    return [Wanted(w.name, w.number or count) if w.name == "clicks" else w for w in wanted], parts
+    return [Wanted(w.name, w.number or count) if w.name == "clicks" else w for w in wanted]
+
+
+def _conflicting(names: AbstractSet[str]) -> set[str]:
+    """The wishes that these leave no room for."""
+    out = EXCLUSIVE if names & EXCLUSIVE else set()
+    if "closes_anywhere" in names:
+        out = out | {"stays_open", "latched"}
+    if "left_open" in names:
+        return out | {"closes_near", "closes_anywhere"}
+    return out | ({"left_open"} if names & {"closes_near", "closes_anywhere"} else set())
 
 
 def _positions(context: Context) -> int:

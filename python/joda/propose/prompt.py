@@ -23,6 +23,7 @@ from joda.profile import CHANNELS, Profile
 from joda.proposal import Proposal
 from joda.propose import Task, Turn
 from joda.template import Template
+from joda.wishes import WISHES
 
 MAX_TOKENS = 16_000
 """Room for an answer, reasoning included."""
@@ -31,11 +32,6 @@ MAX_TOKENS = 16_000
 SHEET = (1000, 800)
 PROFILE = (840, 700)
 JOINT, JOINTS = (704, 528), 5  # more pictures than JOINTS share their area
-
-TOKEN_PIXELS = 28
-TOKEN_AREA = 750
-CHARACTERS = 3.2
-"""Per token of text, rather too few than too many."""
 
 UNSUPPORTED = {
     *("title", "description", "default", "minimum", "maximum", "exclusiveMinimum"),
@@ -118,9 +114,11 @@ def system(templates: Mapping[str, Template]) -> str:
         for label, (low, high) in BANDS.items()
     )
     effects = "\n".join(_effect(template) for template in templates.values())
+    checked = [wish.says.format(number="N") for name, wish in WISHES.items() if name != "moves"]
+    behaviours = "\n".join(f"- it {says}" for says in checked)
     return "\n".join(
         (
-            _read("system", bands=bands),
+            _read("system", bands=bands, behaviours=behaviours),
             _read("vocabulary", effects=effects),
             _read("schema"),
             _read("feedback"),
@@ -201,19 +199,6 @@ def parse_ablation(reply: str, task: Task) -> Profile:
         raise JodaError(f"It must be JSON with three lists of points ({error}).") from None
 
 
-def tokens(asked: Mapping[str, Any]) -> int:
-    """An upper estimate of a request's input tokens, without asking the service."""
-    texts, images = [json.dumps(asked.get("output_config", {}))], 0
-    for block in _blocks(asked):
-        if block["type"] == "text":
-            texts.append(block["text"])
-        else:
-            width, height = _size(base64.b64decode(block["source"]["data"]))
-            patches = math.ceil(width / TOKEN_PIXELS) * math.ceil(height / TOKEN_PIXELS)
-            images += max(patches, math.ceil(width * height / TOKEN_AREA))
-    return images + math.ceil(sum(map(len, texts)) / CHARACTERS)
-
-
 def _joint(task: Task, references: bool) -> list[Block]:
     """The pictures of the joint, and last, cached, what is known and wished of it."""
     share = math.sqrt(JOINTS / max(JOINTS, len(task.pictures)))
@@ -287,15 +272,6 @@ def _image(png: bytes, room: tuple[int, int]) -> Block:
     data = base64.standard_b64encode(out.getvalue()).decode()
     source = {"type": "base64", "media_type": "image/png", "data": data}
     return {"type": "image", "source": source}
-
-
-def _size(png: bytes) -> tuple[int, int]:
-    """Width and height in pixels, from a PNG's header."""
-    return int.from_bytes(png[16:20], "big"), int.from_bytes(png[20:24], "big")
-
-
-def _blocks(asked: Mapping[str, Any]) -> list[Block]:
-    return [*asked["system"], *(b for message in asked["messages"] for b in message["content"])]
 
 
 def _object(**properties: Any) -> dict[str, Any]:

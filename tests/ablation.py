@@ -1,0 +1,104 @@
+"""The paper's ablation: proposals with the template library beside raw control points.
+
+    python tests/ablation.py
+
+Both were asked of the same Claude model in one round, twice each, with the same pictures and
+context of the ten objects in models/; tests/recorded/README.md tells how. Every answer is compiled,
+simulated, and held against what the object does, which neither was told.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from joda import compile, context
+from joda.behaviour import behaviour
+from joda.errors import JodaError
+from joda.field import evaluate
+from joda.propose import Task
+from joda.propose.prompt import parse, parse_ablation
+from joda.template import read_templates
+from joda.wishes import Wanted, unmet
+
+TESTS = Path(__file__).parent
+MODELS = TESTS.parent / "models"
+
+OBJECTS: dict[str, tuple[str, tuple[Wanted, ...]]] = {
+    name: (joint, tuple(Wanted(wish, 3 if wish == "clicks" else 0) for wish in wishes.split()))
+    for name, joint, wishes in (
+        ("cabinet", "door", "held_shut opens_past"),
+        ("dishwasher", "door", "closes_near held_shut stays_half stays_open"),
+        ("drawer", "drawer", "closes_near held_shut stays_put"),
+        ("knob", "knob", "clicks"),
+        ("laptop", "lid", "stays_put"),
+        ("lighter", "button", "closes_anywhere snaps"),
+        ("microwave", "door", "latched stays_put"),
+        ("oven", "door", "closes_near held_shut stays_half stays_open"),
+        ("refrigerator", "door", "closes_near held_shut stays_put"),
+        ("switch", "rocker", "two_sides"),
+    )
+}
+"""What each object does; each can besides be opened and closed by hand."""
+
+RUNS = (1, 2)
+GRID = np.linspace(0, 1, 401)
+
+
+def rows():
+    """Per object and kind of answer: wishes met in each run, wishes in all, spread of the runs."""
+    templates = read_templates()
+    for name, (joint, wanted) in OBJECTS.items():
+        found = context(MODELS / f"{name}.xml", joint)
+        task = Task(found, templates)
+        for kind in ("templates", "raw"):
+            met, curves, lacking = [], [], []
+            for run in RUNS:
+                text = (TESTS / "recorded" / f"{kind}_{run}" / f"{name}.json").read_text("utf-8")
+                try:
+                    profile = (
+                        compile(parse(text, task, ()), found)
+                        if kind == "templates"
+                        else parse_ablation(text, task)
+                    )
+                except JodaError as error:
+                    met.append(0)
+                    lacking.append({"answer": str(error)})
+                    continue
+                missed = unmet(wanted, behaviour(found, profile), found)
+                met.append(len(wanted) + 1 - len(missed))
+                lacking.append(missed)
+                curves.append(evaluate(profile.channels.conservative, GRID)[0])
+            yield name, kind, met, len(wanted) + 1, spread(curves), lacking
+
+
+def spread(curves) -> float:
+    """RMS difference of two runs' force curves, in units of the larger one's peak."""
+    if len(curves) < 2:
+        return float("nan")
+    peak = max(np.abs(curve).max() for curve in curves)
+    return float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2)) / peak) if peak else 0.0
+
+
+def main() -> None:
+    table = list(rows())
+    print(f"{'object':14}{'templates':>12}{'raw':>8}{'spread: templates':>20}{'raw':>8}")
+    for name in OBJECTS:
+        ours, raw = (next(r for r in table if r[:2] == (name, k)) for k in ("templates", "raw"))
+        print(
+            f"{name:14}{sum(ours[2]):>6} of {2 * ours[3]:<2}{sum(raw[2]):>5} of {2 * raw[3]:<2}"
+            f"{ours[4]:>14.2f}{raw[4]:>12.2f}"
+        )
+    for kind in ("templates", "raw"):
+        mine = [row for row in table if row[1] == kind]
+        met, of = sum(sum(row[2]) for row in mine), sum(2 * row[3] for row in mine)
+        whole = sum(m == row[3] for row in mine for m in row[2])
+        print(
+            f"{kind}: {met} of {of} behaviours, all of an object's in {whole} of {2 * len(mine)} "
+            f"answers; spread {np.nanmean([row[4] for row in mine]):.2f}"
+        )
+    print(json.dumps({f"{r[0]}/{r[1]}": [list(x.values()) for x in r[5]] for r in table}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

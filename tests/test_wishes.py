@@ -1,0 +1,188 @@
+"""What is said of joints is read as what it means, and checked on joints that do it or do not."""
+
+from itertools import permutations
+
+import pytest
+from test_behaviour import curve, joint, steady
+
+from joda.behaviour import behaviour
+from joda.wishes import WISHES, Wanted, read_wishes, state, unmet
+
+ALL = [Wanted(name, 5 if name == "clicks" else 0) for name in WISHES if name != "moves"]
+
+
+@pytest.mark.parametrize("wish", ALL, ids=lambda wish: wish.name)
+def test_a_wish_is_read_back_from_its_own_sentence(wish):
+    assert read_wishes(state([wish])) == [wish]
+    assert read_wishes(state([wish]), refused=True) == (
+        [] if not WISHES[wish.name].denies else [Wanted("closes_anywhere")]
+    )
+
+
+def test_any_two_wishes_are_read_back_from_one_description():
+    for pair in permutations(ALL, 2):
+        assert set(read_wishes(state(pair))) == set(pair)
+    assert set(read_wishes(state(ALL))) == set(ALL)
+    assert state([]) == ""
+
+
+def names(text: str, **kwargs) -> str:
+    return " ".join(sorted(wish.name for wish in read_wishes(text, **kwargs)))
+
+
+@pytest.mark.parametrize(
+    ("text", "means"),
+    [
+        ("The door swings shut by itself when it is almost closed.", "closes_near"),
+        ("A magnet pulls it in over the last few centimetres.", "closes_near"),
+        ("The door closes automatically when it is nearly shut.", "closes_near"),
+        ("It closes softly by itself from anywhere.", "closes_anywhere soft"),
+        ("Self-closing door.", "closes_anywhere"),
+        ("It closes on its own.", "closes_anywhere"),
+        ("A spring pulls the door closed from any position.", "closes_anywhere"),
+        ("The button springs back when let go.", "closes_anywhere"),
+        ("soft-close drawer", "soft"),
+        ("It shuts quietly and slowly.", "soft"),
+        ("It never slams.", "soft"),
+        ("It closes without slamming", "soft"),
+        ("The lid falls open past the middle.", "opens_past"),
+        ("Once past half-way it falls open.", "opens_past"),
+        ("It stays where you leave it!", "stays_put"),
+        ("Free-stop hinge.", "stays_put"),
+        ("The lid holds any angle.", "stays_put"),
+        ("It stays open at the middle.", "stays_half"),
+        ("The door stays wide open.", "stays_open"),
+        ("It stays shut until you pull hard.", "held_shut"),
+        ("A magnetic catch keeps it closed.", "held_shut"),
+        ("It latches shut with a click.", "latched"),
+        ("You need to push it to latch.", "latched"),
+        ("A rocker that snaps over to either side.", "two_sides"),
+        ("It flips between two stable positions.", "two_sides"),
+        ("The stick returns to its centre from either side.", "returns_to_middle"),
+        ("It springs back to neutral.", "returns_to_middle"),
+        ("A button that pops in.", "snaps"),
+        # two in one sentence
+        ("It closes by itself when nearly closed and stays wide open.", "closes_near stays_open"),
+        ("It does not latch and stays wherever it is left.", "stays_put"),
+        ("The door stays closed, but it does not latch.", "held_shut"),
+        ("It returns from anywhere, and it closes gently.", "closes_anywhere soft"),
+        # denied
+        ("It does not stay where it is left.", ""),
+        ("It should not stay open.", ""),
+        ("The door does not close by itself.", "left_open"),
+        ("It won't shut on its own.", "left_open"),
+        ("Without a push it does not close.", ""),
+        # about something else
+        ("The latch is on the right.", ""),
+        ("A white door with two hinges.", ""),
+        ("It can be opened half-way.", ""),
+        ("It opens to the left, the handle is made of steel.", ""),
+        ("The door is heavy and has a lot of friction.", ""),
+        ("It closes with a bang.", ""),
+        ("The detents are too strong.", ""),
+        ("", ""),
+    ],
+)
+def test_what_people_say_is_read_as_what_it_means(text, means):
+    assert names(text) == means
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("It clicks into 5 positions.", 5),
+        ("It snaps into three stable positions.", 3),
+        ("The knob has 8 detents.", 8),
+        ("A rotary switch with 4 click stops.", 4),
+        ("A knob with twelve positions", 12),
+        ("It has detents.", 0),
+    ],
+)
+def test_numbers_of_positions_are_read_as_digits_and_words(text, number):
+    assert read_wishes(text) == [Wanted("clicks", number)]
+
+
+@pytest.mark.parametrize(
+    ("text", "denies"),
+    [
+        ("It does not stay where it is left.", "stays_put"),
+        ("It doesn't close by itself from anywhere.", "closes_anywhere"),
+        ("It should not stay open, but it clicks into 5 positions.", "stays_open"),
+        ("The knob turns smoothly. It has no detents.", "clicks"),
+        ("Without clicks", "clicks"),
+        ("The door stays closed, but it does not latch.", "latched"),
+        ("It stays open.", ""),
+    ],
+)
+def test_what_is_denied_is_told_apart(text, denies):
+    assert names(text, refused=True) == denies
+
+
+# Per wish: forces, friction, damping of a joint that does it, and of one that does not. The slide
+# is 1 m long and moves 1 kg; forces in N, negative closes.
+NOTHING = ((), (), ())
+FRICTION = ((), (steady(6),), (steady(3),))
+MAGNET = ((curve((-12, -4, 0), (0, 0.1)),), (steady(1),), (steady(3),))
+RETURN = ((curve((-3, -8)),), (steady(1),), (steady(20),))
+TOGGLE = ((curve((-6, 6)),), (steady(0.2),), (steady(5),))
+CENTRE = ((curve((6, -6)),), (steady(0.1),), (steady(5),))
+LATCH = ((curve((-8, -12, -6, 0, 6, 0), (0, 0.08)),), (steady(1),), (steady(3),))
+FIVE = (
+    (
+        curve((-3, -8, 0), (0, 0.125)),
+        *(curve((0, 8, 0, -8, 0), (k / 4 - 0.125, k / 4 + 0.125)) for k in (1, 2, 3)),
+        curve((0, 8, 3), (0.875, 1)),
+    ),
+    (steady(0.3),),
+    (steady(4),),
+)
+HUMP = ((curve((0, -40, 0, 40, 0), (0.45, 0.55)),), (steady(0.5),), (steady(2),))
+CASES = {
+    "moves": (FRICTION, ((steady(-80),), (), ())),
+    "closes_near": (MAGNET, FRICTION),
+    "closes_anywhere": (RETURN, MAGNET),
+    "left_open": (FRICTION, MAGNET),
+    "opens_past": (((curve((-4, 6)),), (steady(0.2),), (steady(5),)), RETURN),
+    "held_shut": (MAGNET, ((steady(2),), (steady(0.1),), (steady(3),))),
+    "latched": (LATCH, MAGNET),
+    "stays_put": (FRICTION, RETURN),
+    "stays_half": (FRICTION, TOGGLE),
+    "stays_open": (TOGGLE, RETURN),
+    "clicks": (FIVE, TOGGLE),
+    "two_sides": (TOGGLE, RETURN),
+    "returns_to_middle": (CENTRE, TOGGLE),
+    "snaps": (HUMP, FRICTION),
+    "soft": (RETURN, ((steady(-8),), (), (steady(1),))),
+}
+
+
+def test_every_wish_has_its_two_joints():
+    assert CASES.keys() == WISHES.keys()
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize("name", CASES)
+def test_a_wish_is_met_by_a_joint_that_does_it_and_not_by_one_that_does_not(tmp_path, name, mirror):
+    wanted = [Wanted(name, 5 if name == "clicks" else 0)]
+    does, does_not = CASES[name]
+    lacking = []
+    for parts in (does, does_not):
+        found, given = joint(tmp_path, *parts, mass=0.2 if name == "snaps" else 1.0, mirror=mirror)
+        lacking.append(unmet(wanted, behaviour(found, given), found))
+    assert lacking[0] == {}
+    assert list(lacking[1]) == [name]
+    assert lacking[1][name].startswith(f"It {wanted[0].sentence}: no, ")
+
+
+def test_soft_closing_is_asked_of_a_joint_that_closes(tmp_path):
+    found, given = joint(tmp_path, *FRICTION)
+    lacking = unmet([Wanted("soft")], behaviour(found, given), found)
+    assert lacking == {"soft": "It closes softly: no, it does not close by itself."}
+
+
+def test_more_clicks_are_wanted_than_there_are(tmp_path):
+    found, given = joint(tmp_path, *FIVE)
+    behaved = behaviour(found, given)
+    assert unmet([Wanted("clicks", 6)], behaved, found) == {
+        "clicks": "It clicks into 6 positions: no, it rests by itself at 5 positions, not 6."
+    }
