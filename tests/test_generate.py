@@ -205,13 +205,14 @@ def test_a_joint_that_moves_nothing_visible_goes_by_the_text(joda, tmp_path):
     assert "No pictures, the proposer goes by the text" in out and "moves no geom" in out
 
 
-def test_a_joint_that_no_hand_can_move_is_one_sentence(tmp_path):
+def test_a_joint_that_moves_nothing_but_an_inertia_goes_by_the_text(tmp_path):
     (tmp_path / "m.xml").write_text(
         """<mujoco><worldbody><body><joint name="door" range="0 90"/>
         <inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody></mujoco>"""
     )
-    with pytest.raises(JodaError, match="all that joint 'door' moves lies on its axis"):
-        generate(tmp_path / "m.xml", "door", tmp_path / "out")
+    made = generate(tmp_path / "m.xml", "door", tmp_path / "out")
+    assert not made.history.rounds[-1].unmet
+    assert any(note.startswith("No pictures") for note in made.notes)
 
 
 def test_rounds_limit_the_proposals(made, quick, tmp_path):
@@ -494,6 +495,8 @@ def test_ctrl_c_stops_at_once_and_it_can_be_resumed(joda, server, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "MUJOCO_GL": "disabled"},
+        # a runner in the background may have told its children to ignore Ctrl-C
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60
     while len(server.requests) < 2 and running.poll() is None and time.monotonic() < deadline:

@@ -80,7 +80,7 @@ def test_the_command_tells_a_line_per_joint(joda, models, tmp_path):
     (models / "notes.xml").write_text("<notes>no model</notes>")
     status, out, err = joda("generate", models, "-o", tmp_path / "out", "--rounds", "1")
     assert status == 2 and err.count("\n") == 1
-    assert err.startswith("joda: 1 of 4 joints have no profile")
+    assert err.startswith("joda: 1 of 4 have no profile")
     lines = out.splitlines()
     assert len(lines) == 4 and all(any(line.startswith(n) for line in lines) for n in NAMES)
     assert next(line for line in lines if line.startswith("broken: ")).count("broken.xml") == 1
@@ -248,7 +248,7 @@ def test_a_refusal_in_a_batch_is_that_joints(server, models, tmp_path, joda):
 
     server.results = results
     status, out, err = joda("generate", models, "-o", tmp_path / "out")
-    assert status == 2 and "1 of 3 joints" in err
+    assert status == 2 and "1 of 3 have no profile" in err
     assert "kitchen/drawer/drawer: the service refuses the request (Bad)." in out
     assert whole(tmp_path / "out" / "kitchen" / "drawer" / "drawer").usage.requests == 1
     assert whole(tmp_path / "out" / "refrigerator" / "door").complete

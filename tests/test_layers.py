@@ -12,14 +12,16 @@ PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 LAYERS = [
     {"errors", "_build", "_core"},
     {"files", "plugin"},
-    {"runs"},
+    {"runs", "least_squares", "smoothing"},
     {"profile"},
     {"field", "model", "mjcf", "template", "proposal"},
     {"scene", "motion", "offscreen", "_schema"},
     {"studio", "_context"},
     {"_attach", "_compile", "draw"},  # stages, never each other
-    {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx"},  # what combines them
-    {"behaviour", "_templates"},
+    {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx", "parameters"},  # what combines them
+    {"behaviour", "_templates", "solo"},
+    {"fitting"},
+    {"_refine"},
     {"wishes"},
     {"propose"},
     {"history"},

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from joda._generate import generate
     from joda._generate_all import generate_all
     from joda._plot import plot
+    from joda._refine import refine
     from joda._render import render
     from joda._revise import revise
     from joda._schema import schema
@@ -45,6 +46,7 @@ __all__ = [
     "plot",
     "plugin_path",
     "read_profiles",
+    "refine",
     "render",
     "revise",
     "schema",
@@ -60,6 +62,7 @@ COMMANDS = (
     "demo",
     "generate",
     "plot",
+    "refine",
     "render",
     "revise",
     "schema",

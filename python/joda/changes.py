@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from joda.draw import COLOURS, GRAVITY, house_style
 from joda.field import evaluate
-from joda.profile import CHANNELS, Channel, Component, Profile
+from joda.profile import CHANNELS, Component, Profile
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -60,25 +61,32 @@ def overlay(
     with house_style():
         figure = Figure(figsize=(8, 7), dpi=120, layout="constrained")
         panels = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
-        s = np.linspace(0, 1, 2001)
-        lo, hi = after.joint.range
-        q = lo + s * (hi - lo)
-        for axes, name in zip(panels, CHANNELS, strict=True):
-            for profile, style in (
-                (before, {"color": "#888888", "ls": "--", "label": "before"}),
-                (after, {"color": COLOURS[name], "label": "after"}),
-            ):
-                channel: Channel = getattr(profile.channels, name)
-                axes.plot(q, evaluate(channel, s)[0], lw=1.8, **style)
-            if name == "conservative" and gravity is not None:
-                axes.plot(*gravity, color=GRAVITY, ls=":", lw=1.4, label="balances gravity")
-            axes.axhline(0, color="#bbbbbb", lw=0.7, zorder=0)
-            axes.set_ylabel(f"{NOUNS[name]} ({_unit(name, after)})")
-            axes.spines[["top", "right"]].set_visible(False)
+        draw_channels(panels, before, after, gravity)
         panels[0].legend(frameon=False, fontsize=9, ncols=3)
         panels[0].set_title(f"{after.joint.name}: before and after", loc="left", parse_math=False)
         panels[-1].set_xlabel(f"joint position ({after.joint.unit})")
         return figure
+
+
+def draw_channels(
+    panels: "Sequence[Axes]",
+    before: Profile,
+    after: Profile,
+    gravity: tuple[Array, Array] | None = None,
+) -> None:
+    """Draws both profiles' channels, one on each of three axes; arguments as for `overlay`."""
+    s = np.linspace(0, 1, 2001)
+    lo, hi = after.joint.range
+    q = lo + s * (hi - lo)
+    for axes, name in zip(panels, CHANNELS, strict=True):
+        old, new = (evaluate(getattr(p.channels, name), s)[0] for p in (before, after))
+        axes.plot(q, old, lw=1.8, color="#888888", ls="--", label="before")
+        axes.plot(q, new, lw=1.8, color=COLOURS[name], label="after")
+        if name == "conservative" and gravity is not None:
+            axes.plot(*gravity, color=GRAVITY, ls=":", lw=1.4, label="balances gravity")
+        axes.axhline(0, color="#bbbbbb", lw=0.7, zorder=0)
+        axes.set_ylabel(f"{NOUNS[name]} ({_unit(name, after)})")
+        axes.spines[["top", "right"]].set_visible(False)
 
 
 def _pairs(

@@ -322,6 +322,76 @@ def plot(
 
 
 @app.command()
+def refine(
+    model: Annotated[
+        Path, typer.Argument(help="Scene whose joint carries a profile.", show_default=False)
+    ],
+    runs: Annotated[list[Path], typer.Argument(help="Measured runs (CSV: time, position, force).")],
+    joint: Joint,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Scene to write.", show_default=False)
+    ],
+    check: Annotated[
+        list[Path] | None, typer.Option(help="A run that is only compared, not fitted.")
+    ] = None,
+    iterations: Annotated[int, typer.Option(min=1, help="At most so many.")] = 15,
+    method: Annotated[
+        Literal["lm", "adam"], typer.Option(help="Levenberg-Marquardt or Adam.")
+    ] = "lm",
+    fit: Annotated[
+        str,
+        typer.Option(
+            help="What may change, with commas: values, intervals, strengths, damping_ratio, "
+            "inertia, gravity."
+        ),
+    ] = "values,intervals",
+    free_shape: Annotated[
+        bool, typer.Option("--free-shape", help="Let curves change sign, rising parts fall.")
+    ] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Bend a joint's profile until simulation matches measured motions.
+
+    Leaves, beside the scene, its .composed.json, .png and .history.json. Example:
+
+        joda refine scene.xml run1.csv run2.csv --joint door -o better.xml
+    """
+    from joda import refine as run
+
+    with _loss_bar() as bar:
+        result = run(
+            model, joint, runs, output, check=check or (), iterations=iterations, method=method,
+            fit=[name.strip() for name in fit.split(",") if name.strip()],  # type: ignore[misc]
+            keep_shape=not free_shape, force=force, progress=bar,
+        )  # fmt: skip
+    if as_json:
+        _print_json(
+            {key: str(v) if isinstance(v, Path) else v for key, v in asdict(result).items()}
+        )
+        return
+    for change in result.changes or ("Nothing changed.",):
+        print(change)
+    unit = "rad or m"
+    print(
+        f"Position error: {result.before:.3g} → {result.after:.3g} {unit} RMS after "
+        f"{result.iterations} iterations; the measurement's noise is {result.noise:.2g}."
+    )
+    if result.checked:
+        print(
+            f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS."
+        )
+    for channel, places in result.unseen.items():
+        if places:
+            where = ", ".join(f"s = {a:.2f} to {b:.2f}" for a, b in places)
+            print(f"The data tell little of {channel} at {where}; there it is as it was before.")
+    for note in result.notes:
+        print(note)
+    for path in (result.scene, result.composed, result.picture, result.history):
+        print(path)
+
+
+@app.command()
 def render(
     model: Model,
     joint: Joint,
@@ -546,3 +616,10 @@ def _bar() -> Iterator[Any]:
         yield lambda done, total, what: bar.update(
             task, completed=done, total=total, description=what
         )
+
+
+@contextmanager
+def _loss_bar() -> Iterator[Any]:
+    """A progress bar of iterations with the present misfit, silent where stderr is no terminal."""
+    with _bar() as bar:
+        yield lambda stage, number, total, rms: bar(number, total, f"{stage}, RMS {rms:.3g}")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from joda._attach import attach
 from joda._context import Context
@@ -62,11 +63,16 @@ def rig(context: Context, profile: Profile) -> mujoco.MjModel:
         return load_model(scene)
 
 
-def _hinge(context: Context) -> dict[str, float | str]:
-    """A mass on an arm: m g (x cos q + z sin q) is gravity's torque about the y axis."""
+def gravity_factors(context: Context) -> NDArray[np.float64]:
+    """Of a hinge: the factors of cos q and sin q that gravity's torque consists of, N·m."""
     q = np.array(context.positions)
     shape = np.stack([np.cos(q), np.sin(q)], axis=1)
-    torque = np.linalg.lstsq(shape, np.array(context.gravity_force), rcond=None)[0]
+    return np.asarray(np.linalg.lstsq(shape, np.array(context.gravity_force), rcond=None)[0])
+
+
+def _hinge(context: Context) -> dict[str, float | str]:
+    """A mass on an arm: m g (x cos q + z sin q) is gravity's torque about the y axis."""
+    torque = gravity_factors(context)
     # Heavy enough for its m r^2 to be a tenth of the inertia.
     inertia = context.equivalent_inertia
     mass = max(float(10 * torque @ torque / (inertia * GRAVITY**2)), inertia)

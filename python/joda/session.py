@@ -66,11 +66,6 @@ class Session:
         self.notes: list[str] = []
         self.model = self._path(history.model)
         self.context: Context = context(self.model, history.joint)
-        if not self.context.lever_arm > 0:
-            raise JodaError(
-                f"{self.model}: all that joint '{self.context.joint.name}' moves lies on its axis, "
-                "where no hand can move it; give its body a geom or a mass beside the axis."
-            )
         self._templates = [self._path(path) for path in history.templates]
         library = read_templates(self._templates)
         self.turns = [self._turn(round) for round in history.rounds]

@@ -1,0 +1,134 @@
+"""Measured motions of a joint, one CSV file each: time, position, and what else was recorded."""
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.errors import JodaError
+from joda.files import read_text
+
+Array = NDArray[np.float64]
+
+COLUMNS = ("time", "position", "velocity", "force")
+LEAST = 4
+"""Fewest samples that make a run."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A measured motion; all arrays have shape (n,).
+
+    Attributes:
+        name: of its file.
+        time: s, strictly increasing, perhaps uneven.
+        position: rad or m, zero and sign as the joint's qpos.
+        velocity: rad/s or m/s; None where it was not measured.
+        force: applied to the joint from outside, N·m or N; NaN where it is not known, zero where
+            the file has no such column.
+        forced: whether the file has the column.
+    """
+
+    name: str
+    time: Array
+    position: Array
+    velocity: Array | None
+    force: Array
+    forced: bool
+
+
+def read_run(path: str | Path) -> Run:
+    """Reads a timed run.
+
+    Args:
+        path: CSV with a header row: `time` and `position`, optionally `velocity` and `force`; other
+            columns are ignored, lines beginning with # are comments.
+
+    Returns:
+        the run.
+
+    Raises:
+        JodaError: it cannot be read; file, line and column are named.
+    """
+    path = Path(path)
+    lines, columns = _table(path)
+    for name in ("time", "position"):
+        if name not in columns:
+            raise JodaError(
+                f"{path}: no column '{name}'; it has {', '.join(columns) or 'none'}, and a run "
+                "needs time (s) and position (rad or m)."
+            )
+    if len(lines) < LEAST:
+        raise JodaError(f"{path}: {len(lines)} samples; a run needs at least {LEAST}.")
+    for name in ("time", "position", "velocity"):
+        missing = np.flatnonzero(np.isnan(columns.get(name, np.zeros(1))))
+        if len(missing):
+            raise JodaError(
+                f"{path}, line {lines[missing[0]]}: {name} is empty; only force may be."
+            )
+    time = columns["time"]
+    back = np.flatnonzero(np.diff(time) <= 0)
+    if len(back):
+        line = lines[back[0] + 1]
+        raise JodaError(f"{path}, line {line}: time does not increase; sort the rows by time.")
+    return Run(
+        name=path.name,
+        time=time,
+        position=columns["position"],
+        velocity=columns.get("velocity"),
+        force=columns.get("force", np.zeros(len(time))),
+        forced="force" in columns,
+    )
+
+
+def _table(path: Path) -> tuple[list[int], dict[str, Array]]:
+    """Line numbers of the rows, and the known columns; NaN where a cell is empty."""
+    rows = _rows(path)
+    number, header = next(rows, (0, []))
+    names = [name.strip().lower() for name in header]
+    if not set(names) & set(COLUMNS):
+        raise JodaError(
+            f"{path}: no header row with time and position; the first row must name the columns."
+        )
+    for name in COLUMNS:
+        if names.count(name) > 1:
+            raise JodaError(f"{path}, line {number}: column '{name}' is there twice.")
+    lines: list[int] = []
+    values: dict[str, list[float]] = {name: [] for name in names if name in COLUMNS}
+    for number, row in rows:
+        if len(row) != len(names):
+            raise JodaError(
+                f"{path}, line {number}: {len(row)} cells, the header has {len(names)} columns."
+            )
+        lines.append(number)
+        for name, cell in zip(names, row, strict=True):
+            if name in values:
+                values[name].append(_cell(path, number, name, cell.strip()))
+    return lines, {name: np.array(column) for name, column in values.items()}
+
+
+def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Rows with the numbers of their lines; comments and empty lines are left out."""
+    reader = csv.reader(StringIO(read_text(path).removeprefix("\ufeff")))
+    try:
+        for row in reader:
+            if row and any(map(str.strip, row)) and not row[0].lstrip().startswith("#"):
+                yield reader.line_num, row
+    except csv.Error as error:
+        raise JodaError(f"{path}, line {reader.line_num}: not CSV ({error}).") from None
+
+
+def _cell(path: Path, line: int, name: str, text: str) -> float:
+    if not text:
+        return float("nan")
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise JodaError(f"{path}, line {line}: {name} is '{text}'; it must be a number.")
+    return value

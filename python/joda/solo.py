@@ -1,0 +1,263 @@
+"""One joint by itself, in JAX: the physics step of MuJoCo with the plugin, solved in closed form.
+
+With all other joints held, a step's constraint problem has one unknown, the joint's acceleration,
+and at most three rows: dry friction, damping, an end of the range. Its optimality condition is
+increasing and piecewise linear, so its solution can be written down; MuJoCo and MJX find the same
+by iteration. That makes whole measured runs differentiable in milliseconds.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import mujoco
+
+from joda._context import Context
+from joda.field import jaxfield
+from joda.parameters import Slot
+from joda.profile import CHANNELS, Profile
+from joda.rig import gravity_factors
+
+Array = jax.Array
+
+EXPLICIT_STIFFNESS = 1.0
+"""As kExplicitStiffness in cpp/joint_dynamics.cc, and so on."""
+STRIDE = 0.25
+STIFF_ROW = 1e4
+
+MIN_IMPEDANCE, MAX_IMPEDANCE = 1e-4, 0.9999
+"""mjMINIMP, mjMAXIMP."""
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=(
+        *("conservative", "friction", "damping", "range", "inertia", "gravity", "solref", "solimp"),
+    ),
+    meta_fields=("hinge",),
+)
+@dataclass(frozen=True)
+class Solo:
+    """A joint with its profile.
+
+    Attributes:
+        conservative, friction, damping: the channels, N or N·m and per m/s or rad/s.
+        range: ends of the range, rad or m, shape (2,).
+        inertia: kg·m² or kg.
+        gravity: hinge: factors of cos q and sin q of gravity's torque, N·m; slide: force and 0.
+            Shape (2,).
+        solref: time constant (s) and damping ratio of the range's ends, shape (2,).
+        solimp: impedance of the range's ends, shape (5,).
+        hinge: whether it is a hinge.
+    """
+
+    conservative: jaxfield.Channel
+    friction: jaxfield.Channel
+    damping: jaxfield.Channel
+    range: Array
+    inertia: Array
+    gravity: Array
+    solref: Array
+    solimp: Array
+    hinge: bool
+
+
+@partial(jax.tree_util.register_dataclass, data_fields=("q", "v", "held"), meta_fields=())
+@dataclass(frozen=True)
+class State:
+    """Position (rad or m), velocity, and the friction force of the step before (N·m or N)."""
+
+    q: Array
+    v: Array
+    held: Array
+
+
+Prepared = tuple[Solo, jaxfield.Cubics, jaxfield.Cubics, jaxfield.Cubics]
+
+
+def from_context(context: Context, profile: Profile, model: mujoco.MjModel, joint: int) -> Solo:
+    """The joint of a model with a profile.
+
+    Args:
+        context: the joint's.
+        profile: of the joint.
+        model: compiled; the solver parameters of the joint's ends are taken from it.
+        joint: its id in the model.
+    """
+    hinge = context.joint.type == "hinge"
+    channels = {name: jaxfield.from_channel(getattr(profile.channels, name)) for name in CHANNELS}
+    return Solo(
+        **channels,
+        range=jnp.array(profile.joint.range),
+        inertia=jnp.array(context.equivalent_inertia),
+        gravity=jnp.array(gravity_factors(context) if hinge else (context.gravity_force[0], 0.0)),
+        solref=jnp.array(model.jnt_solref[joint]),
+        solimp=jnp.array(model.jnt_solimp[joint]),
+        hinge=hinge,
+    )
+
+
+def changed(first: Solo, slots: tuple[Slot, ...], values: jax.Array) -> Solo:
+    """The joint with other numbers; differentiable.
+
+    Args:
+        first: the joint as it was.
+        slots: what each number is.
+        values: the numbers times their scales, shape (n,).
+    """
+    channels: dict[str, dict[str, jax.Array]] = {
+        name: {part: getattr(getattr(first, name), part) for part in ("a", "b", "y", "strength")}
+        for name in CHANNELS
+    }
+    solref, inertia, gravity = first.solref, first.inertia, first.gravity
+    for k, slot in enumerate(slots):
+        if slot.kind == "values":
+            y = channels[slot.channel]["y"]
+            channels[slot.channel]["y"] = y.at[slot.component, slot.index].set(values[k])
+        elif slot.kind == "intervals":
+            part = "ab"[slot.index]
+            ends = channels[slot.channel][part]
+            channels[slot.channel][part] = ends.at[slot.component].set(values[k])
+        elif slot.kind == "strengths":
+            channels[slot.channel]["strength"] = values[k]
+        elif slot.kind == "damping_ratio":
+            solref = solref.at[1].multiply(jnp.exp(values[k]))
+        elif slot.kind == "inertia":
+            inertia = inertia * jnp.exp(values[k])
+        else:
+            gravity = gravity.at[slot.index].add(values[k])
+    parts = {name: replace(getattr(first, name), **channels[name]) for name in CHANNELS}
+    return replace(first, **parts, solref=solref, inertia=inertia, gravity=gravity)
+
+
+def prepare(joint: Solo) -> Prepared:
+    """Does once what does not depend on the state."""
+    return (
+        joint,
+        jaxfield.prepare(joint.conservative, pieces=True),
+        jaxfield.prepare(joint.friction),
+        jaxfield.prepare(joint.damping),
+    )
+
+
+def step(prepared: Prepared, state: State, force: Array, h: float, blur: Array) -> State:
+    """One step of semi-implicit Euler.
+
+    Args:
+        prepared: the joint.
+        state: before.
+        force: applied from outside, N·m or N.
+        h: timestep, s.
+        blur: speed (rad/s or m/s) below which dry friction fades, as a smooth stand-in while a fit
+            is far off; 0: exact.
+
+    Returns:
+        the state after.
+    """
+    joint, conservative, friction, damping = prepared
+    lo, hi = joint.range[0], joint.range[1]
+    inertia, span = joint.inertia, hi - lo
+    q, v = state.q, state.v
+    s = (q - lo) / span
+    own = jaxfield.evaluate(conservative, s)[0]
+    drag = jaxfield.evaluate(damping, s)[0]
+    bound = jaxfield.evaluate(friction, s)[0]
+    drag = drag + h * _implicit_stiffness(conservative, s, v, own, inertia, span, h)
+    blurred = blur > 0
+    speed = jnp.sqrt(jnp.where(blurred, v * v + blur * blur, 1.0))
+    drag = drag + jnp.where(blurred, bound / speed, 0.0)
+    bound = jnp.where(blurred, 0.0, bound)
+    if joint.hinge:
+        weight = joint.gravity[0] * jnp.cos(q) + joint.gravity[1] * jnp.sin(q)
+    else:
+        weight = joint.gravity[0]
+    drive = own + weight + force
+
+    # Optimality: mass * a = drive + friction(a) + limit(a); mass and drive hold the damping row.
+    mass = inertia + h * drag
+    drive = drive - drag * v
+    stiff = STIFF_ROW * inertia
+    held = jnp.clip(state.held, -bound, bound)
+    # friction(a) = clamp(offset - stiff a, -bound, bound)
+    offset = held - stiff * v / h
+    sign, D, reference = _limit(joint, q, v, s)
+
+    def solved(extra_mass: Array, extra_drive: Array) -> tuple[Array, Array]:
+        """Acceleration and friction force, with or without the limit's row."""
+        m, f = mass + extra_mass, drive + extra_drive
+        stuck = (f + offset) / (m + stiff)
+        up, down = (f + bound) / m, (f - bound) / m
+        at_stuck = offset - stiff * stuck
+        a = jnp.where(at_stuck > bound, up, jnp.where(at_stuck < -bound, down, stuck))
+        return a, jnp.clip(at_stuck, -bound, bound)
+
+    free, force_free = solved(jnp.zeros_like(mass), jnp.zeros_like(mass))
+    held_back, force_back = solved(D, D * sign * reference)
+    pushes = (D > 0) & (sign * free - reference < 0)
+    a = jnp.where(pushes, held_back, free)
+    after = v + h * a
+    return State(q + h * after, after, jnp.where(pushes, force_back, force_free))
+
+
+def _implicit_stiffness(
+    conservative: jaxfield.Cubics,
+    s: Array,
+    v: Array,
+    force: Array,
+    inertia: Array,
+    span: Array,
+    h: float,
+) -> Array:
+    """As ImplicitStiffness in cpp/joint_dynamics.cc."""
+    soft = EXPLICIT_STIFFNESS * inertia / h**2
+    reach = h * (jnp.abs(v) + h / inertia * jnp.abs(force)) / span
+    steepest = jaxfield.max_descent(conservative, s - reach, s + reach) / span
+    return jnp.maximum(jnp.maximum(steepest, jnp.abs(force) / (span * STRIDE)) - soft, 0.0)
+
+
+def _limit(joint: Solo, q: Array, v: Array, s: Array) -> tuple[Array, Array, Array]:
+    """The row of the end that is overstepped: sign, D (0: none), reference acceleration.
+
+    MuJoCo's solver parameters, as in "Solver parameters" of its documentation.
+    """
+    lo, hi = joint.range[0], joint.range[1]
+    low = s < 0.5
+    sign = jnp.where(low, 1.0, -1.0)
+    distance = jnp.where(low, q - lo, hi - q)
+    constant, ratio = joint.solref[0], joint.solref[1]
+    dmin, dmax, width, mid, power = (joint.solimp[k] for k in range(5))
+    dmin, dmax, mid = (jnp.clip(x, MIN_IMPEDANCE, MAX_IMPEDANCE) for x in (dmin, dmax, mid))
+    x = jnp.minimum(jnp.abs(distance) / width, 1.0)
+    below = jnp.where(x < mid, x, mid) / mid
+    above = (1 - jnp.where(x < mid, mid, x)) / (1 - mid)
+    rise = jnp.where(x < mid, mid * below**power, 1 - (1 - mid) * above**power)
+    impedance = dmin + rise * (dmax - dmin)
+    stiffness = 1 / (dmax**2 * constant**2 * ratio**2)
+    damping = 2 / (dmax * constant)
+    D = jnp.where(distance < 0, impedance / (1 - impedance) * joint.inertia, 0.0)
+    return sign, D, -damping * sign * v - stiffness * impedance * distance
+
+
+def rollout(joint: Solo, start: State, force: Array, h: float, blur: Array | float = 0.0) -> Array:
+    """Positions of the joint under a force.
+
+    Args:
+        joint: the joint.
+        start: its state at first.
+        force: applied from outside at each step, N·m or N, shape (n,).
+        h: timestep, s.
+        blur: see `step`.
+
+    Returns:
+        positions before the first step and after each, rad or m, shape (n + 1,).
+    """
+    prepared = prepare(joint)
+    smooth = jnp.asarray(blur, start.q.dtype)
+
+    def advance(state: State, applied: Array) -> tuple[State, Array]:
+        after = step(prepared, state, applied, h, smooth)
+        return after, after.q
+
+    _, positions = jax.lax.scan(advance, start, force)
+    return jnp.concatenate([start.q[None], positions])
