@@ -8,7 +8,7 @@ measurement's error. What the motion does not show is held by a prior at its fir
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
