@@ -1,7 +1,7 @@
 """Fits the numbers of a joint's profile to measured motions, by gradients.
 
 First over short windows, each from its own measured start, so that errors do not pile up and the
-misfit stays smooth in the numbers; then over whole runs, whose starts are fitted too, within their
+misfit stays smooth in the numbers; then over whole runs. The starts are fitted too, within their
 measurement's error. What the motion does not show is held by a prior at its first value.
 """
 
@@ -30,12 +30,17 @@ Traced = Any
 
 WINDOW = 0.4
 """Length of a window, s."""
-STARTS = 3
+STARTS = 6
 """Iterations that fit the starts of runs."""
 FINEST = 2e-5
 """Least noise that is believed, in units of the range."""
+ANNEAL = 0.3
+"""What is believed of a misfit before it is fitted: this share of it may be the model's."""
 BLUR = 0.05
 """Speed below which friction is blurred at first, in ranges per second."""
+
+
+Freedom = Literal["components", "values", "all"]
 
 
 @partial(
@@ -156,7 +161,8 @@ def _misfit(
     state = State(start[0], start[1], jnp.zeros_like(start[0]))
     path = solo.rollout(joint, state, part.force, h, blur)
     before, after = path[part.index], path[part.index + 1]
-    return part.mask * (before + part.weight * (after - before) - part.position)
+    misfit: jax.Array = before + part.weight * (after - before) - part.position
+    return jnp.where(part.mask > 0, misfit, 0.0)
 
 
 def _and_misfit(
@@ -244,13 +250,22 @@ class Problem:
     def starts(self, theta: Array, data: Data) -> Array:
         """The starts, within their measurement's errors, from which the prediction fits best."""
         doubt = self._doubt(data)
-        x = np.zeros_like(data.start)
-        for _ in range(STARTS):
-            r, _, slopes = self.misfits(theta, data.start + doubt * x, data)
-            for k, (misfit, slope) in enumerate(zip(r, slopes, strict=True)):
-                J = slope * doubt[k] / self.sigma
-                x[k] -= np.linalg.solve(J.T @ J + np.eye(2), J.T @ misfit / self.sigma + x[k])
-        return np.asarray(data.start + doubt * np.clip(x, -4, 4))
+        found = data.start.copy()
+        free = Inequalities(np.zeros((0, 2)), np.zeros(0))
+        for k, part in enumerate(data.parts):
+            one = Data((part,), data.start[k : k + 1], doubt[k : k + 1])
+
+            def residuals(x: Array, one: Data = one) -> Array:
+                r = self.misfits(theta, one.start + one.doubt * x, one)[0][0]
+                return np.concatenate([r / self.sigma, x])
+
+            def jacobian(x: Array, one: Data = one) -> Array:
+                J = self.misfits(theta, one.start + one.doubt * x, one)[2][0] * one.doubt[0]
+                return np.vstack([J / self.sigma, np.eye(2)])
+
+            best = levenberg_marquardt(residuals, jacobian, np.zeros(2), free, STARTS)
+            found[k] += doubt[k] * best
+        return found
 
     def _doubt(self, data: Data) -> Array:
         return np.maximum(data.doubt, 1e-9 * self.span)
@@ -281,15 +296,17 @@ class Problem:
         """
         history: list[tuple[str, float]] = []
         self._best = self.parameters.start
-        most = 2 if method == "lm" else max(iterations // 3, 1)
-        stages = (
-            ("windows, friction blurred", self.windows, BLUR * self.span, most),
-            ("windows", self.windows, 0.0, most),
-            ("whole runs", self.whole, 0.0, iterations),
+        self._moved: dict[int, Array] = {}  # by data, how far its starts are from the measured
+        share = max(iterations // 4, 1) if method == "adam" else 2
+        stages: tuple[tuple[str, Data, float, Freedom, int], ...] = (
+            ("windows, friction blurred", self.windows, BLUR * self.span, "components", share),
+            ("windows", self.windows, 0.0, "components", share),
+            ("whole runs, curves", self.whole, 0.0, "values", share),
+            ("whole runs, all", self.whole, 0.0, "all", iterations),
         )
         interrupted = False
         try:
-            for name, data, blur, limit in stages:
+            for name, data, blur, freedom, limit in stages:
                 count = min(limit, iterations - len(history))
 
                 def heard(misfit: float, name: str = name) -> None:
@@ -297,7 +314,7 @@ class Problem:
                     told(name, len(history), misfit)
 
                 if count > 0:
-                    self._stage(data, blur, count, method, heard)
+                    self._stage(data, blur, freedom, count, method, heard)
         except KeyboardInterrupt:
             interrupted = True
         return Fit(self._best, self._covariance(self._best), tuple(history), interrupted)
@@ -306,42 +323,53 @@ class Problem:
         self,
         data: Data,
         blur: float,
+        freedom: Freedom,
         iterations: int,
         method: Literal["lm", "adam"],
         told: Callable[[float], None],
     ) -> None:
-        """Fits to windows from fixed starts, to whole runs with starts that are fitted too."""
+        """Fits the parameters, and the starts of the stretches within their errors.
+
+        While the misfit is larger than the noise, the prior counts as if that were the noise.
+        """
         theta, parameters = self._best, self.parameters
-        n = len(theta)
-        free = data is self.whole
-        count = len(data.start) if free else 0
+        basis = parameters.directions(freedom)
+        n, count = basis.shape[1], len(data.start)
         doubt = self._doubt(data)
+        moved = self._moved.get(id(data), np.zeros(2 * count))
+        starts = data.start + doubt * moved.reshape(-1, 2)
+        begun = np.concatenate(self.misfits(theta, starts, data, blur)[0])
+        sigma = max(
+            self.sigma, ANNEAL * float(np.sqrt(np.mean(np.nan_to_num(begun, nan=1e6) ** 2)))
+        )
 
         def split(x: Array) -> tuple[Array, Array]:
-            return x[:n], data.start + doubt * x[n:].reshape(-1, 2) if free else data.start
+            return theta + basis @ x[:n], data.start + doubt * x[n:].reshape(-1, 2)
 
         def residuals(x: Array) -> Array:
-            r = np.concatenate(self.misfits(*split(x), data, blur)[0]) / self.sigma
-            prior = (x[:n] - parameters.start) / parameters.doubt
+            at, starts = split(x)
+            r = np.concatenate(self.misfits(at, starts, data, blur)[0]) / sigma
+            prior = (at - parameters.start) / parameters.doubt
             return np.concatenate([np.nan_to_num(r, nan=1e6), prior, x[n:]])
 
         def jacobian(x: Array) -> Array:
             _, by_theta, by_start = self.misfits(*split(x), data, blur)
-            own = [slope * doubt[k] for k, slope in enumerate(by_start[:count])]
-            J = np.hstack([np.vstack(by_theta), block_diag(*own)]) if own else np.vstack(by_theta)
-            prior = np.diag(np.concatenate([1 / parameters.doubt, np.ones(2 * count)]))
-            return np.vstack([J / self.sigma, prior])
+            own = [slope * doubt[k] for k, slope in enumerate(by_start)]
+            J = np.hstack([np.vstack(by_theta) @ basis, block_diag(*own)]) / sigma
+            return np.vstack([J, block_diag(basis / parameters.doubt[:, None], np.eye(2 * count))])
 
         def heard(_: int, x: Array, __: float) -> None:
-            self._best = x[:n]
+            self._best, self._moved[id(data)] = split(x)[0], x[n:]
             r = np.concatenate(self.misfits(*split(x), data)[0])
             told(float(np.sqrt(np.mean(r**2))))
 
         G = parameters.constraints.G
-        wide = Inequalities(np.hstack([G, np.zeros((len(G), 2 * count))]), parameters.constraints.h)
-        begun = np.concatenate([theta, np.zeros(2 * count)])
+        wide = Inequalities(
+            np.hstack([G @ basis, np.zeros((len(G), 2 * count))]),
+            parameters.constraints.h - G @ theta,
+        )
         minimise = levenberg_marquardt if method == "lm" else adam
-        minimise(residuals, jacobian, begun, wide, iterations, heard)
+        minimise(residuals, jacobian, np.concatenate([np.zeros(n), moved]), wide, iterations, heard)
 
     def _covariance(self, theta: Array) -> Array:
         """From the curvature at the solution, over windows, whose misfits are nearly linear."""

@@ -113,6 +113,26 @@ class Parameters:
                 G[row, column] = factor
         self.constraints = Inequalities(G, np.array([least for _, least in rows]))
 
+    def directions(self, how: Literal["components", "values", "all"]) -> Array:
+        """A basis of the changes that a stage of a fit may make, shape (n, m).
+
+        Args:
+            how: each component as a whole, its control points in step, and what is no control point
+                or interval; or the control points by themselves; or everything.
+        """
+        n = len(self.slots)
+        if how == "all":
+            return np.eye(n)
+        columns: dict[object, Array] = {}
+        for k, slot in enumerate(self.slots):
+            if slot.kind == "intervals":
+                continue
+            whole = how == "components" and slot.kind == "values"
+            key: object = (slot.channel, slot.component) if whole else k
+            column = columns.setdefault(key, np.zeros(n))
+            column[k] = self.start[k] if whole else 1.0
+        return np.stack(list(columns.values()), axis=1) if columns else np.eye(n)
+
     def written(self, theta: Array, *, exact: bool = False) -> Profile:
         """The profile with these numbers, to six digits unless `exact`."""
         content = self.profile.model_dump()

@@ -1,7 +1,9 @@
 """Position, velocity and noise from a measured position: the one smoother there is.
 
-Around each time a parabola is fitted by least squares to the samples within `WINDOW` seconds on
-either side (at least `LEAST` samples): Savitzky and Golay's smoother, for uneven sampling too.
+Around each time a parabola is fitted by least squares to the samples near it (Savitzky and Golay's
+smoother, for uneven sampling too), in the widest of a few windows whose velocity agrees with those
+of all narrower ones: the rule of intersecting confidence intervals (Goldenshluger and Nemirovski,
+1997).
 """
 
 from dataclasses import dataclass
@@ -11,8 +13,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-WINDOW = 0.04
+WINDOWS = (0.02, 0.03, 0.045, 0.07)
+"""Half widths (s) that are tried, from the narrowest on."""
 LEAST = 7
+"""Fewest samples in a window."""
+CONFIDENCE = 1.0
+"""Half width of the intervals, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +28,8 @@ class Smooth:
     Attributes:
         position: rad or m.
         velocity: rad/s or m/s.
-        position_error, velocity_error: their standard deviations from the measurement's noise.
+        position_error, velocity_error: their standard deviations, twice what the noise makes, as
+            the widest window may bend the motion by as much.
     """
 
     position: Array
@@ -69,16 +76,32 @@ def smooth(time: Array, position: Array, at: Array, sigma: float) -> Smooth:
     Returns:
         arrays of shape (m,).
     """
-    out = np.empty((4, len(at)))
-    least = min(LEAST, len(time))
-    for k, t0 in enumerate(at):
-        near = np.flatnonzero(np.abs(time - t0) <= WINDOW)
-        if len(near) < least:
-            near = np.sort(np.argsort(np.abs(time - t0), kind="stable")[:least])
-        t = time[near] - t0
-        A = np.stack([np.ones_like(t), t, t * t], axis=1)[:, : min(3, len(near))]
-        covariance = np.linalg.inv(A.T @ A)
-        fit = covariance @ A.T @ position[near]
-        errors = sigma * np.sqrt(np.diag(covariance))
-        out[:, k] = fit[0], fit[1], errors[0], errors[1]
-    return Smooth(*out)
+    return Smooth(*np.array([_local(time, position, t0, sigma) for t0 in at]).T)
+
+
+def _local(time: Array, position: Array, t0: float, sigma: float) -> tuple[float, ...]:
+    """Position, velocity and their errors at one time."""
+    away = np.abs(time - t0)
+    nearest = np.sort(np.argsort(away, kind="stable")[: min(LEAST, len(time))])
+    out = _parabola(time[nearest] - t0, position[nearest], sigma)
+    low, high = -np.inf, np.inf
+    for half in WINDOWS:
+        near = np.flatnonzero(away <= half)
+        if len(near) < len(nearest):
+            continue
+        wider = _parabola(time[near] - t0, position[near], sigma)
+        low = max(low, wider[1] - CONFIDENCE * wider[3])
+        high = min(high, wider[1] + CONFIDENCE * wider[3])
+        if low > high:
+            break
+        out = wider
+    return out[0], out[1], 2 * out[2], 2 * out[3]
+
+
+def _parabola(t: Array, y: Array, sigma: float) -> tuple[float, float, float, float]:
+    """Value and slope at t = 0, and their standard deviations."""
+    A = np.vander(t, min(3, len(t)), increasing=True)
+    covariance = np.linalg.inv(A.T @ A)
+    fit = covariance @ A.T @ y
+    errors = sigma * np.sqrt(np.diag(covariance))
+    return fit[0], fit[1], errors[0], errors[1]
