@@ -18,7 +18,8 @@ LAYERS = [
     {"scene", "motion", "offscreen", "_schema"},
     {"studio", "_context"},
     {"_attach", "_compile", "draw"},  # stages, never each other
-    {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx", "parameters"},  # what combines them
+    # what combines them
+    {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx", "parameters"},
     {"behaviour", "_templates", "solo"},
     {"fitting"},
     {"_refine"},
