@@ -15,7 +15,7 @@ LAYERS = [
     {"runs", "least_squares", "smoothing"},
     {"profile"},
     {"field", "model", "mjcf", "template", "proposal"},
-    {"scene", "motion", "offscreen", "_schema"},
+    {"scene", "motion", "offscreen", "_schema", "part"},
     {"studio", "_context"},
     {"_attach", "_compile", "draw"},  # stages, never each other
     # what combines them

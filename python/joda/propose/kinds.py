@@ -90,7 +90,7 @@ DOOR = r"door|lid|hinge|flap|panel|front|hatch"
 KINDS = (
     Kind(
         "robot joint",
-        own=r"robot|panda|franka|finger|gripper|wrist|elbow|shoulder|forearm|actuat|motor",
+        own=r"(?<![a-z])arm(?![a-z])|robot|panda|franka|finger|gripper|wrist|elbow|shoulder|forearm|actuat|motor",
         parts=(
             Part("constant_friction_hinge", (0, 1), "its gears rub", friction="weak"),
             Part("constant_damping_hinge", (0, 1), "its gears are greased", damping="weak"),
