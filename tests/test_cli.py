@@ -12,6 +12,8 @@ import pytest
 
 from joda import COMMANDS, JodaError, Profile, bench, demo, plot
 from joda._bench import _without_plugin, hinges
+from joda._refine import Refined
+from joda.cli import app
 
 MODELS = Path(__file__).parents[1] / "models"
 LATCH = Path(__file__).parent / "microwave.latch.json"
@@ -48,6 +50,13 @@ def folder(tmp_path):
 def test_without_arguments_it_shows_its_help():
     assert joda().stdout == joda("--help").stdout
     assert joda().returncode == 0
+
+
+def test_a_renderer_that_mujoco_does_not_know_is_one_sentence():
+    result = joda("schema", MUJOCO_GL="nonsense")
+    assert result.returncode == 2
+    assert "joda: MUJOCO_GL=nonsense cannot be used here" in result.stderr
+    assert "Traceback" not in result.stderr
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -189,6 +198,38 @@ class TestBench:
         assert plain.nv == native.nv == ours.nv == 3
         assert (plain.dof_frictionloss == 0).all()
         assert ours.nplugin == 3
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("hinge", "rad"), ("slide", "m")])
+def test_refine_tells_errors_in_the_joints_unit(kind, unit, tmp_path, monkeypatch, capsys):
+    content = json.loads(LATCH.read_text())
+    content["joint"].update(type=kind, unit=unit)
+    (tmp_path / "composed.json").write_text(json.dumps(content))
+    files = {"scene": "better.xml", "picture": "better.png", "history": "better.history.json"}
+    result = Refined(
+        **{name: tmp_path / path for name, path in files.items()},
+        composed=tmp_path / "composed.json",
+        changes=(),
+        before=0.02,
+        after=0.001,
+        noise=0.0005,
+        checked=(0.03, 0.002),
+        unseen={"friction": ((0.1, 0.25),), "damping": ()},
+        iterations=4,
+        notes=("A note.",),
+    )
+    monkeypatch.setattr("joda._refine.refine", lambda *_, **__: result)
+    command = ["refine", "scene.xml", "run.csv", "--joint", "door", "-o", "better.xml"]
+    app(command, standalone_mode=False)
+    assert capsys.readouterr().out.splitlines() == [
+        "Nothing changed.",
+        f"Position error: 0.02 → 0.001 {unit} RMS after 4 iterations; "
+        f"the measurement's noise is 0.0005 {unit}.",
+        f"On the runs held out: 0.03 → 0.002 {unit} RMS.",
+        "The data tell little of friction at s = 0.10 to 0.25; there it is as it was before.",
+        "A note.",
+        *(str(getattr(result, name)) for name in ("scene", "composed", "picture", "history")),
+    ]
 
 
 class TestPlot:

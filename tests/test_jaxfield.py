@@ -199,7 +199,8 @@ def test_gradients_by_control_values_lie_between_the_one_sided_differences(part,
     for k in range(len(part.x)):
         sides = differences(channel, s, "y", (0, k))
         low, high = sides.min() - 1e-4 * scale, sides.max() + 1e-4 * scale
-        flat = len(set(part.y)) < len(part.y)  # there the derivative may be another direction's
+        # on flat and nearly flat parts the derivative may be another direction's
+        flat = np.abs(np.diff(part.y)).min() < 1e-9 * scale
         assert low <= float(by.y[0, k]) <= high or flat
 
 

@@ -19,6 +19,7 @@ from joda.history import History
 from joda.model import find_joint, load_model
 from joda.motion import Motion, pull, release
 from joda.offscreen import Image, render
+from joda.runs import Run, write_run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +36,8 @@ class Demo:
     """What the demo left behind, and what it saw.
 
     Attributes:
-        folder: with the oven, and all that `joda.generate` leaves.
+        folder: with the oven, all that `joda.generate` leaves, and the motions of the door with the
+            profile as runs: let_go_45.csv, let_go_5.csv.
         plain, scene: the oven as it comes, and with the profile.
         picture: both doors beside each other.
         history: the rounds of the generation.
@@ -94,6 +96,11 @@ def demo(
     found = context(plain, JOINT)
     hand = grip(found), FIRMNESS * found.lever_arm**2, SLOW
     opened = [pull(model, joint, *found.joint.range, *hand) for model in both]
+    for start, (_, motion) in zip(STARTS, let_go, strict=True):
+        path = folder / f"let_go_{np.rad2deg(start):.0f}.csv"
+        every = slice(None, None, max(round(0.005 / both[1].opt.timestep), 1))
+        samples = motion.time[every], motion.position[every], motion.velocity[every]
+        write_run(path, Run(path.name, *samples, force=np.zeros(len(samples[0])), forced=False))
     progress("drawing both doors")
     ends = [float(motion.position[-1]) for motion in let_go[0]]
     views = render(scene, "front", JOINT, [float(STARTS[0]), *ends])

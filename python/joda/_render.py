@@ -19,8 +19,9 @@ from joda.errors import JodaError
 from joda.files import check_target, make_folder, write_bytes
 from joda.model import describe_joint, find_joint, load_model
 from joda.offscreen import HEIGHT, Image, answer, ask
+from joda.part import Array, moving
 from joda.profile import Joint
-from joda.studio import Array, Studio, View, moving
+from joda.studio import Studio, View
 
 ARROW = (0.95, 0.36, 0.05)
 AXIS = (0.12, 0.12, 0.14)

@@ -3,6 +3,7 @@
 `import mujoco` loads it by itself, through the entry point group `mujoco.plugins`.
 """
 
+import os
 from pathlib import Path
 
 from joda._build import MUJOCO_VERSION
@@ -26,7 +27,14 @@ def plugin_path() -> Path:
 
 def load() -> None:
     """Loads the plugin, once; raises JodaError if it was built for another MuJoCo."""
-    import mujoco  # if this is its first import, it calls us through the entry point
+    try:
+        import mujoco  # if this is its first import, it calls us through the entry point
+    except (AttributeError, ImportError, RuntimeError) as error:
+        if not (backend := os.environ.get("MUJOCO_GL")):
+            raise
+        raise JodaError(
+            f"MUJOCO_GL={backend} cannot be used here: {error}; unset it or install libosmesa6."
+        ) from None
 
     global _loaded
     if _loaded:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
-from joda.files import read_text
+from joda.files import read_text, write_text
 
 Array = NDArray[np.float64]
 
@@ -83,6 +83,19 @@ def read_run(path: str | Path) -> Run:
         force=columns.get("force", np.zeros(len(time))),
         forced="force" in columns,
     )
+
+
+def write_run(path: Path, run: Run) -> None:
+    """Writes a run as `read_run` reads it, with a line of comment that names the units."""
+    columns = {"time": run.time, "position": run.position}
+    if run.velocity is not None:
+        columns["velocity"] = run.velocity
+    if run.forced:
+        columns["force"] = run.force
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join("" if np.isnan(x) else f"{x:.9g}" for x in row) for row in rows]
+    header = "# s, rad or m, rad/s or m/s, N·m or N"
+    write_text(path, "\n".join([header, ",".join(columns), *lines]) + "\n")
 
 
 def _table(path: Path) -> tuple[list[int], dict[str, Array]]:

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from joda.offscreen import HEIGHT, WIDTH, Image, opening
 from joda.part import Array, groups, moving, outline
 
-__all__ = ["Array", "Studio", "View", "moving"]
-
 Mask = NDArray[np.bool_]
 
 FOVY = 30.0

@@ -1,0 +1,212 @@
+"""Commands that give a joint its profile: the demo, the loop, and its steps by themselves."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from joda.cli.options import Folder, Force, Json, Key, Model, Scene, Templates, Vlm
+from joda.cli.progress import progress_bar, spinner
+from joda.cli.tell import (
+    generated_as_json,
+    print_json,
+    tell_all,
+    tell_changes,
+    tell_cost,
+    tell_doors,
+    tell_files,
+    tell_round,
+    tell_viewer,
+    with_text_paths,
+)
+
+
+def demo(
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder to fill [default: joda_demo].")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Give an oven door its behaviour, and compare it with the same door without.
+
+    Needs no key and no network. Example:
+
+        joda demo -o joda_demo
+    """
+    from joda import demo as run
+
+    with spinner("demo") as progress:
+        result = run(output, force=force, progress=progress)
+    if as_json:
+        told = {key: value for key, value in vars(result).items() if key != "history"}
+        print_json({**with_text_paths(told), "rounds": len(result.history.rounds)})
+        return
+    for round in result.history.rounds:
+        tell_round(round)
+    tell_doors(result)
+    names = "demo.png", "profile.png", "scene.xml", "composed.json", "history.json", "oven.xml"
+    tell_files(result.folder, names)
+    tell_viewer(result.scene)
+
+
+def generate(
+    model: Annotated[
+        Path, typer.Argument(help="MJCF or URDF file, or a folder of them.", show_default=False)
+    ],
+    output: Folder,
+    joint: Annotated[
+        str | None,
+        typer.Option(
+            "--joint",
+            help="A name, body:NAME[:K] or #K; not needed if there is only one. For a folder: only "
+            "joints of this name.",
+        ),
+    ] = None,
+    proposer: Annotated[
+        str | None,
+        typer.Option(
+            help="anthropic, offline or a proposal.json [default: anthropic where "
+            "ANTHROPIC_API_KEY is set, else offline]."
+        ),
+    ] = None,
+    rounds: Annotated[int, typer.Option(min=1, help="At most so many proposals.")] = 3,
+    describe: Annotated[
+        str, typer.Option(help="What the joint should do, in words.", show_default=False)
+    ] = "",
+    templates: Templates = None,
+    key: Key = "",
+    vlm: Vlm = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what the folder holds.")
+    ] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Give a joint the behaviour of the object: propose, compile, simulate, revise.
+
+    Leaves context.json, pictures, proposal.json, composed.json, profile.png, scene.xml and
+    history.json. A folder of models is done joint by joint. Example:
+
+        joda generate microwave.xml --joint door -o out --describe "it latches shut"
+    """
+    from joda import generate as run
+    from joda import generate_all as run_all
+
+    options: dict[str, Any] = {
+        "proposer": proposer, "rounds": rounds, "describe": describe, "templates": templates or (),
+        "key": key, "vlm": vlm, "resume": resume, "force": force,
+    }  # fmt: skip
+    if model.is_dir():
+        with progress_bar() as bar:
+            done = run_all(model, output, joint=joint, progress=bar, **options)
+        tell_all(done, as_json)
+        return
+    with spinner("generate") as progress:
+        result = run(model, joint, output, progress=progress, **options)
+    if as_json:
+        print_json(generated_as_json(result))
+        return
+    for round in result.history.rounds:
+        tell_round(round)
+    tell_cost(result.history.usage)
+    for note in result.notes:
+        print(note)
+    names = "profile.png", "scene.xml", "composed.json", "proposal.json", "history.json"
+    tell_files(result.folder, names)
+    tell_viewer(result.folder / "scene.xml")
+
+
+def revise(
+    folder: Annotated[Path, typer.Argument(help="What joda generate left.", show_default=False)],
+    feedback: Annotated[
+        str, typer.Option(help="What is wrong or wanted, in words.", show_default=False)
+    ],
+    proposer: Annotated[
+        str | None, typer.Option(help="anthropic or offline [default: as for generate].")
+    ] = None,
+    vlm: Vlm = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Although composed.json was edited by hand since.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Change a generated profile in words; what is not complained about stays.
+
+    Example:
+
+        joda revise out --feedback "the final closing pull is too strong"
+    """
+    from joda import revise as run
+
+    with spinner("revise") as progress:
+        result = run(folder, feedback, proposer=proposer, vlm=vlm, force=force, progress=progress)
+    if as_json:
+        last = result.history.rounds[-1].model_dump(mode="json")
+        print_json({"changes": result.changes, "picture": str(result.picture), "round": last})
+        return
+    tell_changes(result.changes)
+    tell_round(result.history.rounds[-1])
+    tell_cost(result.history.usage)
+    for note in result.notes:
+        print(note)
+    print(result.picture)
+
+
+def compile(
+    proposal: Annotated[Path, typer.Argument(help="proposal.json.", show_default=False)],
+    model: Annotated[Path, typer.Option("--model", help="MJCF or URDF file.", show_default=False)],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="composed.json to write.", show_default=False)
+    ],
+    joint: Annotated[
+        str | None, typer.Option("--joint", help="The joint, if not the one the proposal names.")
+    ] = None,
+    templates: Templates = None,
+    key: Key = "",
+    force: Force = False,
+) -> None:
+    """Compile a proposal's words (weak, medium, strong...) to physical curves.
+
+    The same proposal and key give the same bytes. Example:
+
+        joda compile proposal.json --model microwave.xml --joint door -o composed.json
+    """
+    from joda import compile as run
+
+    run(proposal, model, joint, output, templates=templates or (), key=key, force=force)
+    print(output)
+
+
+def attach(
+    model: Model,
+    composed: Annotated[
+        list[Path],
+        typer.Argument(help="Profiles (composed.json), one per joint.", show_default=False),
+    ],
+    output: Scene,
+    joint: Annotated[
+        str | None,
+        typer.Option(
+            "--joint",
+            help="Joint for the (only) profile, if not the one that it names: a name, "
+            "body:NAME[:K] or #K.",
+        ),
+    ] = None,
+    native: Annotated[
+        Literal["replace", "keep"],
+        typer.Option(help="The joint's own damping, stiffness and frictionloss."),
+    ] = "replace",
+    force: Force = False,
+) -> None:
+    """Write profiles into an existing scene; everything else in the file stays.
+
+    The scene loads in plain MuJoCo wherever joda is installed. Example:
+
+        joda attach microwave.xml composed.json -o scene.xml
+    """
+    from joda import attach as run
+
+    for note in run(model, composed, output, joint=joint, native=native, force=force):
+        print(note)
+    print(output)

@@ -1,0 +1,92 @@
+"""Commands that measure: profiles against measured motions, and what they cost."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from joda.cli.options import Force, Joint, Json, Scene
+from joda.cli.progress import loss_bar, spinner
+from joda.cli.tell import (
+    print_json,
+    tell_changes,
+    tell_errors,
+    tell_ratios,
+    with_text_paths,
+)
+
+
+def refine(
+    model: Annotated[
+        Path, typer.Argument(help="Scene whose joint carries a profile.", show_default=False)
+    ],
+    runs: Annotated[list[Path], typer.Argument(help="Measured runs (CSV: time, position, force).")],
+    joint: Joint,
+    output: Scene,
+    check: Annotated[
+        list[Path] | None, typer.Option(help="A run that is only compared, not fitted.")
+    ] = None,
+    iterations: Annotated[int, typer.Option(min=1, help="At most so many.")] = 15,
+    method: Annotated[
+        Literal["lm", "adam"], typer.Option(help="Levenberg-Marquardt or Adam.")
+    ] = "lm",
+    fit: Annotated[
+        str,
+        typer.Option(
+            help="What may change, with commas: values, intervals, strengths, damping_ratio, "
+            "inertia, gravity."
+        ),
+    ] = "values,intervals",
+    free_shape: Annotated[
+        bool, typer.Option("--free-shape", help="Let curves change sign, rising parts fall.")
+    ] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Bend a joint's profile until simulation matches measured motions.
+
+    Leaves, beside the scene, its .composed.json, .png and .history.json. Example:
+
+        joda refine scene.xml run1.csv run2.csv --joint door -o better.xml
+    """
+    from joda import Profile
+    from joda import refine as run
+
+    with loss_bar() as bar:
+        result = run(
+            model, joint, runs, output, check=check or (), iterations=iterations, method=method,
+            fit=[name.strip() for name in fit.split(",") if name.strip()],  # type: ignore[misc]
+            keep_shape=not free_shape, force=force, progress=bar,
+        )  # fmt: skip
+    if as_json:
+        print_json(with_text_paths(asdict(result)))
+        return
+    tell_changes(result.changes)
+    tell_errors(result, Profile.read(result.composed).joint.unit)
+    for note in result.notes:
+        print(note)
+    for path in (result.scene, result.composed, result.picture, result.history):
+        print(path)
+
+
+def bench(
+    scene: Annotated[
+        Path | None, typer.Argument(help="Scene with profiles [default: hinges of our own].")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Measure what profiles cost per step, as ratios within one run.
+
+    Example:
+
+        joda bench
+    """
+    from joda import bench as run
+
+    with spinner("bench") as progress:
+        rows = run(scene, progress=progress)
+    if as_json:
+        print_json([asdict(row) for row in rows])
+        return
+    tell_ratios(rows)

@@ -1,0 +1,78 @@
+"""Commands that look at a joint and change nothing: what the model knows, pictures, its profile."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from joda.cli.options import Folder, Force, Joint, Model
+from joda.cli.progress import spinner
+
+
+def context(
+    model: Model,
+    joint: Joint,
+    as_json: Annotated[
+        Path | None, typer.Option("--json", help="Write the whole context to this file.")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Tell what the model knows of a joint: axes, range, inertia, gravity, which end is up.
+
+    Example:
+
+        joda context microwave.xml --joint door
+    """
+    from joda import context as run
+    from joda.files import check_target, write_text
+
+    if as_json:
+        check_target(as_json, force)
+    found = run(model, joint)
+    if as_json:
+        write_text(as_json, found.model_dump_json(indent=2) + "\n")
+    print(found.describe())
+    if as_json:
+        print(as_json)
+
+
+def render(
+    model: Model,
+    joint: Joint,
+    output: Folder,
+    count: Annotated[int, typer.Option(min=2, help="How many positions.")] = 5,
+    force: Force = False,
+) -> None:
+    """Picture a joint at several positions: what it moves, its axis, which way is +q.
+
+    Example:
+
+        joda render microwave.xml --joint door -o pictures
+    """
+    from joda import render as run
+
+    with spinner("render"):
+        paths = run(model, joint, output, count=count, force=force)
+    for path in paths:
+        print(path)
+
+
+def plot(
+    source: Annotated[Path, typer.Argument(help="composed.json, or a scene.", show_default=False)],
+    joint: Annotated[
+        str | None, typer.Option("--joint", help="Which joint of a scene with several profiles.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="PNG to write [default: beside SOURCE].")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Draw a profile: force with its friction band, gravity's equilibrium, damping, components.
+
+    Gravity is drawn for a scene. Example:
+
+        joda plot scene.xml --joint door -o profile.png
+    """
+    from joda import plot as run
+
+    print(run(source, output, joint=joint, force=force))

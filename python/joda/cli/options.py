@@ -1,0 +1,24 @@
+"""Arguments and options that several commands have."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Force = Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
+Model = Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)]
+Joint = Annotated[
+    str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
+]
+Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to fill.", show_default=False)]
+Scene = Annotated[Path, typer.Option("-o", "--output", help="Scene to write.", show_default=False)]
+Templates = Annotated[
+    list[Path] | None, typer.Option("--templates", help="Further folders of templates.")
+]
+Key = Annotated[
+    str, typer.Option("--key", help="Another key draws other numbers for the same words.")
+]
+Vlm = Annotated[
+    str | None, typer.Option(help="The model that anthropic asks [default: $JODA_VLM].")
+]

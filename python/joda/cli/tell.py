@@ -1,0 +1,179 @@
+"""Results as text or JSON on stdout."""
+
+import json
+import shutil
+import sys
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from joda.errors import JodaError
+
+if TYPE_CHECKING:
+    from joda._bench import Row
+    from joda._demo import Demo
+    from joda._generate import Generated
+    from joda._refine import Refined
+    from joda.history import Round
+    from joda.propose import Usage
+    from joda.template import Template
+
+
+def print_json(value: Any) -> None:
+    """The value as indented JSON."""
+    print(json.dumps(value, indent=2, ensure_ascii=False))
+
+
+def with_text_paths(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The same for JSON, which has no paths."""
+    return {key: str(v) if isinstance(v, Path) else v for key, v in values.items()}
+
+
+def generated_as_json(result: "Generated") -> dict[str, Any]:
+    """What `joda generate --json` prints of a joint."""
+    told: dict[str, Any] = result.history.model_dump(mode="json")
+    return {**told, "usage": result.history.usage.model_dump(mode="json"), "notes": result.notes}
+
+
+def tell_changes(changes: Sequence[str]) -> None:
+    """A line per change, or that there is none."""
+    for change in changes or ("Nothing changed.",):
+        print(change)
+
+
+def tell_files(folder: Path, names: Iterable[str]) -> None:
+    """The files of a folder that are worth naming."""
+    print("Files:")
+    for name in names:
+        print(f"  {folder / name}")
+
+
+def tell_viewer(scene: Path) -> None:
+    """How to look at a scene."""
+    print(f"See it move: python -m mujoco.viewer --mjcf={scene}")
+
+
+def tell_round(round: "Round") -> None:
+    """What was proposed in a round, and what came of it."""
+    summary = round.proposal.joint_summary
+    print(f"Round {round.number}, {round.proposer}: {summary.motion_description}")
+    print(f"  {round.proposal.whole_motion_descrptn}")
+    for effect in round.proposal.effect_proposals:
+        where = f"{effect.start_ratio:g} to {effect.end_ratio:g}"
+        print(f"  - {effect.effect_name}, s = {where}: {effect.reason}")
+    print(textwrap.indent(round.facts, "  "))
+    for sentence in (*round.unmet, *round.notes):
+        print(f"  ! {sentence}")
+
+
+def tell_cost(usage: "Usage") -> None:
+    """What was asked of the network; nothing if it was not asked."""
+    if usage.requests:
+        price = "price unknown" if usage.dollars is None else f"{usage.dollars:.3f} dollars"
+        print(
+            f"Asked {usage.requests} times: {usage.input_tokens} tokens in "
+            f"({usage.cache_read_tokens} from the cache), {usage.output_tokens} out, {price}."
+        )
+
+
+def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None:
+    """A line per joint; raises JodaError if some gave nothing."""
+    from joda.propose import total
+
+    failed = {label: result for label, result in done.items() if isinstance(result, JodaError)}
+    made = {label: result for label, result in done.items() if not isinstance(result, JodaError)}
+    if as_json:
+        print_json(
+            {
+                label: {"error": str(failed[label])}
+                if label in failed
+                else generated_as_json(made[label])
+                for label in done
+            }
+        )
+    else:
+        for label in done:
+            if label in failed:
+                print(f"{label}: {failed[label]}")
+                continue
+            result = made[label]
+            last = result.history.rounds[-1]
+            lacking = " ".join(last.unmet) or "as described"
+            print(f"{label}: {last.proposal.joint_summary.motion_description}; {lacking}")
+            for note in result.notes:
+                print(f"  {note}")
+        tell_cost(total(result.history.usage for result in made.values()))
+    if failed:
+        raise JodaError(f"{len(failed)} of {len(done)} have no profile; see above.")
+
+
+def tell_doors(result: "Demo") -> None:
+    """What the demo's two doors did."""
+    rows = zip(result.starts, result.plain_ends, result.joda_ends, strict=True)
+    for start, plain, ours in rows:
+        print(
+            f"Let go at {degrees(start):.0f} degrees, {result.duration:g} s later: without a "
+            f"profile at {degrees(plain):.1f}, with it at {abs(degrees(ours)):.1f} degrees."
+        )
+    forces = zip(
+        ("without a profile", "with it"), (result.plain_force, result.joda_force), strict=True
+    )
+    told = [
+        f"{name} it {'pulls' if force > 0 else 'holds back'} with up to {abs(force):.1f} N·m"
+        for name, force in forces
+    ]
+    print(f"Opened slowly by hand: {', '.join(told)}.")
+
+
+def tell_errors(result: "Refined", unit: str) -> None:
+    """How near the simulation came to the measurement, and where that told little.
+
+    Args:
+        result: of a refinement.
+        unit: of its joint's position, rad or m.
+    """
+    print(
+        f"Position error: {result.before:.3g} → {result.after:.3g} {unit} RMS after "
+        f"{result.iterations} iterations; the measurement's noise is {result.noise:.2g} {unit}."
+    )
+    if result.checked:
+        print(
+            f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS."
+        )
+    for channel, places in result.unseen.items():
+        if places:
+            where = ", ".join(f"s = {a:.2f} to {b:.2f}" for a, b in places)
+            print(f"The data tell little of {channel} at {where}; there it is as it was before.")
+
+
+def tell_ratios(rows: "Iterable[Row]") -> None:
+    """The table of `joda bench`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("comparison", "ratio", "required", "µs per step", box=None, pad_edge=False)
+    for row in rows:
+        ours, other = row.microseconds
+        table.add_row(
+            row.what, f"{row.ratio:.3f} ± {row.spread:.3f}", row.bar, f"{ours:.2f} / {other:.2f}"
+        )
+    Console(width=None if sys.stdout.isatty() else 110).print(table)
+
+
+def tell_templates(found: "Iterable[Template]") -> None:
+    """A paragraph per template, no wider than the terminal."""
+    print("\n\n".join(map(_paragraph, found)))
+
+
+def _paragraph(template: "Template") -> str:
+    present = ", ".join(name for name, curve in template.channels if curve)
+    texts = (
+        template.description,
+        f"Placement: {template.placement}",
+        f"Channels: {present or 'none'}",
+    )
+    width = min(shutil.get_terminal_size((100, 24)).columns, 100)
+    wrap = textwrap.TextWrapper(width, initial_indent="  ", subsequent_indent="  ")
+    return "\n".join((template.name, *map(wrap.fill, texts)))

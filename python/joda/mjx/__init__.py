@@ -1,0 +1,43 @@
+"""Profiles inside MJX: the law of the engine plugin, in JAX.
+
+`step` is `mujoco.mjx.step` with the profiles that a scene carries. It solves the problem that the
+plugin solves, through the same two rows per joint (docs/physics.md), and is differentiable in both
+modes: at a solution of the constraint solver the derivatives are those of the implicit function
+theorem, whatever the solver did to get there.
+
+    profiles = joda.read_profiles("scene.xml")
+    model = mujoco.MjModel.from_xml_path("scene.xml")
+    fields = joda.mjx.put_fields(model, profiles)
+    m, d = mjx.put_model(model), mjx.make_data(model)
+    d = jax.jit(joda.mjx.step)(m, d, fields)
+
+A joint's friction of the last step, which the plugin keeps in `plugin_state`, is read from
+`d._impl.efc_force`, so no state is needed beyond `mjx.Data`.
+"""
+
+from importlib import import_module
+from importlib.metadata import version
+
+from joda.errors import JodaError
+
+try:
+    import_module("jax")
+    import_module("mujoco.mjx")
+except ImportError as error:
+    raise JodaError(
+        f'joda.mjx needs JAX and MJX (no module {error.name}); run: pip install ".[mjx]"'
+    ) from None
+
+SUPPORTED = "3.17"
+"""Of mujoco-mjx: other versions may have other internals than `pipeline` is composed of."""
+
+if not f"{version('mujoco-mjx')}.".startswith(f"{SUPPORTED}."):
+    raise JodaError(
+        f"joda.mjx works with mujoco-mjx {SUPPORTED} and found {version('mujoco-mjx')}; "
+        f"run: pip install 'mujoco-mjx=={SUPPORTED}.*'"
+    )
+
+from joda.mjx.fields import Field, Fields, Place, Prepared, prepare, put_fields  # noqa: E402
+from joda.mjx.simulate import rollout, step  # noqa: E402
+
+__all__ = ["Field", "Fields", "Place", "Prepared", "prepare", "put_fields", "rollout", "step"]
