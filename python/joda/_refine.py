@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ITERATIONS = 15
+ITERATIONS = 30
 SEEN = 0.5
 """A part of a curve is seen where the data shrink its uncertainty at least by this factor."""
 STEP = 1e-4
@@ -245,7 +245,7 @@ def _beyond(
             said[-1] = said[-1][:-1] + ", which is less than the bodies have; make them lighter."
     if ("gravity", 0) in values:
         unit_force = gravity_scale(found, parameters.profile)
-        a, b = (unit_force * values["gravity", k] for k in (0, 1))
+        a, b = (unit_force * values.get(("gravity", k), 0.0) for k in (0, 1))
         what = f"{a:.4g} cos q + {b:.4g} sin q N·m" if found.joint.type == "hinge" else f"{a:.4g} N"
         said.append(
             f"Gravity's force on the joint lacks {what}; mend the bodies' centre of mass or tilt."

@@ -1,11 +1,12 @@
 """Fits the numbers of a joint's profile to measured motions, by gradients.
 
 First over short windows, each from its own measured start, so that errors do not pile up and the
-misfit stays smooth in the numbers; then over whole runs. The starts are fitted too, within their
+misfit stays smooth in the numbers; then over longer ones; then over whole runs (multiple shooting:
+Bock 1983). The starts are fitted too, within their
 measurement's error. What the motion does not show is held by a prior at its first value.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
@@ -28,19 +29,24 @@ Array = NDArray[np.float64]
 Traced = Any
 """A NumPy array outside, JAX's own inside a compiled function."""
 
-WINDOW = 0.4
-"""Length of a window, s."""
+WINDOWS = (0.1, 0.4, 0.8)
+"""Lengths of windows, s."""
+WINDOW = 1
+"""Which of them tells what the data know."""
+ROUND = 2
+"""Iterations after which a stage asks anew how far off it is."""
 STARTS = 6
 """Iterations that fit the starts of runs."""
 FINEST = 2e-5
 """Least noise that is believed, in units of the range."""
 ANNEAL = 0.3
 """What is believed of a misfit before it is fitted: this share of it may be the model's."""
+GAIN = 0.003
+"""Share of the misfit that a round must take away for the stage to go on."""
+LEEWAY = 3.0
+"""How many standard deviations of what windows taught count as one, when whole runs are fitted."""
 BLUR = 0.05
 """Speed below which friction is blurred at first, in ranges per second."""
-
-
-Freedom = Literal["components", "values", "all"]
 
 
 @partial(
@@ -86,7 +92,9 @@ class Data:
         return int(sum(part.mask.sum() for part in self.parts))
 
 
-def cut(runs: Sequence[Run], h: float, sigma: float, window: float | None) -> Data:
+def cut(
+    runs: Sequence[Run], h: float, sigma: float, window: float | None, like: Data | None = None
+) -> Data:
     """Runs, or windows of them, as arrays.
 
     Args:
@@ -94,7 +102,9 @@ def cut(runs: Sequence[Run], h: float, sigma: float, window: float | None) -> Da
         h: timestep, s.
         sigma: noise of the position.
         window: length of the windows, s; None: as long as the runs are.
+        like: stretches whose size to take, if it is not much larger: compiling takes longer.
     """
+    sizes = {(len(part.force), len(part.position)) for part in like.parts} if like else set()
     parts, starts, doubts = [], [], []
     for run in runs:
         for piece in _known(run):
@@ -109,16 +119,25 @@ def cut(runs: Sequence[Run], h: float, sigma: float, window: float | None) -> Da
                 inside = (time >= start) & (time <= end + 1e-12)
                 if inside.sum() >= 4:
                     inner = time[inside] - start
-                    parts.append(_stretch(inner, position[inside], time - start, force, h))
+                    parts.append(_stretch(inner, position[inside], time - start, force, h, sizes))
                     starts.append((begun.position[k], begun.velocity[k]))
                     doubts.append((begun.position_error[k], begun.velocity_error[k]))
     return Data(tuple(parts), np.array(starts), np.array(doubts))
 
 
-def _stretch(time: Array, position: Array, forced: Array, force: Array, h: float) -> Stretch:
+def _stretch(
+    time: Array,
+    position: Array,
+    forced: Array,
+    force: Array,
+    h: float,
+    sizes: Collection[tuple[int, int]],
+) -> Stretch:
     """Samples at times since the start, under a force known at other times since the start."""
-    steps = _size(int(np.ceil(time[-1] / h - 1e-9)) + 1)
-    place = _fill(time / h, _size(len(time)))
+    steps, count = _size(int(np.ceil(time[-1] / h - 1e-9)) + 1), _size(len(time))
+    fits = [size for size in sizes if steps <= size[0] <= 6 * steps and count <= size[1]]
+    steps, count = min(fits, default=(steps, count))
+    place = _fill(time / h, count)
     index = np.clip(np.floor(place + 1e-9), 0, steps - 1).astype(int)
     return Stretch(
         force=np.interp(h * np.arange(steps), forced, force),
@@ -219,7 +238,11 @@ class Problem:
         self.sigma = max(float(np.median(noises)), FINEST * self.span)
         self.runs = [(run.time[k], run.position[k]) for run in runs for k in _known(run)]
         self.whole = cut(runs, h, self.sigma, None)
-        self.windows = cut(runs, h, self.sigma, WINDOW)
+        short, middle, long = WINDOWS
+        wide = cut(runs, h, self.sigma, long, self.whole)
+        near = cut(runs, h, self.sigma, middle)
+        self.cuts = (cut(runs, h, self.sigma, short, near), near, wide)
+        self.windows = self.cuts[WINDOW]
 
     def misfits(
         self, theta: Array, starts: Array, data: Data, blur: float = 0.0
@@ -287,7 +310,7 @@ class Problem:
         method: Literal["lm", "adam"] = "lm",
         told: Callable[[str, int, float], None] = lambda stage, number, rms: None,
     ) -> Fit:
-        """Fits in three stages: windows with blurred friction, windows, whole runs.
+        """Fits windows with blurred friction, windows longer and longer, whole runs.
 
         Args:
             iterations: at most so many in all.
@@ -297,16 +320,18 @@ class Problem:
         history: list[tuple[str, float]] = []
         self._best = self.parameters.start
         self._moved: dict[int, Array] = {}  # by data, how far its starts are from the measured
-        share = max(iterations // 4, 1) if method == "adam" else 2
-        stages: tuple[tuple[str, Data, float, Freedom, int], ...] = (
-            ("windows, friction blurred", self.windows, BLUR * self.span, "components", share),
-            ("windows", self.windows, 0.0, "components", share),
-            ("whole runs, curves", self.whole, 0.0, "values", share),
-            ("whole runs, all", self.whole, 0.0, "all", iterations),
+        self._prior = self.parameters.start, np.diag(1 / self.parameters.doubt)
+        share = max(iterations // 5, 1)
+        blur = BLUR * self.span
+        names = [f"windows of {length:g} s" for length in WINDOWS]
+        stages = (
+            (f"{names[0]}, friction blurred", self.cuts[0], blur, min(share, ROUND)),
+            *((name, data, 0.0, share) for name, data in zip(names, self.cuts, strict=True)),
+            ("whole runs", self.whole, 0.0, iterations),
         )
         interrupted = False
         try:
-            for name, data, blur, freedom, limit in stages:
+            for name, data, blurred, limit in stages:
                 count = min(limit, iterations - len(history))
 
                 def heard(misfit: float, name: str = name) -> None:
@@ -314,7 +339,9 @@ class Problem:
                     told(name, len(history), misfit)
 
                 if count > 0:
-                    self._stage(data, blur, freedom, count, method, heard)
+                    if data is self.whole:
+                        self._prior = self._learnt()
+                    self._stage(data, blurred, count, method, heard)
         except KeyboardInterrupt:
             interrupted = True
         return Fit(self._best, self._covariance(self._best), tuple(history), interrupted)
@@ -323,7 +350,28 @@ class Problem:
         self,
         data: Data,
         blur: float,
-        freedom: Freedom,
+        iterations: int,
+        method: Literal["lm", "adam"],
+        told: Callable[[float], None],
+    ) -> None:
+        """Rounds of a stage, until one gains too little."""
+        size = ROUND if method == "lm" else iterations
+        told_so_far: list[float] = []
+
+        def heard(rms: float) -> None:
+            told_so_far.append(rms)
+            told(rms)
+
+        while len(told_so_far) < iterations:
+            before = told_so_far[-1] if told_so_far else np.inf
+            self._round(data, blur, min(size, iterations - len(told_so_far)), method, heard)
+            if not told_so_far or told_so_far[-1] > (1 - GAIN) * before:
+                break
+
+    def _round(
+        self,
+        data: Data,
+        blur: float,
         iterations: int,
         method: Literal["lm", "adam"],
         told: Callable[[float], None],
@@ -333,8 +381,8 @@ class Problem:
         While the misfit is larger than the noise, the prior counts as if that were the noise.
         """
         theta, parameters = self._best, self.parameters
-        basis = parameters.directions(freedom)
-        n, count = basis.shape[1], len(data.start)
+        centre, root = self._prior
+        n, count = len(theta), len(data.start)
         doubt = self._doubt(data)
         moved = self._moved.get(id(data), np.zeros(2 * count))
         starts = data.start + doubt * moved.reshape(-1, 2)
@@ -344,19 +392,19 @@ class Problem:
         )
 
         def split(x: Array) -> tuple[Array, Array]:
-            return theta + basis @ x[:n], data.start + doubt * x[n:].reshape(-1, 2)
+            return theta + x[:n], data.start + doubt * x[n:].reshape(-1, 2)
 
         def residuals(x: Array) -> Array:
             at, starts = split(x)
             r = np.concatenate(self.misfits(at, starts, data, blur)[0]) / sigma
-            prior = (at - parameters.start) / parameters.doubt
+            prior = root @ (at - centre)
             return np.concatenate([np.nan_to_num(r, nan=1e6), prior, x[n:]])
 
         def jacobian(x: Array) -> Array:
             _, by_theta, by_start = self.misfits(*split(x), data, blur)
             own = [slope * doubt[k] for k, slope in enumerate(by_start)]
-            J = np.hstack([np.vstack(by_theta) @ basis, block_diag(*own)]) / sigma
-            return np.vstack([J, block_diag(basis / parameters.doubt[:, None], np.eye(2 * count))])
+            J = np.hstack([np.vstack(by_theta), block_diag(*own)]) / sigma
+            return np.vstack([J, block_diag(root, np.eye(2 * count))])
 
         def heard(_: int, x: Array, __: float) -> None:
             self._best, self._moved[id(data)] = split(x)[0], x[n:]
@@ -365,14 +413,35 @@ class Problem:
 
         G = parameters.constraints.G
         wide = Inequalities(
-            np.hstack([G @ basis, np.zeros((len(G), 2 * count))]),
+            np.hstack([G, np.zeros((len(G), 2 * count))]),
             parameters.constraints.h - G @ theta,
         )
         minimise = levenberg_marquardt if method == "lm" else adam
         minimise(residuals, jacobian, np.concatenate([np.zeros(n), moved]), wide, iterations, heard)
 
+    def _learnt(self) -> tuple[Array, Array]:
+        """What windows have taught, as a prior for whole runs: centre and root of its information.
+
+        A whole run may snap to another side than it did, and its misfit then points anywhere.
+        """
+        data = self.cuts[-1]
+        r = np.concatenate(self.misfits(self._best, self.starts(self._best, data), data)[0])
+        sigma = max(self.sigma, float(np.sqrt(np.mean(r**2))))
+        root = np.linalg.cholesky(self._information(self._best, data, sigma)).T
+        return self._best, np.asarray(root / LEEWAY, float)
+
+    def _information(self, theta: Array, data: Data, sigma: float) -> Array:
+        """Of stretches and the first prior about the numbers, their starts being unknown too."""
+        starts, doubt = self.starts(theta, data), self._doubt(data)
+        total = np.diag(1 / self.parameters.doubt**2)
+        _, by_theta, by_start = self.misfits(theta, starts, data)
+        for J, S, d in zip(by_theta, by_start, doubt, strict=True):
+            own = S * d / sigma
+            left = J / sigma
+            cross = left.T @ own
+            total += left.T @ left - cross @ np.linalg.solve(own.T @ own + np.eye(2), cross.T)
+        return np.asarray(0.5 * (total + total.T))
+
     def _covariance(self, theta: Array) -> Array:
         """From the curvature at the solution, over windows, whose misfits are nearly linear."""
-        by_theta = self.misfits(theta, self.windows.start, self.windows)[1]
-        J = np.vstack(by_theta) / self.sigma
-        return np.asarray(np.linalg.inv(J.T @ J + np.diag(1 / self.parameters.doubt**2)))
+        return np.asarray(np.linalg.inv(self._information(theta, self.windows, self.sigma)))

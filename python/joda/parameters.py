@@ -101,8 +101,10 @@ class Parameters:
             slots.append(Slot("inertia"))
             start.append(0.0)
         if "gravity" in kinds:
-            slots += [Slot("gravity", index=0), Slot("gravity", index=1)]
-            start += [0.0, 0.0]
+            # a slide's weight is one number, a hinge's a cosine and a sine
+            count = 2 if profile.joint.type == "hinge" else 1
+            slots += [Slot("gravity", index=k) for k in range(count)]
+            start += [0.0] * count
         self.slots = tuple(slots)
         self.start = np.array(start)
         self.scales = np.array([_scale(profile, slot, gravity) for slot in slots])
@@ -112,26 +114,6 @@ class Parameters:
             for column, factor in terms.items():
                 G[row, column] = factor
         self.constraints = Inequalities(G, np.array([least for _, least in rows]))
-
-    def directions(self, how: Literal["components", "values", "all"]) -> Array:
-        """A basis of the changes that a stage of a fit may make, shape (n, m).
-
-        Args:
-            how: each component as a whole, its control points in step, and what is no control point
-                or interval; or the control points by themselves; or everything.
-        """
-        n = len(self.slots)
-        if how == "all":
-            return np.eye(n)
-        columns: dict[object, Array] = {}
-        for k, slot in enumerate(self.slots):
-            if slot.kind == "intervals":
-                continue
-            whole = how == "components" and slot.kind == "values"
-            key: object = (slot.channel, slot.component) if whole else k
-            column = columns.setdefault(key, np.zeros(n))
-            column[k] = self.start[k] if whole else 1.0
-        return np.stack(list(columns.values()), axis=1) if columns else np.eye(n)
 
     def written(self, theta: Array, *, exact: bool = False) -> Profile:
         """The profile with these numbers, to six digits unless `exact`."""

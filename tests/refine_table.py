@@ -1,0 +1,277 @@
+"""How well refinement does: the figures of docs/refine.md.
+
+python tests/refine_table.py            side by side with other ways, on the paper's case
+python tests/refine_table.py paper      the paper's case, ten seeds
+python tests/refine_table.py planted    every template planted and recovered, twenty seeds
+python tests/refine_table.py planted 3 detent_internal    three seeds of one
+python tests/refine_table.py time       compilation and nine iterations, first and second time
+"""
+
+import sys
+import time
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from joda import context, templates
+from joda._context import Context
+from joda.field import evaluate
+from joda.motion import release
+from joda.profile import CHANNELS, Channel, Channels, Component, Joint, Profile, Resistance
+from joda.rig import rig
+from joda.runs import Run
+
+MODELS = __file__.rsplit("/tests/", 1)[0] + "/models"
+STEP = 0.005
+SECONDS = 2.0
+NOISE = 5e-4
+"""Of the measured position, as a part of the range."""
+
+
+# --- the paper's case: a cabinet door whose profile holds too much at its open end
+def cabinet_profile(found: Context, support: float, friction: float) -> Profile:
+    """A magnet at the closed end, support (N·m) towards the open one, friction, damping."""
+    magnet = (-3.0, -2.16, -1.14, -0.42, -0.12, 0.0)
+    hold = (0.0, -support, -support)
+    return Profile(
+        joint=found.joint,
+        channels=Channels(
+            conservative=Channel(
+                components=(
+                    Component(label="magnet", interval=(0, 0.12), x=MAGNET, y=magnet),
+                    Component(label="support", interval=(0.6, 1), x=(0, 0.3, 1), y=hold),
+                )
+            ),
+            friction=Resistance(components=(_flat("friction", friction),)),
+            damping=Resistance(components=(_flat("damping", 1.2),)),
+        ),
+    )
+
+
+MAGNET = (0.0, 0.08, 0.2, 0.4, 0.7, 1.0)
+
+
+def _flat(label: str, value: float) -> Component:
+    return Component(label=label, interval=(0, 1), x=(0, 1), y=(value, value))
+
+
+def quiet_rig(found: Context, profile: Profile, step: float = STEP) -> mujoco.MjModel:
+    """The joint alone in MuJoCo with the plugin, its solver converged."""
+    model = rig(found, profile)
+    model.opt.timestep, model.opt.tolerance = step, 1e-14
+    return model
+
+
+def measured(motion, span: float, rng: np.random.Generator, forced: bool = False) -> Run:
+    """A run as an encoder would have recorded it."""
+    position = motion.position + rng.normal(0, NOISE * span, len(motion.time))
+    return Run("run.csv", motion.time, position, None, motion.force, forced)
+
+
+def released(found: Context, profile: Profile, places, rng) -> list[Run]:
+    """Runs of letting the joint go at some normalised positions."""
+    model, (lo, hi) = quiet_rig(found, profile), found.joint.range
+    return [measured(release(model, 0, lo + s * (hi - lo), SECONDS), hi - lo, rng) for s in places]
+
+
+def cabinet(seed: int):
+    """Context, profile to start from, three runs and four that are held out."""
+    found = context(MODELS + "/cabinet.xml", "door")
+    true, start = cabinet_profile(found, 2.5, 0.4), cabinet_profile(found, 6.5, 0.6)
+    rng = np.random.default_rng(seed)
+    train = released(found, true, (0.35, 0.55, 0.8), rng)
+    return found, start, train, released(found, true, (0.3, 0.45, 0.7, 0.9), rng)
+
+
+def problem_of(found: Context, start: Profile, runs, kinds=("values", "intervals")):
+    """The fit of a profile to runs."""
+    from joda import solo
+    from joda.fitting import Problem
+    from joda.parameters import Parameters, gravity_scale
+
+    first = solo.from_context(found, start, quiet_rig(found, start), 0)
+    parameters = Parameters(start, kinds, gravity=gravity_scale(found, start))
+    return Problem(first, parameters, runs, STEP)
+
+
+# --- planted profiles
+@dataclass(frozen=True)
+class Planted:
+    """A joint with a known profile, another to start from, and runs."""
+
+    found: Context
+    true: Profile
+    start: Profile
+    runs: list[Run]
+
+
+WHOLE = ("constant_", "spring_return_")
+LOW, HIGH = "_to_low_end", "_to_high_end"
+
+
+def place(name: str, rng: np.random.Generator) -> tuple[float, float]:
+    """A place where the template is typically found."""
+    if name == "bistable_mechanism" or name.startswith("spring_return"):
+        return 0.0, 1.0
+    if name.startswith("constant_"):
+        return rng.uniform(0.15, 0.3), rng.uniform(0.65, 0.85)
+    width = rng.uniform(0.12, 0.3)
+    if name.endswith(LOW):
+        return 0.0, width
+    if name.endswith(HIGH):
+        return 1 - width, 1.0
+    width = rng.uniform(0.2, 0.4)
+    middle = rng.uniform(0.3, 0.7)
+    return middle - width / 2, middle + width / 2
+
+
+def moved(interval, rng) -> tuple[float, float]:
+    """A slightly other place; ends at the ends of the range stay there."""
+    a, b = interval
+    by = rng.uniform(-0.03, 0.03, 2)
+    return (a + by[0] if a > 0 else a), (b + by[1] if b < 1 else b)
+
+
+def bare(kind: str, span: float, inertia: float) -> Context:
+    """A joint without gravity."""
+    hinge = kind == "hinge"
+    joint = Joint(name="joint", type=kind, range=(0, span), unit="rad" if hinge else "m")
+    found = context(MODELS + ("/knob.xml" if hinge else "/drawer.xml"), "#0")
+    n = len(found.positions)
+    return found.model_copy(
+        update={
+            "joint": joint,
+            "positions": tuple(np.linspace(0, span, n)),
+            "inertia": (inertia,) * n,
+            "equivalent_inertia": inertia,
+            "gravity_force": (0.0,) * n,
+            "gravity_scale": 0.0,
+        }
+    )
+
+
+def planted(name: str, seed: int) -> Planted:
+    """A template at a random place and strength, besides constant friction and damping."""
+    rng = np.random.default_rng([seed, *name.encode()])
+    kind = ("hinge", "slide")[seed % 2]
+    span = rng.uniform(1.0, 2.0) if kind == "hinge" else rng.uniform(0.2, 0.5)
+    inertia = rng.uniform(0.05, 1.0) if kind == "hinge" else rng.uniform(0.5, 5.0)
+    found = bare(kind, span, inertia)
+    force = inertia * span * rng.uniform(10, 40)
+    size = {
+        "conservative": force,
+        "friction": force * rng.uniform(0.1, 0.3),
+        "damping": inertia * rng.uniform(4, 12),
+    }
+    constant = {
+        "friction": force * rng.uniform(0.05, 0.2),
+        "damping": inertia * rng.uniform(1.0, 4.0),
+    }
+    interval = place(name, rng)
+    at = moved(interval, rng)
+    curves = templates()[name].channels
+
+    def profile(interval, factor) -> Profile:
+        out = {}
+        for channel in CHANNELS:
+            parts = []
+            if channel in constant:
+                parts.append(_flat("constant", constant[channel] * factor()))
+            if curve := getattr(curves, channel):
+                y = tuple(size[channel] * factor() * np.array(curve.y))
+                parts.append(Component(label=name, interval=interval, x=curve.x, y=y))
+            cls = Channel if channel == "conservative" else Resistance
+            out[channel] = cls(components=tuple(parts))
+        return Profile(joint=found.joint, channels=Channels(**out))
+
+    true = profile(interval, lambda: 1.0)
+    start = profile(at, lambda: 2 ** rng.uniform(-1, 1))
+    model = quiet_rig(found, true)
+    runs = [measured(pushed(model, span, force, rng), span, rng, True) for _ in range(3)]
+    return Planted(found, true, start, runs)
+
+
+def pushed(model: mujoco.MjModel, span: float, force: float, rng, seconds: float = 4.0):
+    """A hand pushes the joint to and fro between random places, at random speeds, all recorded."""
+    from joda.motion import Motion
+
+    data = mujoco.MjData(model)
+    data.qpos[0] = rng.uniform(0.1, 0.9) * span
+    mujoco.mj_forward(model, data)
+    inertia = float(data.M[0])
+    stiffness = 200 * inertia
+    damping = 2 * 0.5 * np.sqrt(stiffness * inertia)
+    places, times = [data.qpos[0] / span], [0.0]
+    low = bool(places[0] > 0.5)
+    while times[-1] < seconds:
+        places.append(rng.uniform(-0.3, 0.1) if low else rng.uniform(0.9, 1.3))
+        times.append(times[-1] + rng.uniform(0.3, 1.2))
+        low = not low
+    out = []
+    for k in range(round(seconds / STEP) + 1):
+        t = k * STEP
+        target = span * np.interp(t, times, places)
+        push = stiffness * (target - data.qpos[0]) - damping * data.qvel[0]
+        push = float(np.clip(push, -2 * force, 2 * force))
+        out.append((t, data.qpos[0], data.qvel[0], push))
+        data.qfrc_applied[0] = push
+        mujoco.mj_step(model, data)
+    return Motion(*np.array(out).T)
+
+
+def recovery(case: Planted, iterations: int = 15):
+    """Largest and RMS error of each channel over the visited range, in units of its peak."""
+    problem = problem_of(case.found, case.start, case.runs)
+    result = problem.fit(iterations)
+    after = problem.parameters.written(result.theta)
+    span = problem.span
+    visited = np.concatenate([run.position for run in case.runs]) / span
+    s = np.linspace(max(visited.min(), 0), min(visited.max(), 1), 401)
+    out = {}
+    for name in CHANNELS:
+        true, found, begun = (
+            evaluate(getattr(p.channels, name), s)[0] for p in (case.true, after, case.start)
+        )
+        peak = np.abs(true).max()
+        if peak:
+            error = np.abs(found - true) / peak
+            begun = np.abs(begun - true) / peak
+            out[name] = error.max(), np.sqrt(np.mean(error**2)), begun.max()
+    return out, problem.rms(result.theta) / (NOISE * span), result, after
+
+
+def planted_table(seeds: int = 20, *names: str) -> None:
+    for name in names or sorted(templates()):
+        for seed in range(int(seeds)):
+            begun = time.time()
+            case = planted(name, seed)
+            errors, misfit, _, _ = recovery(case)
+            line = "  ".join(
+                f"{c[:4]} {100 * e[0]:6.1f} {100 * e[1]:5.1f} ({100 * e[2]:5.0f})"
+                for c, e in errors.items()
+            )
+            print(
+                f"{name:40}{seed:3} x{misfit:7.2f}  {line}  {time.time() - begun:.1f} s", flush=True
+            )
+
+
+def paper_table(seeds: int = 10) -> None:
+    """Loss before and after nine iterations, on the fitted and on held-out releases; seconds."""
+    print("seed  fitted: times less, of the noise   held out: times less, of the noise   s")
+    for seed in range(int(seeds)):
+        begun = time.time()
+        found, start, train, held_out = cabinet(seed)
+        problem = problem_of(found, start, train)
+        theta = problem.fit(9).theta
+        spent = time.time() - begun
+        line = f"{seed:4}"
+        for one in (problem, problem_of(found, start, held_out)):
+            before, after = one.rms(one.parameters.start), one.rms(theta)
+            line += f"  {(before / after) ** 2:10.0f} {after / one.sigma:6.2f}"
+        print(f"{line}  {spent:.1f}", flush=True)
+
+
+if __name__ == "__main__":
+    what, *rest = sys.argv[1:] or ["paper"]
+    {"planted": planted_table, "paper": paper_table}[what](*rest)

@@ -1,0 +1,48 @@
+"""The paper's refinement: a cabinet door that is held too much, from three measured releases."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from refine_table import STEP, cabinet, problem_of
+
+from joda.fitting import cut
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nine_iterations_bring_the_papers_door_down_to_the_noise(seed):
+    found, start, train, held_out = cabinet(seed)
+    problem = problem_of(found, start, train)
+    result = problem.fit(9)
+    assert len(result.history) <= 9
+    first = problem.parameters.start
+    before, after = problem.rms(first), problem.rms(result.theta)
+    assert before**2 > 100 * after**2
+    assert after < 1.2 * problem.sigma
+    other = problem_of(found, start, held_out)
+    assert other.rms(first) ** 2 > 100 * other.rms(result.theta) ** 2
+
+
+def test_an_interruption_keeps_the_best_so_far():
+    found, start, train, _ = cabinet(0)
+    problem = problem_of(found, start, train)
+
+    def stop(stage, number, rms):
+        if number == 2:
+            raise KeyboardInterrupt
+
+    result = problem.fit(9, told=stop)
+    assert result.interrupted
+    assert len(result.history) == 2
+    assert not np.array_equal(result.theta, problem.parameters.start)
+
+
+def test_where_the_force_is_not_known_nothing_is_asked():
+    _, _, train, _ = cabinet(0)
+    force = train[0].force.copy()
+    force[100:150] = np.nan
+    gap = replace(train[0], force=force, forced=True)
+    data = cut([gap], STEP, 1e-3, None)
+    assert data.samples == 401 - 50
+    assert len(data.parts) == 2
+    assert all(np.all(np.isfinite(part.force)) for part in data.parts)

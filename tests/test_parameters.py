@@ -1,0 +1,74 @@
+"""What a fit may change, and what stays true whatever it does."""
+
+import numpy as np
+import pytest
+
+from joda import templates
+from joda.field import evaluate
+from joda.least_squares import bounded_step
+from joda.parameters import KINDS, Parameters
+from joda.profile import CHANNELS, Channel, Channels, Component, Joint, Profile, Resistance
+
+NAMES = sorted(templates())
+
+
+def planted(name, kind="hinge"):
+    curves, out = templates()[name].channels, {}
+    for channel in CHANNELS:
+        curve = getattr(curves, channel)
+        part = curve and Component(label=name, interval=(0.2, 0.6), x=curve.x, y=curve.y)
+        cls = Channel if channel == "conservative" else Resistance
+        out[channel] = cls(components=(part,) if part else ())
+    joint = Joint(name="j", type=kind, range=(0, 2), unit="rad" if kind == "hinge" else "m")
+    return Profile(joint=joint, channels=Channels(**out))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_first_numbers_are_allowed_and_write_the_same_profile(name):
+    profile = planted(name)
+    for keep in (True, False):
+        p = Parameters(profile, KINDS, keep_shape=keep)
+        assert np.all(p.constraints.G @ p.start >= p.constraints.h - 1e-12)
+        assert p.written(p.start, exact=True) == profile
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_whatever_is_allowed_keeps_signs_and_rises_and_falls(name):
+    profile = planted(name)
+    p = Parameters(profile, ("values", "intervals"))
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        G, h = p.constraints.G, p.constraints.h
+        wish = rng.normal(0, 0.5, len(p.start))
+        theta = p.start + bounded_step(np.eye(len(wish)), wish, G, h - G @ p.start)
+        after = p.written(theta)
+        for channel in CHANNELS:
+            pairs = (getattr(q.channels, channel).components for q in (profile, after))
+            for was, now in zip(*pairs, strict=True):
+                a, b = now.interval
+                assert 0 <= a < b <= 1
+                for old, new in ((was.y, now.y), (np.diff(was.y), np.diff(now.y))):
+                    assert np.all(np.sign(old) * np.array(new) >= -1e-6 * np.abs(now.y).max())
+
+
+def test_strengths_multiply_channels():
+    profile = planted("detent_internal")
+    p = Parameters(profile, ("strengths",))
+    after = p.written(p.start * [2, 0.5, 3])
+    s = np.linspace(0, 1, 101)
+    for name, factor in zip(CHANNELS, (2, 0.5, 3), strict=True):
+        was, now = (evaluate(getattr(q.channels, name), s)[0] for q in (profile, after))
+        np.testing.assert_allclose(now, factor * was, atol=1e-12)
+
+
+def test_ends_of_the_range_stay_where_they_are():
+    profile = planted("constant_friction_hinge")
+    part = profile.channels.friction.components[0].model_copy(update={"interval": (0.0, 1.0)})
+    whole = Channels(friction=Resistance(components=(part,)))
+    p = Parameters(profile.model_copy(update={"channels": whole}), ("intervals",))
+    assert not len(p.start)
+
+
+@pytest.mark.parametrize(("kind", "count"), [("hinge", 2), ("slide", 1)])
+def test_a_slides_weight_is_one_number_and_a_hinges_two(kind, count):
+    assert len(Parameters(planted("detent_internal", kind), ("gravity",)).start) == count

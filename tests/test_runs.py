@@ -1,0 +1,76 @@
+"""Measured runs: what is read, and what is said of files that are not runs."""
+
+import numpy as np
+import pytest
+
+from joda import JodaError
+from joda.runs import read_run
+
+HEAD = "time,position,force\n"
+ROWS = "0,0.1,1\n0.1,0.2,2\n0.3,0.3,\n0.4,0.5,4\n"
+
+
+def read(folder, text):
+    path = folder / "run.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_run(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        HEAD + ROWS,
+        "\ufeff" + HEAD + ROWS,
+        (HEAD + ROWS).replace("\n", "\r\n"),
+        "# made by hand\n" + HEAD + "# a pause\n\n" + ROWS,
+        HEAD.replace("time", " Time ") + ROWS.replace(",", " , "),
+        "note,time,position,force\n" + "".join(f"x,{row}\n" for row in ROWS.split()),
+    ],
+    ids=["plain", "byte order mark", "CRLF", "comments", "blanks and capitals", "other columns"],
+)
+def test_a_run_reads_the_same_however_it_was_written(text, tmp_path):
+    run = read(tmp_path, text)
+    assert run.name == "run.csv"
+    np.testing.assert_array_equal(run.time, [0, 0.1, 0.3, 0.4])
+    np.testing.assert_array_equal(run.position, [0.1, 0.2, 0.3, 0.5])
+    np.testing.assert_array_equal(run.force, [1, 2, np.nan, 4])
+    assert run.forced
+    assert run.velocity is None
+
+
+def test_without_a_force_column_none_was_applied(tmp_path):
+    run = read(tmp_path, "position,time,velocity\n1,0,5\n2,1,6\n3,2,7\n4,3,8\n")
+    assert not run.forced
+    np.testing.assert_array_equal(run.force, np.zeros(4))
+    np.testing.assert_array_equal(run.velocity, [5, 6, 7, 8])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "no header row"),
+        (ROWS, "no header row"),
+        ("position,force\n1,2\n", "no column 'time'; it has position, force"),
+        ("time,force\n1,2\n", "no column 'position'"),
+        (HEAD + ROWS.replace("0.2", ""), "line 3: position is empty; only force may be"),
+        (HEAD + ROWS.replace("0.2", "soon"), "line 3: position is 'soon'; it must be a number"),
+        (HEAD + ROWS.replace("0.2", "nan"), "line 3: position is 'nan'"),
+        (HEAD + ROWS.replace("0.2", "inf"), "line 3: position is 'inf'"),
+        (HEAD + ROWS.replace("0.3,0.3", "0.1,0.3"), "line 4: time does not increase"),
+        (HEAD + ROWS.replace("0.3,0.3", "0.05,0.3"), "line 4: time does not increase"),
+        ("time,time,position\n" + ROWS, "line 1: column 'time' is there twice"),
+        (HEAD + ROWS.replace(",2\n", "\n"), "line 3: 2 cells, the header has 3 columns"),
+        (HEAD + "0,1,2\n1,1,2\n2,1,2\n", "3 samples; a run needs at least 4"),
+        (b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "run.csv"),
+    ],
+)
+def test_a_file_that_is_no_run_is_refused_with_its_place(text, said, tmp_path):
+    with pytest.raises(JodaError) as error:
+        read(tmp_path, text)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(JodaError, match=r"none\.csv"):
+        read_run(tmp_path / "none.csv")
