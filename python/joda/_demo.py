@@ -153,16 +153,9 @@ def _picture(let_go: list[list[Motion]], opened: list[Motion], views: Sequence[I
         upper[2].axhline(0, color="#333333", lw=0.8)
         upper[2].set(xlabel="door angle (degrees)", ylabel="torque of the hand (N·m)")
         upper[2].set_title("opened slowly by hand", loc="left", fontsize=11)
-        for text, height, base in (("it pulls", 0.98, "top"), ("it holds back", 0.02, "bottom")):
-            upper[2].text(
-                0.98,
-                height,
-                text,
-                transform=upper[2].transAxes,
-                ha="right",
-                va=base,
-                color="#777777",
-            )
+        corner: Any = {"transform": upper[2].transAxes, "color": "#777777"}
+        upper[2].text(0.98, 0.98, "it pulls", ha="right", va="top", **corner)
+        upper[2].text(0.04, 0.02, "it holds back", ha="left", va="bottom", **corner)
         upper[0].legend(frameon=False, loc="lower right")
         for axes in upper:
             axes.spines[["top", "right"]].set_visible(False)
