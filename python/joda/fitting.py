@@ -2,8 +2,8 @@
 
 First over short windows, each from its own measured start, so that errors do not pile up and the
 misfit stays smooth in the numbers; then over longer ones; then over whole runs (multiple shooting:
-Bock 1983). The starts are fitted too, within their
-measurement's error. What the motion does not show is held by a prior at its first value.
+Bock 1983). The starts are fitted too, within their measurement's error. What the motion does not
+show is held by a prior at its first value.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -37,6 +37,8 @@ ROUND = 2
 """Iterations after which a stage asks anew how far off it is."""
 STARTS = 6
 """Iterations that fit the starts of runs."""
+START = 3.0
+"""How far the start of a run may be from the measured one, in its standard deviations."""
 FINEST = 2e-5
 """Least noise that is believed, in units of the range."""
 ANNEAL = 0.3
@@ -274,7 +276,7 @@ class Problem:
         """The starts, within their measurement's errors, from which the prediction fits best."""
         doubt = self._doubt(data)
         found = data.start.copy()
-        free = Inequalities(np.zeros((0, 2)), np.zeros(0))
+        near = Inequalities(np.vstack([np.eye(2), -np.eye(2)]), np.full(4, -START))
         for k, part in enumerate(data.parts):
             one = Data((part,), data.start[k : k + 1], doubt[k : k + 1])
 
@@ -286,7 +288,7 @@ class Problem:
                 J = self.misfits(theta, one.start + one.doubt * x, one)[2][0] * one.doubt[0]
                 return np.vstack([J / self.sigma, np.eye(2)])
 
-            best = levenberg_marquardt(residuals, jacobian, np.zeros(2), free, STARTS)
+            best = levenberg_marquardt(residuals, jacobian, np.zeros(2), near, STARTS)
             found[k] += doubt[k] * best
         return found
 
