@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 LAYERS = [
     {"errors", "_build", "_core"},
     {"files", "plugin"},
-    {"runs", "least_squares", "smoothing"},
+    {"runs", "least_squares", "smoothing", "stiffness"},
     {"profile"},
     {"field", "model", "mjcf", "template", "proposal"},
     {"scene", "motion", "offscreen", "_schema", "part"},

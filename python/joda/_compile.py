@@ -14,7 +14,7 @@ from typing import Literal
 from joda._context import Context, context
 from joda.errors import JodaError
 from joda.files import check_target, write_text
-from joda.profile import CHANNELS, Channels, Component, Profile
+from joda.profile import CHANNELS, Channels, Component, Profile, rounded
 from joda.proposal import EffectProposal, Label, Proposal
 from joda.template import Template, read_templates
 
@@ -171,7 +171,7 @@ def _component(
         label=effect.effect_name,
         interval=(effect.start_ratio, effect.end_ratio),
         x=curve.x,
-        y=tuple(_round(peak * y) for y in curve.y),
+        y=tuple(rounded(peak * y) for y in curve.y),
     )
 
 
@@ -179,8 +179,3 @@ def _uniform(draw: str) -> float:
     """A number in [0, 1) that depends on nothing but the text."""
     digest = hashlib.sha256(draw.encode()).digest()
     return int.from_bytes(digest[:6], "big") / 2**48
-
-
-def _round(value: float) -> float:
-    """To six significant digits: readable, and the same bytes whatever rounded last."""
-    return float(f"{value:.6g}") + 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from joda.model import describe_joint, find_joint, load_model
+from joda.model import describe_joint, find_joint, load_model, moves_with
 from joda.motion import gravity_force
 from joda.profile import Joint
 
@@ -167,21 +167,12 @@ def _points(m: mujoco.MjModel, data: mujoco.MjData, body: int) -> NDArray[np.flo
     """Corners of the boxes around the geoms that move, and the centre of mass; shape (n, 3), m."""
     corners = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3)
     points = [data.subtree_com[body][None]]
-    for geom in np.flatnonzero(_below(m, body)[m.geom_bodyid]):
+    for geom in np.flatnonzero(moves_with(m, body)[m.geom_bodyid]):
         centre, half = np.split(m.geom_aabb[geom], 2)
         points.append(
             data.geom_xpos[geom] + (centre + corners * half) @ data.geom_xmat[geom].reshape(3, 3).T
         )
     return np.concatenate(points)
-
-
-def _below(m: mujoco.MjModel, body: int) -> NDArray[np.bool_]:
-    """Which bodies move with this one, itself included; shape (nbody,)."""
-    inside = np.zeros(m.nbody, bool)
-    inside[body] = True
-    for k in range(body + 1, m.nbody):
-        inside[k] = inside[m.body_parentid[k]]
-    return inside
 
 
 def _lever_arm(
@@ -205,7 +196,7 @@ def _driven(m: mujoco.MjModel, joint: int) -> bool:
 def _names(m: mujoco.MjModel, joint: int) -> tuple[str, ...]:
     body = int(m.jnt_bodyid[joint])
     names = [m.joint(joint).name, m.body(body).name]
-    for geom in np.flatnonzero(_below(m, body)[m.geom_bodyid]):
+    for geom in np.flatnonzero(moves_with(m, body)[m.geom_bodyid]):
         names.append(m.body(m.geom_bodyid[geom]).name)
         names.append(m.geom(geom).name)
         if m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH and m.geom_dataid[geom] >= 0:

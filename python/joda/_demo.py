@@ -14,7 +14,7 @@ from joda._generate import generate
 from joda.behaviour import FIRMNESS, SLOW, grip
 from joda.draw import house_style, write_png
 from joda.errors import JodaError
-from joda.files import make_folder, write_bytes
+from joda.files import make_folder, occupied, write_bytes
 from joda.history import History
 from joda.model import find_joint, load_model
 from joda.motion import Motion, pull, release
@@ -81,7 +81,7 @@ def demo(
         JodaError: the folder cannot be written, or holds files already.
     """
     folder = Path(output) if output is not None else _fresh("joda_demo")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not force:
+    if occupied(folder) and not force:
         raise JodaError(f"{folder}: exists already; choose another folder with -o or add --force.")
     make_folder(folder)
     plain, scene = folder / MODEL, folder / "scene.xml"

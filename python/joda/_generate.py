@@ -8,6 +8,7 @@ from pathlib import Path
 import mujoco
 
 from joda.errors import JodaError
+from joda.files import occupied
 from joda.history import History
 from joda.model import find_joint, joint_name, joint_type, load_model
 from joda.proposal import Proposal
@@ -164,7 +165,7 @@ def check_rounds(rounds: int) -> None:
 
 def _check_free(folder: Path, force: bool) -> None:
     """Raises JodaError if the folder holds anything but a generation that came to nothing."""
-    if force or not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+    if force or not occupied(folder):
         return
     path = folder / "history.json"
     if path.is_file():

@@ -25,6 +25,11 @@ def check_target(path: Path, force: bool) -> None:
         raise JodaError(f"{path}: the folder {path.parent} does not exist; create it first.")
 
 
+def occupied(folder: Path) -> bool:
+    """Whether something is there already: a file, or a folder that is not empty."""
+    return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+
+
 def make_folder(path: Path) -> None:
     """Makes the folder, and those above it, unless it exists; raises JodaError."""
     try:

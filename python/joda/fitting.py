@@ -176,32 +176,21 @@ def _misfit(
     blur: jax.Array,
     slots: tuple[Slot, ...],
     h: float,
-) -> jax.Array:
-    """Predicted minus measured positions of one stretch, from a start (position and velocity)."""
+) -> tuple[jax.Array, jax.Array]:
+    """Predicted minus measured positions of one stretch, from a start (position and velocity).
+
+    Twice: to be differentiated, and to be handed through.
+    """
     joint = changed(first, slots, values)
     state = State(start[0], start[1], jnp.zeros_like(start[0]))
     path = solo.rollout(joint, state, part.force, h, blur)
     before, after = path[part.index], path[part.index + 1]
-    misfit: jax.Array = before + part.weight * (after - before) - part.position
-    return jnp.where(part.mask > 0, misfit, 0.0)
-
-
-def _and_misfit(
-    values: jax.Array,
-    start: jax.Array,
-    part: Stretch,
-    first: Solo,
-    blur: jax.Array,
-    slots: tuple[Slot, ...],
-    h: float,
-) -> tuple[jax.Array, jax.Array]:
-    misfit = _misfit(values, start, part, first, blur, slots, h)
+    misfit = before + part.weight * (after - before) - part.position
+    misfit = jnp.where(part.mask > 0, misfit, 0.0)
     return misfit, misfit
 
 
-_slopes = jax.jit(
-    jax.jacfwd(_and_misfit, argnums=(0, 1), has_aux=True), static_argnames=("slots", "h")
-)
+_slopes = jax.jit(jax.jacfwd(_misfit, argnums=(0, 1), has_aux=True), static_argnames=("slots", "h"))
 """Derivatives by the values and by the start, and the misfit itself. Compiled once per structure of
 the joint and size of the data, which is why sizes are rounded up (`_size`)."""
 

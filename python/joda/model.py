@@ -4,6 +4,8 @@ import re
 from pathlib import Path
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.profile import Joint
@@ -101,6 +103,15 @@ def _find(model: mujoco.MjModel, address: str) -> int | None:
     if match[2] is None:
         return first if count == 1 else None
     return first + int(match[2]) if int(match[2]) < count else None
+
+
+def moves_with(model: mujoco.MjModel, body: int) -> NDArray[np.bool_]:
+    """Which bodies move with this one, itself included; shape (nbody,)."""
+    inside = np.zeros(model.nbody, bool)
+    inside[body] = True
+    for k in range(body + 1, model.nbody):
+        inside[k] = inside[model.body_parentid[k]]
+    return inside
 
 
 def describe_joint(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from joda._context import Context
 from joda.least_squares import Inequalities
-from joda.profile import CHANNELS, Component, Profile
+from joda.profile import CHANNELS, Component, Profile, rounded
 
 Array = NDArray[np.float64]
 Kind = Literal["values", "intervals", "strengths", "damping_ratio", "inertia", "gravity"]
@@ -139,7 +139,7 @@ class Parameters:
             for component in content["channels"][name]["components"]:
                 floor = -np.inf if name == "conservative" else 0.0
                 kept = [max(y, floor) for y in component["y"]]
-                component["y"] = kept if exact else [_rounded(y) for y in kept]
+                component["y"] = kept if exact else [rounded(y) for y in kept]
         return Profile.model_validate(content)
 
 
@@ -212,7 +212,3 @@ def _interval(
     if width:
         fixed = (0.0 if 1 in at else b) - (0.0 if 0 in at else a)
         rows.append((width, NARROWEST - fixed))
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.6g}") + 0.0

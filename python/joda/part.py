@@ -4,6 +4,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.model import moves_with
+
 Array = NDArray[np.float64]
 
 
@@ -24,11 +26,8 @@ def groups(model: mujoco.MjModel, joint: int) -> list[int]:
 
 def _subtree(model: mujoco.MjModel, body: int) -> list[int]:
     """The geoms of a body and of all below it that are not wholly transparent."""
-    inside = np.zeros(model.nbody, bool)
-    inside[body] = True
-    for k in range(body + 1, model.nbody):
-        inside[k] = inside[model.body_parentid[k]]
-    return np.flatnonzero(inside[model.geom_bodyid] & (_alpha(model) > 0)).tolist()
+    inside = moves_with(model, body)[model.geom_bodyid]
+    return np.flatnonzero(inside & (_alpha(model) > 0)).tolist()
 
 
 def _alpha(model: mujoco.MjModel) -> Array:

@@ -209,6 +209,11 @@ class Profile(File):
             raise JodaError(f"joint '{joint.name}': {describe(error)}") from None
 
 
+def rounded(value: float) -> float:
+    """To six significant digits: readable, and the same bytes whatever rounded last."""
+    return float(f"{value:.6g}") + 0.0
+
+
 def describe(error: ValidationError) -> str:
     """The first thing wrong with a file, as one sentence: key, what, what would be right."""
     first = error.errors(include_url=False)[0]

@@ -18,13 +18,9 @@ from joda.field import jaxfield
 from joda.parameters import Slot
 from joda.profile import CHANNELS, Profile
 from joda.rig import gravity_factors
+from joda.stiffness import STIFF_ROW, implicit_stiffness, reach
 
 Array = jax.Array
-
-EXPLICIT_STIFFNESS = 1.0
-"""As kExplicitStiffness in cpp/joint_dynamics.cc, and so on."""
-STRIDE = 0.25
-STIFF_ROW = 1e4
 
 MIN_IMPEDANCE, MAX_IMPEDANCE = 1e-4, 0.9999
 """mjMINIMP, mjMAXIMP."""
@@ -163,7 +159,9 @@ def step(prepared: Prepared, state: State, force: Array, h: float, blur: Array) 
     own = jaxfield.evaluate(conservative, s)[0]
     drag = jaxfield.evaluate(damping, s)[0]
     bound = jaxfield.evaluate(friction, s)[0]
-    drag = drag + h * _implicit_stiffness(conservative, s, v, own, inertia, span, h)
+    far = reach(v, own, inertia, 1 / span, h)
+    steepest = jaxfield.max_descent(conservative, s - far, s + far)
+    drag = drag + h * implicit_stiffness(own, steepest, inertia, 1 / span, h)
     blurred = blur > 0
     speed = jnp.sqrt(jnp.where(blurred, v * v + blur * blur, 1.0))
     drag = drag + jnp.where(blurred, bound / speed, 0.0)
@@ -198,22 +196,6 @@ def step(prepared: Prepared, state: State, force: Array, h: float, blur: Array) 
     a = jnp.where(pushes, held_back, free)
     after = v + h * a
     return State(q + h * after, after, jnp.where(pushes, force_back, force_free))
-
-
-def _implicit_stiffness(
-    conservative: jaxfield.Cubics,
-    s: Array,
-    v: Array,
-    force: Array,
-    inertia: Array,
-    span: Array,
-    h: float,
-) -> Array:
-    """As ImplicitStiffness in cpp/joint_dynamics.cc."""
-    soft = EXPLICIT_STIFFNESS * inertia / h**2
-    reach = h * (jnp.abs(v) + h / inertia * jnp.abs(force)) / span
-    steepest = jaxfield.max_descent(conservative, s - reach, s + reach) / span
-    return jnp.maximum(jnp.maximum(steepest, jnp.abs(force) / (span * STRIDE)) - soft, 0.0)
 
 
 def _limit(joint: Solo, q: Array, v: Array, s: Array) -> tuple[Array, Array, Array]:

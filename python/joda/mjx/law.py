@@ -11,14 +11,12 @@ from joda.field import jaxfield
 from joda.mjx.fields import Prepared
 from joda.mjx.internals import Rows
 from joda.profile import CHANNELS
+from joda.stiffness import STIFF_ROW, implicit_stiffness, reach
 
 Array = jax.Array
 
-EXPLICIT_STIFFNESS = 1.0
-"""As kExplicitStiffness in cpp/joint_dynamics.cc, and so on."""
-STRIDE = 0.25
-STIFF_ROW = 1e4
 IDLE_ROW = 1e-12
+"""As kIdleRow in cpp/joint_dynamics.cc."""
 
 
 def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
@@ -49,12 +47,10 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
     if spring:
         stacks = prepared.conservative
         force, _ = _each(stacks, order["conservative"], jaxfield.evaluate, s)
-        soft = EXPLICIT_STIFFNESS * inertia / h**2
-        reach = h * (jnp.abs(v) + h / inertia * jnp.abs(force)) * per_range
+        far = reach(v, force, inertia, per_range, h)
         descent = jaxfield.max_descent
-        steepest = _each(stacks, order["conservative"], descent, s - reach, s + reach)
-        stride = jnp.abs(force) * per_range / STRIDE
-        stiffness = jnp.maximum(0, jnp.maximum(stride, steepest * per_range) - soft)
+        steepest = _each(stacks, order["conservative"], descent, s - far, s + far)
+        stiffness = implicit_stiffness(force, steepest, inertia, per_range, h)
         drag = h * stiffness
     if damper:
         drag = drag + _each(prepared.damping, order["damping"], jaxfield.evaluate, s)[0]

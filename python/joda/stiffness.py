@@ -1,0 +1,38 @@
+"""What of a field must act implicitly for stability, in JAX: as in cpp/joint_dynamics.cc."""
+
+import jax
+import jax.numpy as jnp
+
+Array = jax.Array
+
+EXPLICIT_STIFFNESS = 1.0
+"""As kExplicitStiffness in cpp/joint_dynamics.cc, and so on."""
+STRIDE = 0.25
+STIFF_ROW = 1e4
+
+
+def reach(v: Array, force: Array, inertia: Array, per_range: Array, h: Array | float) -> Array:
+    """How far the joint may get within a step, in normalised position.
+
+    Args:
+        v: velocity, rad/s or m/s.
+        force: the field's, N·m or N.
+        inertia: kg·m² or kg.
+        per_range: 1 / width of the range, 1/rad or 1/m.
+        h: timestep, s.
+    """
+    return h * (jnp.abs(v) + h / inertia * jnp.abs(force)) * per_range
+
+
+def implicit_stiffness(
+    force: Array, steepest: Array, inertia: Array, per_range: Array, h: Array | float
+) -> Array:
+    """The stiffness that acts implicitly, N·m/rad or N/m.
+
+    Args:
+        force, inertia, per_range, h: as for `reach`.
+        steepest: the field's steepest descent within reach, N·m or N per range.
+    """
+    stride = jnp.abs(force) * per_range / STRIDE
+    soft = EXPLICIT_STIFFNESS * inertia / h**2
+    return jnp.maximum(0.0, jnp.maximum(stride, steepest * per_range) - soft)
