@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from refine_table import STEP, cabinet, problem_of
 
-from joda.fitting import cut
+from joda.stretches import cut
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -43,6 +43,6 @@ def test_where_the_force_is_not_known_nothing_is_asked():
     force[100:150] = np.nan
     gap = replace(train[0], force=force, forced=True)
     data = cut([gap], STEP, 1e-3, None)
-    assert data.samples == 401 - 50
-    assert len(data.parts) == 2
-    assert all(np.all(np.isfinite(part.force)) for part in data.parts)
+    assert data.real.sum() == 401 - 50
+    assert len(data.start) == 2
+    assert np.all(np.isfinite(data.batch.force))

@@ -21,6 +21,7 @@ LAYERS = [
     # what combines them
     {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx", "parameters"},
     {"behaviour", "_templates", "solo"},
+    {"stretches"},
     {"fitting"},
     {"_refine"},
     {"wishes"},

@@ -1,15 +1,28 @@
-"""refine: what it needs, and what it says where that is missing."""
+"""refine: what it needs, what it says where that is missing, and what it leaves."""
 
+import json
 import subprocess
 import sys
+from dataclasses import dataclass, fields
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
-from scenes import attached, write
+from refine_table import MODELS, STEP, cabinet, cabinet_profile, released
+from scenes import attached, model_of, write
+from scipy.optimize import least_squares
 
-from joda import JodaError, refine
+from joda import JodaError, Profile, attach, context, refine
+from joda._refine import Refined
+from joda.runs import Run, write_run
+from joda.scene import read_profiles
 
 RUN = "time,position\n" + "".join(f"{0.01 * k},{0.3 + 0.001 * k}\n" for k in range(40))
+CABINET = Path(MODELS, "cabinet.xml").read_text()
+JOINT = 'range="0 1.6"/>'
+NUDGE = [-0.003, -0.25], [0.003, 0.25]
+"""How far (rad, rad/s) the measured start of a run may be off: three errors of the smoother."""
 BLOCKED = "import sys\nsys.modules['jax'] = None\n"
 
 
@@ -56,3 +69,184 @@ def test_a_mistake_is_answered_before_any_file_is_written(change, said, tmp_path
     with pytest.raises(JodaError, match=said):
         refine(**arguments)
     assert sorted(tmp_path.iterdir()) == before
+
+
+def command(folder, *arguments):
+    """Runs `joda refine` on the door of scene.xml, in a process of its own without a terminal."""
+    words = ["joda", "refine", "scene.xml", "--joint", "door", "-o", "better.xml", *arguments]
+    return python(f"import sys\nsys.argv = {words!r}\nfrom joda.cli import main\nmain()", folder)
+
+
+def recorded(folder, runs, name) -> list[str]:
+    """Writes the runs; the names of the files."""
+    names = [f"{name}{k}.csv" for k in range(len(runs))]
+    for file, run in zip(names, runs, strict=True):
+        write_run(folder / file, run)
+    return names
+
+
+def content(folder) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@dataclass(frozen=True)
+class Door:
+    """What the command made of a scene and of measured runs."""
+
+    folder: Path
+    done: subprocess.CompletedProcess
+    start: Profile
+    held: list[Run]
+
+    @property
+    def told(self) -> dict:
+        return json.loads(self.done.stdout)
+
+    @property
+    def history(self) -> dict:
+        return json.loads((self.folder / "better.history.json").read_text())
+
+    def replayed(self, scene: str, nudged=False) -> float:
+        """RMS error of a scene that MuJoCo steps from where the held-out runs were let go.
+
+        Nudged: from the start near there that suits each run best.
+        """
+        model, errors = model_of(self.folder / scene), []
+        for run in self.held:
+            # runs start at hundredths of the range, which is far more than their noise
+            start = np.array([1.6 * round(run.position[0] / 1.6, 2), 0.0])
+            assert abs(start[0] - run.position[0]) < 0.005
+
+            def error(by, run=run, start=start):
+                return replay(model, run, start + by) - run.position
+
+            by = least_squares(error, [0, 0], bounds=NUDGE).x if nudged else np.zeros(2)
+            errors.append(error(by))
+        return float(np.sqrt(np.mean(np.square(errors))))
+
+
+def replay(model: mujoco.MjModel, run: Run, start) -> np.ndarray:
+    """Positions of the door at the times of a run, from a position and a velocity."""
+    data, path = mujoco.MjData(model), []
+    data.qpos[0], data.qvel[0] = start
+    steps = round(run.time[-1] / model.opt.timestep)
+    for _ in range(steps + 1):
+        path.append(data.qpos[0])
+        mujoco.mj_step(model, data)
+    return np.interp(run.time, model.opt.timestep * np.arange(steps + 1), path)
+
+
+@pytest.fixture(scope="module")
+def door(tmp_path_factory) -> Door:
+    """The paper's case: a door that is held too much, three measured runs, four held out."""
+    folder = tmp_path_factory.mktemp("door")
+    _, start, train, held = cabinet(0)
+    write(folder, CABINET.replace('timestep="0.002"', f'timestep="{STEP}"'))
+    attach(folder / "in.xml", start, folder / "scene.xml")
+    runs = recorded(folder, train, "run")
+    checks = [word for name in recorded(folder, held, "held") for word in ("--check", name)]
+    done = command(folder, *runs, *checks, "--iterations", "9", "--json")
+    return Door(folder, done, start, held)
+
+
+class TestThePapersDoor:
+    def test_the_command_succeeds_and_prints_nothing_but_json(self, door):
+        assert (door.done.returncode, door.done.stderr) == (0, "")
+        assert set(door.told) == {field.name for field in fields(Refined)}
+
+    def test_it_leaves_the_four_files_that_it_names(self, door):
+        told = [door.told[key] for key in ("scene", "composed", "picture", "history")]
+        assert told == [
+            f"better.{kind}" for kind in ("xml", "composed.json", "png", "history.json")
+        ]
+        new = {name for name in content(door.folder) if name.startswith("better")}
+        assert new == set(told)
+
+    def test_the_scene_carries_the_profile_that_is_written_beside_it(self, door):
+        model_of(door.folder / "better.xml")
+        carried = read_profiles(door.folder / "better.xml")["door"]
+        beside = Profile.read(door.folder / "better.composed.json")
+        assert (carried.joint, carried.channels) == (beside.joint, beside.channels)
+        assert carried.channels != door.start.channels
+
+    def test_the_changes_name_the_support_that_was_too_strong(self, door):
+        (support,) = (line for line in door.told["changes"] if line.startswith("support"))
+        assert "force -6.5 → -2." in support
+
+    def test_the_scene_replayed_in_mujoco_from_rest_is_far_nearer_the_held_out_runs(self, door):
+        was, now = door.replayed("scene.xml"), door.replayed("better.xml")
+        assert was == pytest.approx(door.told["checked"][0], rel=0.02)
+        assert now < was / 50
+
+    def test_the_error_told_is_that_of_a_replay_from_the_starts_that_suit_best(self, door):
+        now, told = door.replayed("better.xml", nudged=True), door.told["checked"][1]
+        assert 0.7 * told < now < 1.05 * told
+
+    def test_the_fitted_runs_come_down_to_the_noise(self, door):
+        assert door.told["noise"] == pytest.approx(5e-4 * 1.6, rel=0.1)
+        assert door.told["before"] > 100 * door.told["after"]
+        assert door.told["after"] < 1.5 * door.told["noise"]
+
+    def test_the_history_has_all_iterations(self, door):
+        rows = door.history["iterations"]
+        assert 0 < len(rows) == door.told["iterations"] <= 9
+        assert all(row["stage"] and np.isfinite(row["rmse"]) for row in rows)
+        assert rows[-1]["stage"] == "whole runs"
+        assert rows[-1]["rmse"] < rows[0]["rmse"]
+        assert not door.history["interrupted"]
+
+    def test_the_history_repeats_what_was_told(self, door):
+        for key, name in {
+            "rmse_before": "before",
+            "rmse_after": "after",
+            "noise_floor": "noise",
+            "held_out": "checked",
+            "unseen": "unseen",
+        }.items():
+            assert door.history[key] == door.told[name]
+
+    def test_the_magnet_that_no_run_has_passed_is_unseen_and_stays(self, door):
+        unseen = door.told["unseen"]
+        assert set(unseen) == {"conservative", "friction", "damping"}
+        for a, b in (pair for pairs in unseen.values() for pair in pairs):
+            assert 0 <= a < b <= 1
+        (magnet,) = unseen["conservative"]
+        assert magnet == pytest.approx([0, 0.12], abs=0.02)
+        assert sum(b - a for pairs in unseen.values() for a, b in pairs) < 0.5
+        carried = read_profiles(door.folder / "better.xml")["door"].channels.conservative
+        magnets = [channel.components[0] for channel in (carried, door.start.channels.conservative)]
+        np.testing.assert_allclose(magnets[0].y, magnets[1].y, rtol=0.05, atol=0.02)
+
+    def test_the_picture_is_a_png(self, door):
+        assert (door.folder / "better.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+    def test_a_second_run_is_refused_and_changes_nothing(self, door):
+        before = content(door.folder)
+        again = command(door.folder, "run0.csv")
+        assert (again.returncode, again.stdout) == (2, "")
+        assert "better.xml exists already" in again.stderr.replace(":", "")
+        assert again.stderr.count("\n") == 1
+        assert content(door.folder) == before
+
+
+def test_inertia_and_bounce_are_found_and_end_in_the_joints_attributes(tmp_path):
+    rng = np.random.default_rng(0)
+    heavy = write(tmp_path, CABINET.replace(JOINT, JOINT[:-2] + ' armature="0.1"/>'), "heavy.xml")
+    found = context(heavy, "door")
+    true = cabinet_profile(found, 2.5, 0.4)
+    runs = recorded(tmp_path, released(found, true, (0.55, 0.8), rng), "run")
+    text = CABINET.replace(JOINT, JOINT[:-2] + ' solreflimit="0.02 0.3"/>')
+    text = text.replace('timestep="0.002"', f'timestep="{STEP}"')
+    attach(write(tmp_path, text), true, tmp_path / "scene.xml")
+    done = command(tmp_path, *runs, "--fit", "damping_ratio,inertia", "--iterations", "8")
+    assert (done.returncode, done.stderr) == (0, "")
+    model = model_of(tmp_path / "better.xml")
+    assert model.jnt_solref[0] == pytest.approx([0.02, 1.0], rel=0.1)
+    assert model.dof_armature[0] == pytest.approx(0.1, rel=0.1)
+    lines = done.stdout.splitlines()
+    assert lines[0] == "Nothing changed."
+    assert "rad RMS after 7 iterations" in lines[1]
+    assert any(line.startswith("Inertia: 0.1743 → 0.27") for line in lines)
+    assert lines[-4:] == [
+        f"better.{kind}" for kind in ("xml", "composed.json", "png", "history.json")
+    ]

@@ -1,4 +1,6 @@
-"""The smoother: noise is estimated as it is, velocity without bias."""
+"""The smoother: noise is estimated as it is, velocity as well as it says."""
+
+from functools import cache
 
 import numpy as np
 import pytest
@@ -41,3 +43,74 @@ def test_velocity_is_right_within_its_error(even, curved):
     assert np.mean(np.abs(off) < 2) > 0.9
     off = (found.position - np.interp(at, t, y)) / found.position_error
     assert np.mean(np.abs(off) < 2) > 0.9
+
+
+FINE = 1e-4
+"""Timestep (s) of the doors below."""
+
+
+@cache
+def shut(speed: float) -> np.ndarray:
+    """A door that drifts, snaps shut at about `speed` (rad/s) and stops: position and velocity."""
+    q, v, out = 0.9, 0.0, []
+    for _ in range(16001):
+        out.append((q, v))
+        s = q / 0.25
+        magnet = 15 * speed**2 * s * (1 - s) if 0 < s < 1 else 0.0
+        stop = 2500 * q + 30 * v if q < 0 else 0.0
+        v -= FINE * (0.8 + 0.5 * v + magnet + stop)
+        q += FINE * v
+    return np.array(out).T
+
+
+@cache
+def knocking(speed: float) -> np.ndarray:
+    """A door that falls on a hard stop at `speed` (rad/s) and rebounds: position and velocity."""
+    q, v, out = 0.2 * speed, 0.0, []
+    for _ in range(16001):
+        out.append((q, v))
+        v -= FINE * speed / 0.4
+        q += FINE * v
+        q, v = (-q, -0.4 * v) if q < 0 else (q, v)
+    return np.array(out).T
+
+
+@cache
+def swinging(speed: float, rate=6.0) -> np.ndarray:
+    """A sinusoid of that greatest speed (rad/s) and rate (rad/s): position and velocity."""
+    phase = rate * FINE * np.arange(16001)
+    return speed * np.array([np.sin(phase) / rate, np.cos(phase)])
+
+
+def stated_and_true(motion: np.ndarray, hertz: int, sigma: float) -> tuple[np.ndarray, np.ndarray]:
+    """Stated and true errors of velocity, at a hundred times a second of three recordings."""
+    every = round(1 / (FINE * hertz))
+    q, v = motion[:, ::every]
+    t = FINE * every * np.arange(len(q))
+    found = []
+    for seed in range(3):
+        y = q + np.random.default_rng(seed).normal(0, sigma, len(q))
+        some = slice(None, None, hertz // 100)
+        smoothed = smooth(t, y, t[some], noise(t, y))
+        found.append((smoothed.velocity_error, smoothed.velocity - v[some]))
+    stated, true = np.concatenate(found, axis=1)
+    return stated, true
+
+
+@pytest.mark.parametrize("sigma", [2e-4, 2e-3])
+@pytest.mark.parametrize("hertz", [100, 200, 1000])
+@pytest.mark.parametrize("speed", [1, 3, 6])
+@pytest.mark.parametrize("motion", [shut, knocking, swinging])
+def test_fast_motion_and_snaps_have_the_velocity_errors_that_are_stated(
+    motion, speed, hertz, sigma
+):
+    stated, true = stated_and_true(motion(speed), hertz, sigma)
+    assert np.mean(np.abs(true) < 2 * stated) > 0.9
+
+
+@pytest.mark.parametrize("sigma", [2e-4, 2e-3])
+@pytest.mark.parametrize("hertz", [100, 200, 1000])
+@pytest.mark.parametrize("speed", [1, 3, 6])
+def test_slow_turns_do_not_have_their_velocity_error_overstated(speed, hertz, sigma):
+    stated, true = stated_and_true(swinging(speed, 1.5), hertz, sigma)
+    assert np.sqrt(np.mean(stated**2) / np.mean(true**2)) < 5

@@ -1,5 +1,6 @@
 """The joint by itself in JAX: MuJoCo's motion with the plugin, and its derivatives."""
 
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -7,6 +8,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from mujoco import mjx
 
 from joda import context, templates
 from joda.field import evaluate
@@ -15,9 +17,11 @@ from joda.profile import CHANNELS, Channel, Channels, Component, Profile, Resist
 from joda.rig import rig
 
 jax.config.update("jax_enable_x64", True)
+import joda.mjx  # noqa: E402
 from joda import solo  # noqa: E402
 
 MODELS = sorted((Path(__file__).parents[1] / "models").glob("*.xml"))
+FAST = {"xla_backend_optimization_level": "0"}  # compiles in a third of the time
 roll = jax.jit(solo.rollout, static_argnames="h")
 
 
@@ -69,6 +73,24 @@ def test_two_seconds_under_random_forces_are_the_plugins(number, step):
     assert np.abs(path - visited).max() < 1e-6 * (hi - lo)
     assert np.abs(path - visited)[:100].max() < 1e-7 * (hi - lo)
     assert max(visited) >= hi or min(visited) <= lo  # an end of the range was hit
+
+
+def test_a_second_under_random_forces_is_that_of_mjx():
+    found = context(MODELS[0].with_stem("cabinet"), "#0")
+    profile, force = profile_for(found, sorted(templates()).index("magnetic_return_to_low_end"))
+    model, (lo, hi) = quiet(found, profile, 0.005), found.joint.range
+    joint, start = solo.from_context(found, profile, model, 0), 0.5 * (lo + hi)
+    pushes = jnp.array(np.repeat(np.random.default_rng(3).normal(0, 2 * force, 10), 20))
+    fields = joda.mjx.put_fields(model, {"joint": profile})
+    m, d = mjx.put_model(model), mjx.make_data(model)
+    d = d.replace(qpos=jnp.array([start]))
+    run = jax.jit(partial(joda.mjx.rollout, read=lambda d: d.qpos[0]), compiler_options=FAST)
+    wanted = np.array(run(m, d, fields, pushes[:, None])[1])
+    state = solo.State(jnp.array(start), jnp.array(0.0), jnp.array(0.0))
+    path = np.array(roll(joint, state, pushes, h=0.005))[1:]
+    assert np.abs(path - wanted).max() < 1e-9 * (hi - lo)
+    assert wanted.min() < lo + 0.2 * (hi - lo)  # past the magnet
+    assert wanted.max() > hi  # past the end of the range
 
 
 @pytest.mark.parametrize("kind", ["hinge", "slide"])

@@ -88,11 +88,12 @@ def levenberg_marquardt(
     for number in range(1, iterations + 1):
         J = jacobian(theta)
         scale = np.sqrt(np.maximum((J**2).sum(axis=0), 1e-12))
+        Q, R = np.linalg.qr(J)
+        target = np.concatenate([-Q.T @ r, np.zeros(len(theta))])
         before = cost
         for _ in range(TRIALS):
-            A = np.vstack([J, np.diag(np.sqrt(damping) * scale)])
-            b = np.concatenate([-r, np.zeros(len(theta))])
-            step = bounded_step(A, b, constraints.G, constraints.h - constraints.G @ theta)
+            A = np.vstack([R, np.diag(np.sqrt(damping) * scale)])
+            step = bounded_step(A, target, constraints.G, constraints.h - constraints.G @ theta)
             trial = residuals(theta + step)
             new = 0.5 * float(trial @ trial)
             if new < cost:

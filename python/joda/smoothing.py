@@ -3,7 +3,7 @@
 Around each time a parabola is fitted by least squares to the samples near it (Savitzky and Golay's
 smoother, for uneven sampling too), in the widest of a few windows whose velocity agrees with those
 of all narrower ones: the rule of intersecting confidence intervals (Goldenshluger and Nemirovski,
-1997).
+1997). What the parabola bends is told by a cubic in the same window.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,8 @@ class Smooth:
         position: rad or m.
         velocity: rad/s or m/s.
         position_error, velocity_error: their standard deviations, twice what the noise makes, as
-            the widest window may bend the motion by as much.
+            the widest window may bend the motion by as much; to the velocity's is added, as squares
+            add, by how much a cubic's velocity differs.
     """
 
     position: Array
@@ -81,27 +82,36 @@ def smooth(time: Array, position: Array, at: Array, sigma: float) -> Smooth:
 
 def _local(time: Array, position: Array, t0: float, sigma: float) -> tuple[float, ...]:
     """Position, velocity and their errors at one time."""
+    near = _window(time, position, t0, sigma)
+    t, y = time[near] - t0, position[near]
+    value, slope, value_error, slope_error = _polynomial(t, y, sigma, 2)
+    bent = _polynomial(t, y, sigma, 3)[1] - slope
+    return value, slope, 2 * value_error, float(np.hypot(2 * slope_error, bent))
+
+
+def _window(time: Array, position: Array, t0: float, sigma: float) -> NDArray[np.intp]:
+    """The widest window, as indices, whose velocity agrees with those of all narrower ones."""
     away = np.abs(time - t0)
-    nearest = np.sort(np.argsort(away, kind="stable")[: min(LEAST, len(time))])
-    out = _parabola(time[nearest] - t0, position[nearest], sigma)
+    widest = np.sort(np.argsort(away, kind="stable")[: min(LEAST, len(time))])
+    least = len(widest)
     low, high = -np.inf, np.inf
     for half in WINDOWS:
         near = np.flatnonzero(away <= half)
-        if len(near) < len(nearest):
+        if len(near) < least:
             continue
-        wider = _parabola(time[near] - t0, position[near], sigma)
-        low = max(low, wider[1] - CONFIDENCE * wider[3])
-        high = min(high, wider[1] + CONFIDENCE * wider[3])
+        _, slope, _, error = _polynomial(time[near] - t0, position[near], sigma, 2)
+        low, high = max(low, slope - CONFIDENCE * error), min(high, slope + CONFIDENCE * error)
         if low > high:
             break
-        out = wider
-    return out[0], out[1], 2 * out[2], 2 * out[3]
+        widest = near
+    return widest
 
 
-def _parabola(t: Array, y: Array, sigma: float) -> tuple[float, float, float, float]:
+def _polynomial(t: Array, y: Array, sigma: float, degree: int) -> tuple[float, float, float, float]:
     """Value and slope at t = 0, and their standard deviations."""
-    A = np.vander(t, min(3, len(t)), increasing=True)
+    scale = np.abs(t).max()
+    A = np.vander(t / scale, min(degree + 1, len(t)), increasing=True)
     covariance = np.linalg.inv(A.T @ A)
     fit = covariance @ A.T @ y
     errors = sigma * np.sqrt(np.diag(covariance))
-    return fit[0], fit[1], errors[0], errors[1]
+    return fit[0], fit[1] / scale, errors[0], errors[1] / scale

@@ -137,7 +137,7 @@ def prepare(joint: Solo) -> Prepared:
     )
 
 
-def step(prepared: Prepared, state: State, force: Array, h: float, blur: Array) -> State:
+def step(prepared: Prepared, state: State, force: Array, h: float) -> State:
     """One step of semi-implicit Euler.
 
     Args:
@@ -145,8 +145,6 @@ def step(prepared: Prepared, state: State, force: Array, h: float, blur: Array) 
         state: before.
         force: applied from outside, N·m or N.
         h: timestep, s.
-        blur: speed (rad/s or m/s) below which dry friction fades, as a smooth stand-in while a fit
-            is far off; 0: exact.
 
     Returns:
         the state after.
@@ -162,10 +160,6 @@ def step(prepared: Prepared, state: State, force: Array, h: float, blur: Array) 
     far = reach(v, own, inertia, 1 / span, h)
     steepest = jaxfield.max_descent(conservative, s - far, s + far)
     drag = drag + h * implicit_stiffness(own, steepest, inertia, 1 / span, h)
-    blurred = blur > 0
-    speed = jnp.sqrt(jnp.where(blurred, v * v + blur * blur, 1.0))
-    drag = drag + jnp.where(blurred, bound / speed, 0.0)
-    bound = jnp.where(blurred, 0.0, bound)
     if joint.hinge:
         weight = joint.gravity[0] * jnp.cos(q) + joint.gravity[1] * jnp.sin(q)
     else:
@@ -221,7 +215,7 @@ def _limit(joint: Solo, q: Array, v: Array, s: Array) -> tuple[Array, Array, Arr
     return sign, D, -damping * sign * v - stiffness * impedance * distance
 
 
-def rollout(joint: Solo, start: State, force: Array, h: float, blur: Array | float = 0.0) -> Array:
+def rollout(joint: Solo, start: State, force: Array, h: float) -> Array:
     """Positions of the joint under a force.
 
     Args:
@@ -229,16 +223,14 @@ def rollout(joint: Solo, start: State, force: Array, h: float, blur: Array | flo
         start: its state at first.
         force: applied from outside at each step, N·m or N, shape (n,).
         h: timestep, s.
-        blur: see `step`.
 
     Returns:
         positions before the first step and after each, rad or m, shape (n + 1,).
     """
     prepared = prepare(joint)
-    smooth = jnp.asarray(blur, start.q.dtype)
 
     def advance(state: State, applied: Array) -> tuple[State, Array]:
-        after = step(prepared, state, applied, h, smooth)
+        after = step(prepared, state, applied, h)
         return after, after.q
 
     _, positions = jax.lax.scan(advance, start, force)

@@ -1,5 +1,6 @@
 """Commands that measure: profiles against measured motions, and what they cost."""
 
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
@@ -53,6 +54,9 @@ def refine(
     from joda import Profile
     from joda import refine as run
 
+    # what JAX compiles takes longer than the fit itself, so it is kept for the next call
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(caches / "joda" / "jax"))
     with loss_bar() as bar:
         result = run(
             model, joint, runs, output, check=check or (), iterations=iterations, method=method,

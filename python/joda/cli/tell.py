@@ -138,6 +138,9 @@ def tell_errors(result: "Refined", unit: str) -> None:
         f"Position error: {result.before:.3g} → {result.after:.3g} {unit} RMS after "
         f"{result.iterations} iterations; the measurement's noise is {result.noise:.2g} {unit}."
     )
+    print(
+        f"The same over windows of 0.4 s: {result.windows[0]:.3g} → {result.windows[1]:.3g} {unit}."
+    )
     if result.checked:
         print(
             f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS."
