@@ -44,6 +44,15 @@ inline std::vector<std::string_view> Split(std::string_view text, char separator
   }
 }
 
+// What stands between white space.
+inline std::vector<std::string_view> Words(std::string_view text) {
+  std::vector<std::string_view> out;
+  for (text = Trim(text); !text.empty(); text = Trim(text.substr(out.back().size()))) {
+    out.push_back(text.substr(0, text.find_first_of(" \t\r\n")));
+  }
+  return out;
+}
+
 // The text in quotes, cut after some 40 bytes but never within a UTF-8 character.
 inline std::string Quote(std::string_view text) {
   size_t end = std::min<size_t>(text.size(), 40);
@@ -56,9 +65,7 @@ inline std::string Quote(std::string_view text) {
 // Numbers separated by white space; throws for anything else, infinities and NaN included.
 inline Eigen::VectorXd ParseNumbers(std::string_view text) {
   std::vector<double> out;
-  text = internal::Trim(text);
-  while (!text.empty()) {
-    const std::string_view word = text.substr(0, text.find_first_of(" \t\r\n"));
+  for (const std::string_view word : internal::Words(text)) {
     double value;
     const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
     if (result.ec != std::errc() || result.ptr != word.data() + word.size() ||
@@ -66,7 +73,6 @@ inline Eigen::VectorXd ParseNumbers(std::string_view text) {
       throw std::invalid_argument(internal::Quote(word) + " is not a finite number");
     }
     out.push_back(value);
-    text = internal::Trim(text.substr(word.size()));
   }
   return Eigen::Map<Eigen::VectorXd>(out.data(), static_cast<Eigen::Index>(out.size()));
 }
@@ -95,6 +101,18 @@ inline void Validate(const Component& c, bool nonnegative) {
     fail("values of friction and damping must not be negative");
 }
 
+// One component from its three parts; it has no label.
+inline Component ParseComponent(std::string_view interval, std::string_view x, std::string_view y,
+                                bool nonnegative) {
+  const auto ends = ParseNumbers(interval);
+  if (ends.size() != 2) {
+    throw std::invalid_argument("expected the two numbers of the interval before the first |");
+  }
+  const Component out = {"", ends[0], ends[1], ParseNumbers(x), ParseNumbers(y)};
+  Validate(out, nonnegative);
+  return out;
+}
+
 // All components of one channel; the text may be empty.
 inline std::vector<Component> ParseChannel(std::string_view text, bool nonnegative) {
   std::vector<Component> out;
@@ -106,28 +124,20 @@ inline std::vector<Component> ParseChannel(std::string_view text, bool nonnegati
     const auto parts = internal::Split(piece, '|');
     const auto colon = parts[0].rfind(':');
     const bool labelled = colon != std::string_view::npos;
-    Component c;
-    c.label = std::string(internal::Trim(labelled ? parts[0].substr(0, colon) : ""));
+    const std::string label(internal::Trim(labelled ? parts[0].substr(0, colon) : ""));
     try {
       if (parts.size() != 3) {
         throw std::invalid_argument("expected \"label: a b | x ... | y ...\", got " +
                                     internal::Quote(piece));
       }
-      const auto interval = ParseNumbers(labelled ? parts[0].substr(colon + 1) : parts[0]);
-      if (interval.size() != 2) {
-        throw std::invalid_argument("expected the two numbers of the interval before the first |");
-      }
-      c.a = interval[0];
-      c.b = interval[1];
-      c.x = ParseNumbers(parts[1]);
-      c.y = ParseNumbers(parts[2]);
-      Validate(c, nonnegative);
+      const auto interval = labelled ? parts[0].substr(colon + 1) : parts[0];
+      out.push_back(ParseComponent(interval, parts[1], parts[2], nonnegative));
+      out.back().label = label;
     } catch (const std::invalid_argument& error) {
-      const std::string name = c.label.empty() ? "" : " " + internal::Quote(c.label);
+      const std::string name = label.empty() ? "" : " " + internal::Quote(label);
       throw std::invalid_argument("component " + std::to_string(i + 1) + name + ": " +
                                   error.what());
     }
-    out.push_back(std::move(c));
   }
   return out;
 }

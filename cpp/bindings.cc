@@ -54,9 +54,9 @@ Raises:
   module.def(
       "set_profile",
       [](std::uintptr_t model, std::uintptr_t data, int joint, double lo, double hi,
-         const std::array<std::string, 6>& texts) {
-        const char* pointers[6];
-        for (int i = 0; i < 6; ++i) pointers[i] = texts[i].c_str();
+         const std::array<std::string, 7>& texts) {
+        const char* pointers[7];
+        for (int i = 0; i < 7; ++i) pointers[i] = texts[i].c_str();
         char error[1024];
         if (joda_set_profile(reinterpret_cast<const mjModel*>(model),
                              reinterpret_cast<mjData*>(data), joint, lo, hi, pointers, error,
@@ -66,5 +66,7 @@ Raises:
       },
       py::arg("model_address"), py::arg("data_address"), py::arg("joint"), py::arg("lo"),
       py::arg("hi"), py::arg("texts"),
-      "Replaces the profile of a joint in one mjData; texts: channel and combine, three times.");
+      "Replaces the profile of a joint in one mjData; texts: channel and combine, three times, "
+      "then "
+      "the effects.");
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -12,10 +14,11 @@ namespace {
 
 constexpr int kMaxJoints = 6;  // hinges and slides that one MuJoCo body can have
 
-// "range", then the texts of the channels.
-constexpr std::array<const char*, 7> kKeys = {
-    "range",   "conservative",   "conservative_combine", "friction", "friction_combine",
-    "damping", "damping_combine"};
+// "range", then the texts of the channels and of the effects.
+constexpr std::array<const char*, 8> kKeys = {
+    "range",           "conservative",     "conservative_combine",
+    "friction",        "friction_combine", "damping",
+    "damping_combine", "effects"};
 
 const char* Value(const mjModel* m, int instance, const std::string& key) {
   const char* value = mj_getPluginConfig(m, instance, key.c_str());
@@ -26,6 +29,9 @@ bool IsConfigured(const mjModel* m, int instance, const std::string& prefix) {
   return std::any_of(kKeys.begin(), kKeys.end(),
                      [&](const char* key) { return *Value(m, instance, prefix + key); });
 }
+
+// Before the attributes of the joint at `place` in its body; -1 stands for the only one.
+std::string Prefix(int place) { return place < 0 ? "" : std::to_string(place) + "."; }
 
 std::string Name(const mjModel* m, int type, int id, const std::string& kind) {
   const char* name = mj_id2name(m, type, id);
@@ -101,6 +107,65 @@ PiecewiseCubic ParseNamed(const std::string& prefix, const char* const* keys,
                    [&] { return PiecewiseCubic(ParseChannel(texts[0], nonnegative), combine); });
 }
 
+// The effects in the text, null if it is blank.
+std::shared_ptr<const Effects> ParseShared(std::string_view text) {
+  if (internal::Trim(text).empty()) return nullptr;
+  return std::make_shared<const Effects>(ParseEffects(text));
+}
+
+// As nstate cannot report errors, what cannot be read counts as without effects.
+int CountStatesOf(const char* effects) {
+  try {
+    return CountStates(ParseShared(effects).get());
+  } catch (const std::invalid_argument&) {
+    return CountStates(static_cast<const Effects*>(nullptr));
+  }
+}
+
+std::string Print(double value) {
+  char out[32];
+  std::snprintf(out, sizeof out, "%g", value);
+  return out;
+}
+
+void CheckFriction(const mjModel* m, int joint, const Profile& profile) {
+  const bool has_row = m->dof_frictionloss[m->jnt_dofadr[joint]] > 0;
+  const std::string effect = profile.effects ? profile.effects->needs_row : "";
+  std::string what;
+  if (!effect.empty()) what = "the effect \"" + effect + "\"";
+  if (!profile.friction.coefficients().isZero(0)) what = "a friction channel";
+  if (has_row || what.empty()) return;
+  throw std::invalid_argument(JointName(m, joint) + " has " + what +
+                              " but no friction row in the solver; add "
+                              "frictionloss=\"1e-12\" to the joint");
+}
+
+void CheckGravityOffset(const mjModel* m, int joint, const GravityOffset& gravity) {
+  const bool hinge = m->jnt_type[joint] == mjJNT_HINGE;
+  if (hinge ? gravity.force == 0 : gravity.descent == 0) return;
+  throw std::invalid_argument(JointName(m, joint) + " is a " + (hinge ? "hinge" : "slide") +
+                              "; its effect \"gravity_offset\" takes " +
+                              (hinge ? "sin and cos" : "force"));
+}
+
+void CheckInertia(const mjModel* m, int joint, const Effects& effects) {
+  const int dof = m->jnt_dofadr[joint];
+  if (m->dof_armature[dof] < 0.999999 * effects.added_inertia) {
+    const std::string needed = Print(effects.added_inertia);
+    throw std::invalid_argument(JointName(m, joint) + " has armature " +
+                                Print(m->dof_armature[dof]) + ", less than its effect " +
+                                "\"added_inertia\" of " + needed + "; write armature=\"" + needed +
+                                "\" on the joint");
+  }
+  // a heavier handle would make the contact, which is explicit, unstable
+  if (effects.backlash.inertia * m->dof_invweight0[dof] > 0.5) {
+    throw std::invalid_argument(JointName(m, joint) + " has inertia " +
+                                Print(1 / m->dof_invweight0[dof]) +
+                                ", and the handle of its effect \"backlash\" " +
+                                Print(effects.backlash.inertia) + "; at most half is possible");
+  }
+}
+
 }  // namespace
 
 const std::vector<std::string>& AttributeNames() {
@@ -116,7 +181,7 @@ const std::vector<std::string>& AttributeNames() {
 
 std::string JointName(const mjModel* m, int joint) { return Name(m, mjOBJ_JOINT, joint, "joint"); }
 
-Profile ParseProfile(const std::string& prefix, double lo, double hi, const char* const texts[6]) {
+Profile ParseProfile(const std::string& prefix, double lo, double hi, const char* const texts[7]) {
   const char* const* keys = kKeys.data() + 1;
   Profile profile;
   profile.lo = lo;
@@ -124,21 +189,25 @@ Profile ParseProfile(const std::string& prefix, double lo, double hi, const char
   profile.conservative = ParseNamed(prefix, keys, texts, false);
   profile.friction = ParseNamed(prefix, keys + 2, texts + 2, true);
   profile.damping = ParseNamed(prefix, keys + 4, texts + 4, true);
+  profile.effects = Attribute(prefix + keys[6], [&] { return ParseShared(texts[6]); });
   return profile;
 }
 
-void CheckFriction(const mjModel* m, int joint, const Profile& profile) {
-  const bool has_row = m->dof_frictionloss[m->jnt_dofadr[joint]] > 0;
-  if (has_row || profile.friction.coefficients().isZero(0)) return;
-  throw std::invalid_argument(JointName(m, joint) +
-                              " has a friction channel but no friction row in the solver; add "
-                              "frictionloss=\"1e-12\" to the joint");
+void CheckProfile(const mjModel* m, int joint, const Profile& profile) {
+  CheckFriction(m, joint, profile);
+  if (!profile.effects) return;
+  CheckGravityOffset(m, joint, profile.effects->gravity);
+  CheckInertia(m, joint, *profile.effects);
 }
 
-int CountJoints(const mjModel* m, int instance) {
-  int count = IsConfigured(m, instance, "");
-  for (int place = 0; place < kMaxJoints; ++place) {
-    count += IsConfigured(m, instance, std::to_string(place) + ".");
+int CountStates(const Effects* effects) { return effects && effects->backlash.play > 0 ? 3 : 1; }
+
+int CountStates(const mjModel* m, int instance) {
+  int count = 0;
+  for (int place = -1; place < kMaxJoints; ++place) {
+    const std::string prefix = Prefix(place);
+    if (!IsConfigured(m, instance, prefix)) continue;
+    count += CountStatesOf(Value(m, instance, prefix + kKeys.back()));
   }
   return count;
 }
@@ -147,7 +216,7 @@ std::vector<JointConfig> ReadConfig(const mjModel* m, int instance) {
   const int body = FindBody(m, instance);
   std::vector<JointConfig> out;
   for (int place = -1; place < kMaxJoints; ++place) {
-    const std::string prefix = place < 0 ? "" : std::to_string(place) + ".";
+    const std::string prefix = Prefix(place);
     if (!IsConfigured(m, instance, prefix)) continue;
     const int joint = FindJoint(m, body, place);
     if (!out.empty() && out.back().joint == joint) {
@@ -159,7 +228,7 @@ std::vector<JointConfig> ReadConfig(const mjModel* m, int instance) {
     const auto [lo, hi] =
         Attribute(prefix + kKeys[0], [&] { return ParseRange(m, joint, texts[0]); });
     out.push_back({joint, ParseProfile(prefix, lo, hi, texts.data() + 1)});
-    CheckFriction(m, joint, out.back().profile);
+    CheckProfile(m, joint, out.back().profile);
   }
   return out;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "config.h"
+#include "rows.h"
 
 namespace joda {
 namespace {
@@ -42,86 +43,51 @@ int CountPositive(const mjtNum* values, int n) {
   return static_cast<int>(std::count_if(values, values + n, [](mjtNum x) { return x > 0; }));
 }
 
-// Row among [first, last) of this step's constraints that belongs to the object, -1: none. Rows
-// come in the order of their objects. `expected` is tried first, then bisection.
-inline int FindRow(const mjData* d, int first, int last, int expected, int type, int id) {
-  int row = first + expected;
-  if (row < last && d->efc_type[row] == type && d->efc_id[row] == id) return row;
-  int lo = first, hi = last;
-  while (lo < hi) {
-    row = (lo + hi) / 2;
-    if (d->efc_type[row] == type && d->efc_id[row] == id) return row;
-    const bool before =
-        d->efc_type[row] < type || (d->efc_type[row] == type && d->efc_id[row] < id);
-    (before ? lo : hi) = before ? row + 1 : row;
-  }
-  return -1;
-}
-
-// What of the step is the same for all joints.
-struct Step {
-  double h, per_h;
-  bool spring, damper, friction;  // not disabled
-  bool keeps_rows;                // the solver will use the rows as they are set here
-  bool dual, sparse;
-
-  explicit Step(const mjModel* m)
-      : h(m->opt.timestep),
-        per_h(1 / h),
-        spring(!(m->opt.disableflags & mjDSBL_SPRING)),
-        damper(!(m->opt.disableflags & mjDSBL_DAMPER)),
-        friction(!(m->opt.disableflags & mjDSBL_FRICTIONLOSS)),
-        // the discrete integrator makes the rows anew behind the plugin, and noslip drops the
-        // compliance of friction rows
-        keeps_rows(m->opt.integrator != mjINT_DISCRETE && m->opt.noslip_iterations == 0),
-        dual(m->opt.solver == mjSOL_PGS || m->opt.noslip_iterations > 0),
-        sparse(dual && mj_isSparse(m)) {}
-};
-
-// Makes the row resist the velocity at the end of the step: force = offset - D (a + v / h), within
-// +-bound.
-void SetRow(const Step& step, mjData* d, int row, double D, double bound, double offset) {
-  const double R = 1 / D;
-  if (step.dual) {  // the dual solvers see R on the diagonal of A + R
-    mjtNum* diagonal = d->efc_AR + static_cast<std::ptrdiff_t>(row) * (d->nefc + 1);
-    if (step.sparse) {
-      const int* colind = d->efc_AR_colind + d->efc_AR_rowadr[row];
-      const int* found = std::find(colind, colind + d->efc_AR_rownnz[row], row);
-      diagonal = d->efc_AR + (found - d->efc_AR_colind);
-    }
-    *diagonal += R - d->efc_R[row];
-  }
-  d->efc_D[row] = D;
-  d->efc_R[row] = R;
-  d->efc_frictionloss[row] = bound;
-  // the engine computes the reference a = -B v - K I pos from these right after the passive forces
-  d->efc_pos[row] = -offset * R;
-  mjtNum* KBIP = d->efc_KBIP + 4 * row;
-  KBIP[0] = 1;
-  KBIP[1] = step.per_h;
-  KBIP[2] = 1;
-  if (d->nisland > 0) {
-    const int i = d->map_efc2iefc[row];
-    d->iefc_D[i] = D;
-    d->iefc_R[i] = R;
-    d->iefc_frictionloss[i] = bound;
-  }
-}
-
-// Part of the field that must act implicitly for stability, as a stiffness: what is stiffer than
-// kExplicitStiffness at the steepest place that the joint may reach within this step, or would move
-// it by more than a fraction of its range (kStride).
+// Part of the springs' force that must act implicitly for stability, as a stiffness: what is
+// stiffer than kExplicitStiffness at the steepest place that the joint may reach within this step,
+// or would move it by more than a fraction of its range (kStride).
 double ImplicitStiffness(const Step& step, const Profile& p, double s, double v, double force,
                          double inertia) {
   const double soft = kExplicitStiffness * inertia * step.per_h * step.per_h;
+  const double gravity = p.effects ? p.effects->gravity.descent : 0;
+  const double steepest = step.spring ? p.conservative.MaxDescent() * p.per_range : 0;
   double stiffness = std::abs(force) * p.per_range * (1 / kStride);
-  if (p.conservative.MaxDescent() * p.per_range > soft) {
+  if (steepest + gravity > soft) {
     const double free = step.h * (std::abs(v) + step.h / inertia * std::abs(force));
     const double reach = free * p.per_range;
-    stiffness = std::max(stiffness, p.conservative.MaxDescent(s - reach, s + reach) * p.per_range);
+    const double near = p.conservative.MaxDescent(s - reach, s + reach) * p.per_range;
+    stiffness = std::max(stiffness, gravity + std::min(near, steepest));
   }
   return std::max(0.0, stiffness - soft);
 }
+
+// Generalised force of gravity on the joint, over all bodies that it moves, and of what is applied
+// to it.
+double LoadOn(const mjModel* m, const mjData* d, int joint, int body) {
+  const mjtNum* axis = d->xaxis + 3 * joint;
+  mjtNum direction[3];  // in which the centre of mass moves
+  mju_copy3(direction, axis);
+  if (m->jnt_type[joint] == mjJNT_HINGE) {
+    mjtNum arm[3];
+    mju_sub3(arm, d->subtree_com + 3 * body, d->xanchor + 3 * joint);
+    mju_cross(direction, axis, arm);
+  }
+  const bool weightless = m->opt.disableflags & mjDSBL_GRAVITY;
+  const double weight = weightless ? 0 : m->body_subtreemass[body];
+  return weight * mju_dot3(direction, m->opt.gravity) + d->qfrc_applied[m->jnt_dofadr[joint]];
+}
+
+// What has no row becomes a force that at most stops the joint within the step.
+double ResistingForce(const FrictionBounds& bounds, double drag, double v, double h,
+                      double inertia) {
+  const double dry = v < 0 ? bounds.negative : bounds.positive;
+  if (!(dry > 0 || drag > 0)) return 0;
+  const double stop = inertia * std::abs(v) / h;
+  const double resistance = dry + drag * std::abs(v) / (1 + h * drag / inertia);
+  return -std::copysign(std::min(resistance, stop), v);
+}
+
+bool HasBacklash(const Effects* effects) { return effects && effects->backlash.play > 0; }
 
 }  // namespace
 
@@ -136,6 +102,7 @@ int JointDynamics::FindDampingRow(const mjData* d, const Joint& joint) {
 }
 
 JointDynamics::JointDynamics(const mjModel* m, int instance) {
+  int state = 0;
   for (JointConfig& config : ReadConfig(m, instance)) {
     Joint joint;
     joint.id = config.joint;
@@ -145,6 +112,8 @@ JointDynamics::JointDynamics(const mjModel* m, int instance) {
     joint.equality = FindEquality(m, joint.id);
     joint.friction_row = CountPositive(m->dof_frictionloss, joint.dof);
     joint.profile = std::move(config.profile);
+    joint.state = state;
+    state += CountStates(joint.profile.effects.get());
     joints_.push_back(std::move(joint));
   }
 }
@@ -152,64 +121,104 @@ JointDynamics::JointDynamics(const mjModel* m, int instance) {
 void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
   for (Joint& mine : joints_) {
     if (mine.id != joint) continue;
-    CheckFriction(m, joint, profile);
+    CheckProfile(m, joint, profile);
+    if (CountStates(mine.profile.effects.get()) != CountStates(profile.effects.get())) {
+      throw std::invalid_argument(JointName(m, joint) +
+                                  " would gain or lose the effect \"backlash\", whose state needs "
+                                  "room in the model; attach the profile and compile anew");
+    }
     mine.profile = std::move(profile);
     return;
   }
   throw std::invalid_argument(JointName(m, joint) + " carries no profile; attach one first");
 }
 
-void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) const {
+double JointDynamics::SetFrictionRow(const Step& step, mjData* d, int row, const Joint& joint,
+                                     double bound, double state, double inertia) {
+  const double held = step.keeps_rows ? std::clamp(state, -bound, bound) : 0;
+  double D = kStiffRow * inertia, drag = 0;
+  const Effects* effects = joint.profile.effects.get();
+  if (effects && effects->presliding.stiffness > 0 && step.keeps_rows) {
+    const Presliding& bristle = effects->presliding;
+    const double left = BristleLeft(bristle, held, bound, d->qvel[joint.dof]);
+    const double in_row = BristleLeftInRow(left, step.h, bristle.stiffness, inertia);
+    D = std::clamp(step.h * step.h * bristle.stiffness * in_row, kIdleRow * inertia, D);
+    drag = bristle.damping * left;
+  }
+  SetRow(step, d, row, D, bound, held);
+  return drag;
+}
+
+double JointDynamics::PushThroughPlay(const mjData* d, const mjtNum* state, double h,
+                                      Joint* joint) {
+  const double applied = d->qfrc_applied[joint->dof];
+  joint->handle = {state[1], state[2]};
+  return MoveHandle(joint->profile.effects->backlash, h, applied, d->qvel[joint->dof],
+                    &joint->handle) -
+         applied;
+}
+
+void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
   const Step step(m);
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
-  for (size_t k = 0; k < joints_.size(); ++k) {
-    const Joint& joint = joints_[k];
+  for (Joint& joint : joints_) {
     if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
     const Profile& p = joint.profile;
+    const Effects* effects = p.effects.get();
     const double h = step.h, inertia = 1 / m->dof_invweight0[joint.dof], v = d->qvel[joint.dof];
-    const double s = (d->qpos[joint.qpos] - p.lo) * p.per_range;
+    const double q = d->qpos[joint.qpos], s = (q - p.lo) * p.per_range;
 
-    double force = 0, stiffness = 0, drag = 0, friction = 0;
-    if (step.spring) {
-      force = p.conservative(s).value;
-      stiffness = ImplicitStiffness(step, p, s, v, force, inertia);
-      drag = h * stiffness;
+    double spring = step.spring ? p.conservative(s).value : 0;
+    double drag = step.damper ? p.damping(s).value : 0;
+    double friction = step.friction ? p.friction(s).value : 0;
+    if (effects) {
+      spring += OffsetForce(effects->gravity, q);
+      if (step.damper) drag += ExtraDamping(*effects, s, v);
     }
-    if (step.damper) drag += p.damping(s).value;
-    if (step.friction) friction = p.friction(s).value;
+    const double stiffness = ImplicitStiffness(step, p, s, v, spring, inertia);
+    drag += h * stiffness;
 
     const int friction_row = FindFrictionRow(d, joint);
+    if (friction_row >= 0) friction += m->dof_frictionloss[joint.dof];
+    FrictionBounds bounds = {friction, friction};
+    if (effects && step.friction) {
+      const double load = effects->load > 0 ? LoadOn(m, d, joint.id, joint.body) : 0;
+      bounds = BoundFriction(*effects, friction, s, v, load);
+    }
+    double force = 0;
     if (friction_row >= 0) {
-      friction += m->dof_frictionloss[joint.dof];
-      const double held = step.keeps_rows ? std::clamp(state[k], -friction, friction) : 0;
-      SetRow(step, d, friction_row, kStiffRow * inertia, friction, held);
-      friction = 0;
+      const double bristle =
+          SetFrictionRow(step, d, friction_row, joint, bounds.Bound(), state[joint.state], inertia);
+      if (step.damper) drag += bristle;
+      force = bounds.Shift();  // as the row is symmetric
+      bounds = {0, 0};
     }
     const int damping_row = step.keeps_rows ? FindDampingRow(d, joint) : -1;
     if (damping_row >= 0) {
       SetRow(step, d, damping_row, std::max(h * drag, kIdleRow * inertia), 0, 0);
       drag = 0;
     } else {
-      force /= 1 + h * h * stiffness / inertia;
+      spring /= 1 + h * h * stiffness / inertia;
     }
 
-    // what has no row becomes a force that at most stops the joint within the step
-    if (friction > 0 || drag > 0) {
-      const double stop = inertia * std::abs(v) / h;
-      const double resistance = friction + drag * std::abs(v) / (1 + h * drag / inertia);
-      force -= std::copysign(std::min(resistance, stop), v);
-    }
-    d->qfrc_passive[joint.dof] += force;
+    force += ResistingForce(bounds, drag, v, h, inertia);
+    if (HasBacklash(effects)) force += PushThroughPlay(d, state + joint.state, h, &joint);
+    d->qfrc_passive[joint.dof] += spring + force;
   }
 }
 
 void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
+  constexpr int kNoPassive = mjDSBL_SPRING | mjDSBL_DAMPER;  // both: Compute was not called
+  const bool computed = (m->opt.disableflags & kNoPassive) != kNoPassive;
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
-  for (size_t k = 0; k < joints_.size(); ++k) {
-    const Joint& joint = joints_[k];
+  for (const Joint& joint : joints_) {
     if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
     const int row = FindFrictionRow(d, joint);
-    state[k] = row < 0 ? 0 : d->efc_force[row];
+    state[joint.state] = row < 0 ? 0 : d->efc_force[row];
+    if (computed && HasBacklash(joint.profile.effects.get())) {
+      state[joint.state + 1] = joint.handle.gap;
+      state[joint.state + 2] = joint.handle.velocity;
+    }
   }
 }
 
@@ -223,7 +232,7 @@ void JointDynamics::Register() {
   plugin.capabilityflags = mjPLUGIN_PASSIVE;
   plugin.nattribute = static_cast<int>(attributes.size());
   plugin.attributes = attributes.data();
-  plugin.nstate = +[](const mjModel* m, int instance) { return CountJoints(m, instance); };
+  plugin.nstate = +[](const mjModel* m, int instance) { return CountStates(m, instance); };
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
     try {
       d->plugin_data[instance] = reinterpret_cast<uintptr_t>(new JointDynamics(m, instance));
@@ -246,7 +255,7 @@ void JointDynamics::Register() {
     std::fill_n(state, m->plugin_statenum[instance], 0);
   };
   plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
-    reinterpret_cast<const JointDynamics*>(d->plugin_data[instance])->Compute(m, d, instance);
+    reinterpret_cast<JointDynamics*>(d->plugin_data[instance])->Compute(m, d, instance);
   };
   plugin.advance = +[](const mjModel* m, mjData* d, int instance) {
     reinterpret_cast<const JointDynamics*>(d->plugin_data[instance])->Advance(m, d, instance);
@@ -257,7 +266,7 @@ void JointDynamics::Register() {
 }  // namespace joda
 
 extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
-                                const char* const texts[6], char* error, int error_size) {
+                                const char* const texts[7], char* error, int error_size) {
   try {
     if (joint < 0 || joint >= m->njnt) {
       throw std::invalid_argument("the model has " + std::to_string(m->njnt) +

@@ -2,7 +2,8 @@
 //
 // Per joint three channels over its position: conservative force F(s), dry friction f_max(s) and
 // damping C(s). F is a passive force; friction and damping are rows of MuJoCo's convex solver, so
-// they are coupled with contacts and limits and stable at any timestep. See docs/physics.md.
+// they are coupled with contacts and limits and stable at any timestep. The effects beyond them act
+// through the same force and rows. See docs/physics.md.
 //
 // The plugin never writes to mjModel, and all its state is in plugin_state: any thread, any mjData.
 #ifndef JODA_JOINT_DYNAMICS_H_
@@ -13,6 +14,8 @@
 #include <vector>
 
 #include "config.h"
+#include "effects.h"
+#include "rows.h"
 
 namespace joda {
 
@@ -22,13 +25,15 @@ class JointDynamics {
   JointDynamics(const mjModel* m, int instance);
 
   // Adds the forces of all its joints to the step being computed.
-  void Compute(const mjModel* m, mjData* d, int instance) const;
+  void Compute(const mjModel* m, mjData* d, int instance);
 
   // Remembers the dry friction of the step just taken, one number per joint in plugin_state: the
-  // next step's friction continues from it, so that a held joint does not creep.
+  // next step's friction continues from it, so that a held joint does not creep. A joint with
+  // backlash has two numbers more, the handle's.
   void Advance(const mjModel* m, mjData* d, int instance) const;
 
-  // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint.
+  // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint
+  // or the profile needs other state.
   void SetProfile(const mjModel* m, int joint, Profile profile);
 
   static void Register();
@@ -41,12 +46,21 @@ class JointDynamics {
     int body;          // the body it moves
     int equality;      // equality constraint whose row carries the damping, -1: none
     int friction_row;  // expected place of its friction row among the friction rows
+    int state;         // its place in the instance's state
+    Handle handle;     // after the step being computed, until Advance
     Profile profile;
   };
 
   // Rows of this step's constraints, -1: none.
   static int FindFrictionRow(const mjData* d, const Joint& joint);
   static int FindDampingRow(const mjData* d, const Joint& joint);
+
+  // Sets the joint's friction row, whose last force is `state`; returns the bristle's damping.
+  static double SetFrictionRow(const Step& step, mjData* d, int row, const Joint& joint,
+                               double bound, double state, double inertia);
+
+  // Moves the joint's handle; returns what it exerts on the part beyond the applied force.
+  static double PushThroughPlay(const mjData* d, const mjtNum* state, double h, Joint* joint);
 
   std::vector<Joint> joints_;
 };
@@ -56,6 +70,6 @@ class JointDynamics {
 // Replaces the profile of `joint` in `d` only; the texts are as in the attributes. Returns 0, or -1
 // with one sentence in `error`.
 extern "C" MJAPI int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
-                                      const char* const texts[6], char* error, int error_size);
+                                      const char* const texts[7], char* error, int error_size);
 
 #endif  // JODA_JOINT_DYNAMICS_H_

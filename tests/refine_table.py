@@ -9,14 +9,16 @@ import sys
 import time
 from dataclasses import dataclass
 
+import jax
 import mujoco
 import numpy as np
 
 from joda import context, templates
 from joda._context import Context
+from joda.component import Component
 from joda.field import evaluate
 from joda.motion import Motion, release
-from joda.profile import CHANNELS, Channel, Channels, Component, Joint, Profile, Resistance
+from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
 from joda.rig import rig
 from joda.runs import Run
 
@@ -218,7 +220,7 @@ def pushed(model: mujoco.MjModel, span: float, force: float, rng, seconds: float
     return Motion(*np.array(out).T)
 
 
-def recovery(case: Planted, iterations: int = 30):
+def recovery(case: Planted, iterations: int = 60):
     """RMS and largest error of each channel over the visited range, in units of its peak.
 
     Where a curve jumps, `NEAR` on either side is left out: there any shift is as large as the jump.
@@ -248,6 +250,7 @@ def planted_table(seeds: int = 20, *names: str) -> None:
     print("RMS and largest error over the visited range, % of the channel's peak; seconds")
     rms = []
     for name in names or sorted(templates()):
+        jax.clear_caches()  # what is compiled for one template is of no use to the next
         for seed in range(int(seeds)):
             begun = time.time()
             errors = recovery(planted(name, seed))

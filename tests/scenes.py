@@ -9,15 +9,8 @@ import numpy as np
 from matplotlib.image import imsave
 
 from joda import attach
-from joda.profile import (
-    Channel,
-    Channels,
-    Component,
-    Joint,
-    JointLimitHint,
-    Profile,
-    Resistance,
-)
+from joda.component import Component
+from joda.profile import Channel, Channels, Joint, JointLimitHint, Profile, Resistance
 
 
 def component(label: str, *y: float) -> Component:

@@ -7,7 +7,8 @@ import pytest
 
 from joda import context
 from joda.behaviour import AT_END, GRIP, STARTS, behaviour, grip
-from joda.profile import Channel, Channels, Component, Profile, Resistance
+from joda.component import Component
+from joda.profile import Channel, Channels, Profile, Resistance
 
 SLIDE = """
 <mujoco><compiler angle="radian"/><worldbody><body>

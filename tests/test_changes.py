@@ -4,17 +4,9 @@ import numpy as np
 import pytest
 
 from joda.changes import changes, overlay
+from joda.component import Component
 from joda.field import evaluate
-from joda.profile import (
-    CHANNELS,
-    Channel,
-    Channels,
-    Component,
-    Joint,
-    JointLimitHint,
-    Profile,
-    Resistance,
-)
+from joda.profile import CHANNELS, Channel, Channels, Joint, JointLimitHint, Profile, Resistance
 
 
 def part(label="latch", interval=(0.0, 0.1), y=(-2.0, 0.0)):

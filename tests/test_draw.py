@@ -8,9 +8,10 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex, to_rgb
 from scipy.interpolate import PchipInterpolator
 
+from joda.component import Component
 from joda.draw import COLOURS, draw, write_png
 from joda.errors import JodaError
-from joda.profile import Channel, Channels, Component, Joint, Profile, Resistance
+from joda.profile import Channel, Channels, Joint, Profile, Resistance
 
 HINGE = Joint(name="door", type="hinge", range=(-0.5, 1.5), unit="rad")
 SLIDE = Joint(name="drawer", type="slide", range=(0, 1), unit="m")

@@ -7,7 +7,8 @@ from joints import SOLVERS, component, flat, load, run, scene, warnings
 from mujoco import batch, rollout
 
 import joda
-from joda.profile import Channel, Channels, Component, Joint, Profile, Resistance
+from joda.component import Component
+from joda.profile import Channel, Channels, Joint, Profile, Resistance
 from joda.scene import INERT
 
 FULL = mujoco.mjtState.mjSTATE_INTEGRATION

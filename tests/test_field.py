@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 
 from joda import _core
+from joda.component import MIN_WIDTH, Component
 from joda.field import evaluate
-from joda.profile import MIN_WIDTH, Channel, Component, Joint, Profile
+from joda.profile import Channel, Joint, Profile
 
 GOLDENS = make_field.read()
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from refine_table import STEP, cabinet, problem_of
+from refine_table import STEP, cabinet, planted, problem_of, recovery
 
 from joda.stretches import cut
 
@@ -21,6 +21,13 @@ def test_nine_iterations_bring_the_papers_door_down_to_the_noise(seed):
     assert after < 1.2 * problem.sigma
     other = problem_of(found, start, held_out)
     assert other.rms(first) ** 2 > 100 * other.rms(result.theta) ** 2
+
+
+@pytest.mark.parametrize("name", ["bistable_mechanism", "bistable_mechanism_internal"])
+def test_a_planted_profile_with_a_barrier_is_recovered(name):
+    seed = int(np.random.default_rng().integers(2**31))
+    for channel, (rms, _) in recovery(planted(name, seed)).items():
+        assert rms < 0.05, (name, seed, channel)
 
 
 def test_an_interruption_keeps_the_best_so_far():

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 
 from joda import _core
+from joda.component import Component
 from joda.field import evaluate, jaxfield
-from joda.profile import Channel, Component, Joint, Profile
+from joda.profile import Channel, Joint, Profile
 
 jax.config.update("jax_enable_x64", True)
 

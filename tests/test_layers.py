@@ -12,16 +12,19 @@ PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 LAYERS = [
     {"errors", "_build", "_core"},
     {"files", "plugin"},
-    {"runs", "least_squares", "smoothing", "stiffness"},
+    {"runs", "least_squares", "limits", "smoothing", "stiffness"},
+    {"component"},
+    {"effects"},
     {"profile"},
     {"field", "model", "mjcf", "template", "proposal"},
-    {"scene", "motion", "offscreen", "_schema", "part"},
+    {"scene", "motion", "offscreen", "resistance", "_schema", "part", "laws"},
     {"studio", "_context"},
-    {"_attach", "_compile", "draw"},  # stages, never each other
+    {"_attach", "_compile", "draw", "suspicions"},  # stages, never each other
     # what combines them
     {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx", "parameters"},
     {"behaviour", "_templates", "solo"},
     {"stretches"},
+    {"misfit"},
     {"fitting"},
     {"_refine"},
     {"wishes"},

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from joda import templates
+from joda.component import Component
 from joda.field import evaluate
 from joda.least_squares import bounded_step
 from joda.parameters import KINDS, Parameters
-from joda.profile import CHANNELS, Channel, Channels, Component, Joint, Profile, Resistance
+from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
 
 NAMES = sorted(templates())
 

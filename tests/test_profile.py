@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from joda import _core
+from joda.component import Component
 from joda.errors import JodaError
-from joda.profile import CHANNELS, Component, Joint, Profile
+from joda.profile import CHANNELS, Joint, Profile
 
 HINGE = Joint(name="door", type="hinge", range=(-0.5, 1.5), unit="rad")
 
@@ -107,11 +108,10 @@ MISTAKES = {
     "joint: unit must be rad for a hinge and m for a slide.": {"joint.unit": "m"},
     "joint.unit: must be 'rad' or 'm'.": {"joint.unit": "deg"},
     "joint: range must be two increasing numbers.": {"joint.range": [1, 1]},
-    "schema_version: this version of joda reads schema_version 1, the file has 2.": {
-        "schema_version": 2
+    "schema_version: this version of joda reads schema_version 1 and 2, the file has 3.": {
+        "schema_version": 3
     },
-    "effects: effects beyond the three channels are not supported by this version; "
-    "leave it empty.": {"effects": [{}]},
+    'effects[0]: the key "effect" is missing; it names the effect.': {"effects": [{}]},
 }
 
 

@@ -6,9 +6,10 @@ import pytest
 from joints import component, flat, load
 
 from joda import attach, context
+from joda.component import Component
 from joda.model import find_joint, load_model
 from joda.motion import SET_OUT, gravity_force, pull, release, settle
-from joda.profile import Channel, Channels, Component, Profile, Resistance
+from joda.profile import Channel, Channels, Profile, Resistance
 from joda.rig import rig
 
 SEEDS = range(24)

@@ -11,9 +11,10 @@ import pytest
 from mujoco import mjx
 
 from joda import context, templates
+from joda.component import Component
 from joda.field import evaluate
 from joda.parameters import KINDS, Parameters
-from joda.profile import CHANNELS, Channel, Channels, Component, Profile, Resistance
+from joda.profile import CHANNELS, Channel, Channels, Profile, Resistance
 from joda.rig import rig
 
 jax.config.update("jax_enable_x64", True)

@@ -10,9 +10,10 @@ import pytest
 from assets import NAMES, asset
 
 from joda import attach
+from joda.component import Component
 from joda.model import describe_joint, joint_type, load_model
 from joda.motion import release
-from joda.profile import Channel, Channels, Component, Profile, Resistance
+from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scene import read_profiles
 
 TIME = 0.1  # in which a scale's worth of force moves the joint through half its range, s

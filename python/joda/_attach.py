@@ -19,13 +19,23 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 import numpy as np
 
+from joda.effects import AddedInertia, EndStopRestitution
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes
+from joda.limits import limit_parameters
 from joda.mjcf import Element, MjcfError, Source
 from joda.model import find_joint, joint_name, joint_type, load, sentence, write_out
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
-from joda.scene import DAMPING_ROW, INERT, TRACE, find_instance, has_damping_row, prefix
+from joda.scene import (
+    DAMPING_ROW,
+    INERT,
+    TRACE,
+    find_instance,
+    has_damping_row,
+    prefix,
+    profiles_of,
+)
 
 DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
 """Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
@@ -84,7 +94,7 @@ def attach(
     for target, profile in zip(targets, loaded, strict=True):
         scene.add(target, profile, native, also)
     content = scene.finish(output.parent)
-    _verify(output, content, compiled, also)
+    _verify(output, content, compiled, scene.heavier or "armature" in also)
     write_bytes(output, content)
     return scene.notes
 
@@ -106,6 +116,7 @@ class _Scene:
     ) -> None:
         self.spec, self.model = spec, model
         self.notes: list[str] = []
+        self.heavier = False  # whether a joint gets more or less inertia
         self.source, self.joints = self._open(path, targets)
         self.instances: dict[int, _Instance] = {}  # by body
         self.rows: list[str] = []  # equalities to add
@@ -147,6 +158,7 @@ class _Scene:
         self._compare_range(joint, profile)
         changes = self._native(joint, native)
         changes |= self._limit(joint, profile)
+        changes |= self._inertia(joint, profile)
         if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
             changes |= self._discrete(joint)
         if not self.names[joint]:
@@ -260,6 +272,14 @@ class _Scene:
         """The joint-limit hint as the limit's damping ratio, its stiffness as it is."""
         hint = profile.joint_limit_hint
         limited = self.model.jnt_limited[joint]
+        for effect in profile.effects:
+            if isinstance(effect, EndStopRestitution):
+                if not limited:
+                    self._note(joint, "has no limits, so end_stop_restitution does nothing")
+                    return {}
+                step = float(self.model.opt.timestep)
+                values, impedance = limit_parameters(effect.restitution, step)
+                return {"solreflimit": values, "solimplimit": impedance}
         if not limited or hint.selected_side == "none" or hint.elasticity == "none":
             return {}
         ratio = DAMP_RATIO[hint.elasticity]
@@ -275,6 +295,17 @@ class _Scene:
             "one value for both ends)",
         )
         return {"solreflimit": values}
+
+    def _inertia(self, joint: int, profile: Profile) -> dict[str, str]:
+        """The armature with the profile's added inertia, without that of the one it replaces."""
+        name = joint_name(self.model, joint)
+        replaced = profiles_of(self.spec, self.model).get(name)
+        before, after = (_added_inertia(one) for one in (replaced, profile))
+        if before == after:
+            return {}
+        own = float(self.model.dof_armature[self.model.jnt_dofadr[joint]])
+        self.heavier = True
+        return {"armature": f"{max(own - before, 0.0) + after:.9g}"}
 
     def _note(self, joint: int, text: str) -> None:
         name = self.names[joint] or joint_name(self.model, joint)
@@ -294,8 +325,16 @@ class _Scene:
         return next(n for n in (base, *(f"{base}{k}" for k in range(10**6))) if n not in self.names)
 
 
-def _verify(output: Path, content: bytes, before: mujoco.MjModel, also: Mapping[str, str]) -> None:
-    """Compiles the scene where it will lie; raises JodaError if it is not the model it was."""
+def _added_inertia(profile: Profile | None) -> float:
+    effects = profile.effects if profile else ()
+    return sum(effect.inertia for effect in effects if isinstance(effect, AddedInertia))
+
+
+def _verify(output: Path, content: bytes, before: mujoco.MjModel, heavier: bool) -> None:
+    """Compiles the scene where it will lie; raises JodaError if it is not the model it was.
+
+    `heavier`: joints were given armature.
+    """
     trial = output.with_name(f".{output.stem}.{os.getpid()}.xml")
     try:
         trial.write_bytes(content)
@@ -308,7 +347,7 @@ def _verify(output: Path, content: bytes, before: mujoco.MjModel, also: Mapping[
     finally:
         trial.unlink(missing_ok=True)
     for name in SAME:
-        if name == "dof_invweight0" and "armature" in also:
+        if name == "dof_invweight0" and heavier:
             continue
         old, new = np.array(getattr(before, name)), np.array(getattr(after, name))
         if old.shape != new.shape or not np.allclose(old, new, rtol=1e-3, atol=1e-6):

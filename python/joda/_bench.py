@@ -13,11 +13,33 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from joda.component import Component
+from joda.effects import (
+    AsymmetricFriction,
+    Backlash,
+    DirectionDependentDamping,
+    GravityOffset,
+    LoadDependentFriction,
+    PreslidingFriction,
+    QuadraticDamping,
+    StribeckFriction,
+)
 from joda.field import evaluate
 from joda.plugin import PLUGIN
-from joda.profile import CHANNELS, Channel, Channels, Component, Joint, Profile, Resistance
+from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
 from joda.scene import DAMPING_ROW, INERT, TRACE, open_scene
 
+ALL_EFFECTS = (
+    AsymmetricFriction(direction="positive", y=(0.05, 0.05)),
+    DirectionDependentDamping(direction="negative", y=(0.2, 0.2)),
+    StribeckFriction(velocity=0.1, y=(0.05, 0.05)),
+    QuadraticDamping(y=(0.05, 0.05)),
+    PreslidingFriction(stiffness=200, damping=0.05, breakaway=0.7),
+    LoadDependentFriction(coefficient=0.05),
+    GravityOffset(sin=0.1, cos=0.1),
+    Backlash(play=0.01, inertia=0.001),
+)
+"""All that act in the step; the others are attributes of the scene."""
 ROUNDS = 31
 SWING = 100  # steps; all joints move meanwhile
 FULL = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -61,11 +83,13 @@ def bench(
         return _bench_scene(Path(scene), progress)
     rows = []
     progress("one hinge")
-    plain, native, ours = (hinges(1, kind) for kind in ("plain", "native", "joda"))
-    times = _measure([(plain, None), (native, None), (ours, None), (plain, _callback(ours))])
+    plain, native, ours, full = (hinges(1, kind) for kind in ("plain", "native", "joda", "effects"))
+    models = (plain, native, ours, full)
+    times = _measure([*((model, None) for model in models), (plain, _callback(ours))])
     rows.append(_row("hinge, three channels / native elements", times[2], times[1], "<= 1.10"))
     what = "addition of a Python callback / of the plugin"
-    rows.append(_row(what, times[3] - times[0], times[2] - times[0], ">= 10"))
+    rows.append(_row(what, times[4] - times[0], times[2] - times[0], ">= 10"))
+    rows.append(_row("hinge, all effects / three channels", times[3], times[2], "<= 1.25"))
     progress("10 and 200 hinges")
     few, many = hinges(10, "joda"), hinges(200, "joda")
     few_native, many_native = hinges(10, "native"), hinges(200, "native")
@@ -79,18 +103,22 @@ def bench(
 
 
 def hinges(count: int, kind: str) -> mujoco.MjModel:
-    """Doors side by side: "plain", with "native" spring, damping and friction, or with profiles."""
+    """Doors side by side: "plain", with "native" spring, damping and friction, with profiles
+    ("joda"), or with profiles and all effects that there are ("effects")."""
     attributes = {
         "plain": "",
         "native": 'stiffness="0.5" damping="0.2" frictionloss="0.1"',
         "joda": f'frictionloss="{TRACE}"',
+        "effects": f'frictionloss="{TRACE}"',
     }[kind]
+    ours = kind in ("joda", "effects")
+    profile = _three_channels()
+    if kind == "effects":
+        profile = profile.model_copy(update={"effects": ALL_EFFECTS})
     bodies, instances, rows = [], [], []
-    config = "".join(
-        f'<config key="{k}" value="{v}"/>' for k, v in _three_channels().attributes().items()
-    )
+    config = "".join(f'<config key="{k}" value="{v}"/>' for k, v in profile.attributes().items())
     for k in range(count):
-        reference = f'<plugin instance="p{k}"/>' if kind == "joda" else ""
+        reference = f'<plugin instance="p{k}"/>' if ours else ""
         bodies.append(
             f'<body pos="{k} 0 0">'
             f'<joint name="j{k}" axis="0 0 1" range="0 1.5" limited="true" {attributes}/>'
@@ -99,7 +127,7 @@ def hinges(count: int, kind: str) -> mujoco.MjModel:
         instances.append(f'<instance name="p{k}">{config}</instance>')
         rows.append(f'<joint name="{DAMPING_ROW}j{k}" joint1="j{k}" {INERT}/>')
     extension = f'<extension><plugin plugin="{PLUGIN}">{"".join(instances)}</plugin></extension>'
-    extra = (extension, f"<equality>{''.join(rows)}</equality>") if kind == "joda" else ("", "")
+    extra = (extension, f"<equality>{''.join(rows)}</equality>") if ours else ("", "")
     quiet = '<option><flag contact="disable"/></option>'  # a row of doors is no collision benchmark
     return mujoco.MjModel.from_xml_string(
         f'<mujoco><compiler angle="radian"/>{quiet if count > 1 else ""}{extra[0]}'

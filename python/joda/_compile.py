@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Literal
 
 from joda._context import Context, context
+from joda.component import Component
 from joda.errors import JodaError
 from joda.files import check_target, write_text
-from joda.profile import CHANNELS, Channels, Component, Profile, rounded
+from joda.profile import CHANNELS, Channels, Profile, rounded
 from joda.proposal import EffectProposal, Label, Proposal
 from joda.template import Template, read_templates
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ITERATIONS = 30
+ITERATIONS = 60
 SEEN = 0.5
 """A part of a curve is seen where the data shrink its uncertainty at least by this factor."""
 PARTED = 5.0
@@ -143,7 +143,7 @@ def refine(
             "one with joda attach."
         )
     before, found = profiles[name], context(source, name)
-    first = solo.from_context(found, before, compiled, number)
+    first = solo.from_context(found, before, compiled, number, attached=True)
     unit = gravity_scale(found, before)
     parameters = Parameters(before, fit, keep_shape=keep_shape, gravity=unit)
     if not len(parameters.start):

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda._context import Context
+from joda.component import Frozen
 from joda.motion import FIRMEST, Motion, pull, settle
-from joda.profile import Frozen, Profile
+from joda.profile import Profile
 from joda.rig import TIMESTEP, rig
 
 Array = NDArray[np.float64]

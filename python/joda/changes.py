@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.component import Component
 from joda.draw import COLOURS, GRAVITY, house_style
 from joda.field import evaluate
-from joda.profile import CHANNELS, Component, Profile
+from joda.profile import CHANNELS, Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +26,7 @@ def changes(before: Profile, after: Profile) -> list[str]:
 
     Args:
         before, after: profiles of one joint; components of the same label and channel are taken
-            for the same, in their order, those that did not change first.
+            for the same, in their order, those that did not change first. Then the effects.
     """
     out = []
     for channel in CHANNELS:
@@ -35,6 +36,12 @@ def changes(before: Profile, after: Profile) -> list[str]:
             out.append(_line(*pair, NOUNS[channel], unit))
         if old.combine != new.combine:
             out.append(f"{NOUNS[channel]}: components combined by {new.combine}, not {old.combine}")
+    known, now = ({e.key: e for e in profile.effects} for profile in (before, after))
+    for key in {**known, **now}:
+        old, new = known.get(key), now.get(key)
+        if old != new:
+            was = f", before {old.described()}" if old and new else ""
+            out.append(f"{new.described()}{was}" if new else f"without {key.replace('_', ' ')}")
     if before.joint_limit_hint != after.joint_limit_hint:
         hint = after.joint_limit_hint
         given = "none" not in (hint.selected_side, hint.elasticity)

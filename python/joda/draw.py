@@ -8,7 +8,7 @@ runs inside the shaded band, dry friction holds the joint.
 import io
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.effects import DirectionDependentDamping, QuadraticDamping, StribeckFriction
 from joda.field.reference import evaluate
 from joda.files import check_target, write_bytes
 from joda.profile import CHANNELS, Channel, Profile
+from joda.resistance import damping, friction_bounds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +28,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-COLOURS = {"conservative": "#c8202f", "friction": "#d98c1f", "damping": "#1f8a70"}
+COLOURS = {
+    "conservative": "#c8202f",
+    "friction": "#d98c1f",
+    "damping": "#1f8a70",
+    "effects": "#6b4fa0",
+}
 GRAVITY = "#1f5fbf"
 INK = "#333333"
 
@@ -56,7 +63,8 @@ def draw(profile: Profile, gravity: tuple[Array, Array] | None = None) -> "Figur
     from matplotlib.figure import Figure
 
     with house_style():
-        bars = max(1, sum(len(getattr(profile.channels, name).components) for name in CHANNELS))
+        counts = [len(getattr(profile.channels, name).components) for name in CHANNELS]
+        bars = max(1, sum(counts) + len(profile.effects))
         strip = min(bars * BAR, MAX_STRIP)
         frame = TOP + BOTTOM + 2 * GAP
         panels = max(HEIGHT - frame - strip, MIN_PANELS)
@@ -107,22 +115,19 @@ def _force_panel(
     noun, unit = ("torque", "N·m") if hinge else ("force", "N")
     s = _samples(channels.conservative, channels.friction)
     q = lo + s * (hi - lo)
-    value, friction = evaluate(channels.conservative, s)[0], evaluate(channels.friction, s)[0]
+    value = evaluate(channels.conservative, s)[0]
 
     axes.axhline(0, color="#999999", linewidth=0.7, zorder=1)
     drawn = [value]
-    if channels.friction.components:
-        axes.fill_between(
-            q,
-            value - friction,
-            value + friction,
-            color=COLOURS["friction"],
-            alpha=0.3,
-            linewidth=0,
-            label="± dry friction",
-            zorder=2,
-        )
-        drawn += [value - friction, value + friction]
+    bands = {"± dry friction": friction_bounds(profile, s, np.inf)}
+    if any(isinstance(effect, StribeckFriction) for effect in profile.effects):
+        bands["± at rest, before it breaks away"] = friction_bounds(profile, s)
+    for label, (positive, negative) in bands.items():
+        if positive.any() or negative.any():
+            band = value - positive, value + negative
+            style: dict[str, Any] = {"color": COLOURS["friction"], "alpha": 0.25, "linewidth": 0}
+            axes.fill_between(q, *band, label=label, zorder=2, **style)
+            drawn += band
     if gravity is not None:
         axes.plot(
             gravity[0],
@@ -142,7 +147,7 @@ def _force_panel(
         label=f"conservative {noun}",
         zorder=4,
     )
-    if not (channels.conservative.components or channels.friction.components):
+    if not (channels.conservative.components or len(drawn) > 1 + (gravity is not None)):
         _note(axes, f"no conservative {noun}, no dry friction", 0.62)
     _value_axis(axes, drawn, noun, unit)
 
@@ -179,52 +184,62 @@ def _damping_panel(axes: "Axes", profile: Profile) -> None:
     lo, hi = profile.joint.range
     s = _samples(profile.channels.damping)
     value = evaluate(profile.channels.damping, s)[0]
-    axes.plot(lo + s * (hi - lo), value, color=COLOURS["damping"], linewidth=1.8, label="damping")
-    if not profile.channels.damping.components:
+    q, speed = lo + s * (hi - lo), f"{profile.joint.unit}/s"
+    axes.plot(q, value, color=COLOURS["damping"], linewidth=1.8, label="damping")
+    drawn = [value]
+    if any(isinstance(e, DirectionDependentDamping | QuadraticDamping) for e in profile.effects):
+        for v, line in ((1.0, "--"), (-1.0, ":")):
+            there = damping(profile, s, v)
+            label = f"at {_number(v)} {speed}"
+            axes.plot(q, there, line, color=COLOURS["damping"], linewidth=1.5, label=label)
+            drawn.append(there)
+        axes.legend(frameon=False, fontsize=7, ncols=3, loc="upper right")
+    if not any(values.any() for values in drawn):
         _note(axes, "no damping")
     unit = "N·m·s/rad" if profile.joint.type == "hinge" else "N·s/m"
-    _value_axis(axes, [value], "damping", unit)
+    _value_axis(axes, drawn, "damping", unit)
     axes.set_xlabel(f"joint position q ({profile.joint.unit})", fontsize=9, color=INK)
 
 
 def _component_strip(figure: "Figure", axes: "Axes", profile: Profile) -> None:
     """One bar per component, grouped by channel, with its label in or beside it."""
-    lo, hi = profile.joint.range
     row = 0
     for name in CHANNELS:
         channel: Channel = getattr(profile.channels, name)
-        first = row
-        for component in channel.components:
-            a, b = (lo + end * (hi - lo) for end in component.interval)
-            axes.barh(
-                row,
-                b - a,
-                left=a,
-                height=0.82,
-                facecolor=(COLOURS[name], 0.25),
-                edgecolor=COLOURS[name],
-                linewidth=0.7,
-            )
-            _bar_label(figure, axes, component.label, a, b, row)
-            row += 1
-        if row > first:
-            rule = "\n(max)" if channel.combine == "max" and row - first > 1 else ""
-            axes.text(
-                -0.008,
-                (first + row - 1) / 2,
-                name + rule,
-                transform=axes.get_yaxis_transform(),
-                ha="right",
-                va="center",
-                fontsize=7,
-                color=COLOURS[name],
-            )
+        bars = [(component.label, component.interval) for component in channel.components]
+        rule = "\n(max)" if channel.combine == "max" and len(bars) > 1 else ""
+        row = _bars(figure, axes, profile, name + rule, COLOURS[name], bars, row)
+    effects = [(e.described(), getattr(e, "interval", (0, 1))) for e in profile.effects]
+    row = _bars(figure, axes, profile, "effects", COLOURS["effects"], effects, row)
     if not row:
         _note(axes, "no components")
     axes.set_ylim(max(row, 1) - 0.5, -0.5)
     axes.set_yticks([])
     axes.tick_params(axis="x", bottom=False, labelbottom=False)
     axes.spines[:].set_color("#cccccc")
+
+
+def _bars(
+    figure: "Figure",
+    axes: "Axes",
+    profile: Profile,
+    title: str,
+    colour: str,
+    bars: Sequence[tuple[str, tuple[float, float]]],
+    first: int,
+) -> int:
+    """A group of bars (label, interval) from a row on, and the row after it."""
+    lo, hi = profile.joint.range
+    for row, (label, interval) in enumerate(bars, first):
+        a, b = (lo + end * (hi - lo) for end in interval)
+        style: dict[str, Any] = {"facecolor": (colour, 0.25), "edgecolor": colour, "linewidth": 0.7}
+        axes.barh(row, b - a, left=a, height=0.82, **style)
+        _bar_label(figure, axes, label, a, b, row)
+    if bars:
+        style = {"ha": "right", "va": "center", "fontsize": 7, "color": colour}
+        middle = first + (len(bars) - 1) / 2
+        axes.text(-0.008, middle, title, transform=axes.get_yaxis_transform(), **style)
+    return first + len(bars)
 
 
 def _bar_label(figure: "Figure", axes: "Axes", label: str, a: float, b: float, row: int) -> None:

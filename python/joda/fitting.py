@@ -8,23 +8,19 @@ error. What the motion does not show is held by a prior at its first value.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from joda import smoothing, solo
+from joda import smoothing
 from joda.least_squares import Inequalities, adam, levenberg_marquardt
-from joda.parameters import Parameters, Slot
+from joda.misfit import slopes, start_slopes
+from joda.parameters import Parameters
 from joda.runs import Run
-from joda.solo import Solo, State, changed
-from joda.stretches import Batch, Stretches, cut, known
-
-jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
+from joda.solo import Solo
+from joda.stretches import Stretches, cut, known
 
 Array = NDArray[np.float64]
 Method = Literal["lm", "adam"]
@@ -35,8 +31,11 @@ MOST = 150
 """Most windows; long measurements get longer ones."""
 HELD = 0.01
 """How much less than later the ends of intervals may move at first."""
-FIRST, MORE = 6, 4
-"""Iterations at most with short windows: ends of intervals held, and not."""
+FIRST = 6
+"""Iterations at most with short windows, the ends of intervals held."""
+TURNS, SETTLED = 3, 0.98
+"""How often at most short and long windows take turns, and the share of their misfit that must be
+left for the last turn."""
 FOLLOWS = 0.01
 """Whole runs that are missed by less than this, in ranges, need no windows any more."""
 UNDONE = 1.05
@@ -56,76 +55,6 @@ ANNEAL = 0.3
 """What is believed of a misfit before it is fitted: this share of it may be the model's."""
 GAIN = 0.0003
 """Share of the misfit that a round must take away for the stage to go on."""
-REACH = 0.004
-"""How far ends of intervals are moved (normalised position) to see what that does: where a curve
-jumps at an end, the derivative along the path does not know of it."""
-
-
-def _predicted(
-    values: jax.Array,
-    start: jax.Array,
-    part: Batch,
-    first: Solo,
-    slots: tuple[Slot, ...],
-    h: float,
-) -> jax.Array:
-    """Predicted minus measured positions of one stretch."""
-    joint = changed(first, slots, values)
-    state = State(start[0], start[1], jnp.zeros_like(start[0]))
-    path = solo.rollout(joint, state, part.force, h)
-    before, after = path[part.index], path[part.index + 1]
-    misfit = before + part.weight * (after - before) - part.position
-    return jnp.where(part.mask > 0, misfit, 0.0)
-
-
-@partial(jax.jit, static_argnames=("slots", "h"))
-def _slopes(
-    values: jax.Array,
-    starts: jax.Array,
-    batch: Batch,
-    first: Solo,
-    slots: tuple[Slot, ...],
-    h: float,
-) -> tuple[jax.Array, jax.Array]:
-    """`_predicted` of all stretches, and its derivatives by the values and the start."""
-    n = len(slots)
-    ends = np.array([k for k, slot in enumerate(slots) if slot.kind == "intervals"], int)
-    along = REACH * np.eye(n + 2)[ends]
-    moves = jnp.array(np.vstack([np.zeros(n + 2), along, -along]))
-
-    def one(start: jax.Array, part: Batch) -> tuple[jax.Array, jax.Array]:
-        def predicted(x: jax.Array) -> jax.Array:
-            return _predicted(x[:n], x[n:], part, first, slots, h)
-
-        x = jnp.concatenate([values, start])
-        moved = jax.vmap(predicted)(x + moves)
-        J = jax.jacfwd(predicted)(x)
-        by_ends = (moved[1 : 1 + len(ends)] - moved[1 + len(ends) :]).T / (2 * REACH)
-        return moved[0], J.at[:, ends].set(by_ends)
-
-    return jax.vmap(one)(starts, batch)
-
-
-@partial(jax.jit, static_argnames=("slots", "h"))
-def _start_slopes(
-    values: jax.Array,
-    starts: jax.Array,
-    batch: Batch,
-    first: Solo,
-    slots: tuple[Slot, ...],
-    h: float,
-) -> tuple[jax.Array, jax.Array]:
-    """Misfits of all stretches, and their derivatives by the start."""
-
-    def one(start: jax.Array, part: Batch) -> tuple[jax.Array, jax.Array]:
-        def misfit(x: jax.Array) -> tuple[jax.Array, jax.Array]:
-            out = _predicted(values, x, part, first, slots, h)
-            return out, out
-
-        J, out = jax.jacfwd(misfit, has_aux=True)(start)
-        return out, J
-
-    return jax.vmap(one)(starts, batch)
 
 
 @dataclass(frozen=True)
@@ -241,7 +170,7 @@ class Problem:
         """Predicted minus measured positions, and their derivatives by the starts."""
         values = theta * self.parameters.scales
         fixed = self.first, self.parameters.slots, self.h
-        misfit, J = _start_slopes(values, data.filled(starts), data.batch, *fixed)
+        misfit, J = start_slopes(values, data.filled(starts), data.batch, *fixed)
         n = len(starts)
         return np.nan_to_num(np.asarray(misfit)[:n], nan=1e6), np.nan_to_num(np.asarray(J)[:n])
 
@@ -282,8 +211,7 @@ class Problem:
         try:
             run("short windows, intervals held", self.short, min(FIRST, iterations // 3), held)
             if self.rms(self._best) > FOLLOWS * self.span:
-                run("short windows", self.short, MORE)
-                run("long windows", self.long, iterations // 3)
+                self._alternate(run, iterations)
             before, shown = self._best, self._windows(self._best)
             run("whole runs", self.whole, iterations)
             if np.any(self._windows(self._best) > UNDONE * shown):
@@ -291,6 +219,22 @@ class Problem:
         except KeyboardInterrupt:
             interrupted = True
         return Fit(self._best, self._covariance(), tuple(history), interrupted)
+
+    def _alternate(self, run: Callable[[str, Stretches, int], None], iterations: int) -> None:
+        """Short and long windows in turn, their starts measured anew: each leaves the places where
+        the other gets stuck, at jumps and where the joint sticks. Keeps the best."""
+        best, least = self._best, np.inf
+        for _ in range(TURNS):
+            self._moved = {}
+            run("short windows", self.short, max(iterations // 12, 1))
+            run("long windows", self.long, max(iterations // 6, 1))
+            misfit = float(np.prod(self._windows(self._best)))
+            if misfit < least:
+                best = self._best
+            if misfit > SETTLED * least:
+                break
+            least = misfit
+        self._best = best
 
     def _stage(self, stage: Stage, method: Method, told: Callable[[float], None]) -> None:
         """Rounds of a stage, until one gains too little."""
@@ -351,7 +295,7 @@ class Problem:
         n, real = len(doubt), data.real
         misfit, by_theta, by_start = self._slopes(x, data)
         rows = zip(by_start / sigmas[:, None, None], real, strict=True)
-        own = block_diag(*(slopes[there] for slopes, there in rows))
+        own = block_diag(*(part[there] for part, there in rows))
         weighted = (misfit / sigmas[:, None])[real], (by_theta / sigmas[:, None, None])[real]
         prior = (x[:n] - self.parameters.start) / doubt
         J = np.vstack(
@@ -367,7 +311,7 @@ class Problem:
         doubt = self._doubt(data)
         starts = data.start + doubt * x[n:].reshape(-1, 2)
         fixed = self.first, parameters.slots, self.h
-        out, J = _slopes(x[:n] * parameters.scales, data.filled(starts), data.batch, *fixed)
+        out, J = slopes(x[:n] * parameters.scales, data.filled(starts), data.batch, *fixed)
         misfit = np.nan_to_num(np.asarray(out)[:count], nan=1e6)
         J = np.nan_to_num(np.asarray(J)[:count])
         return misfit, J[:, :, :n] * parameters.scales, J[:, :, n:] * doubt[:, None, :]

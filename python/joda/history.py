@@ -3,7 +3,8 @@
 from typing import Literal
 
 from joda.behaviour import Behaviour
-from joda.profile import File, Frozen
+from joda.component import Frozen
+from joda.profile import File
 from joda.proposal import Proposal
 from joda.propose import Usage, total
 

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda._context import Context
+from joda.component import Component
 from joda.least_squares import Inequalities
-from joda.profile import CHANNELS, Component, Profile, rounded
+from joda.profile import CHANNELS, Profile, rounded
 
 Array = NDArray[np.float64]
 Kind = Literal["values", "intervals", "strengths", "damping_ratio", "inertia", "gravity"]

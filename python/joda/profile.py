@@ -12,30 +12,24 @@ The same numbers travel as text in the plugin's MJCF attributes (`Profile.attrib
 
 import json
 import re
-from collections.abc import Iterable, Mapping
-from itertools import pairwise
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import ValidationError, model_validator
 
+from joda.component import Component, Frozen, numbers
+from joda.effects import AnyEffect, Effect, GravityOffset
 from joda.errors import JodaError
 from joda.files import read_text
 
-MIN_WIDTH = 1e-9
-"""Narrowest interval, and narrowest gap between control points, in normalised position."""
-MAX_VALUE = 1e15
-"""Largest magnitude of a control point's value; no coefficient of a cubic can overflow."""
-
 CHANNELS = ("conservative", "friction", "damping")
-ATTRIBUTES = ("range", *(f"{name}{part}" for name in CHANNELS for part in ("", "_combine")))
+ATTRIBUTES = (
+    "range",
+    *(f"{name}{part}" for name in CHANNELS for part in ("", "_combine")),
+    "effects",
+)
 """The plugin's attributes for one joint."""
-
-
-class Frozen(BaseModel):
-    """A part of a file: immutable, finite, without unknown keys."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class File(Frozen):
@@ -62,49 +56,6 @@ class File(Frozen):
             )
 
         return strings_or_lists.sub(fold, text) + "\n"
-
-
-class Component(Frozen):
-    """A local PCHIP curve.
-
-    Attributes:
-        label: what it stands for; shown in pictures and kept in the MJCF. No ';' or '|'.
-        interval: [a, b] in normalised joint position, 0 <= a < b <= 1.
-        x: control points in the local coordinate u = (s - a) / (b - a), from 0 to 1.
-        y: values there, N or N·m; N·s/m or N·m·s/rad for damping.
-    """
-
-    label: Annotated[str, Field(pattern=r"^[^;|\x00-\x1f]*$")] = ""
-    interval: tuple[float, float]
-    x: tuple[float, ...]
-    y: tuple[float, ...]
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        a, b = self.interval
-        if not 0 <= a < b <= 1:
-            raise ValueError("interval must satisfy 0 <= a < b <= 1, in normalised joint position")
-        if b - a < MIN_WIDTH:
-            raise ValueError("interval is narrower than 1e-9 of the range")
-        if len(self.x) < 2:
-            raise ValueError("at least two control points are needed")
-        if len(self.x) != len(self.y):
-            raise ValueError(
-                f"x has {len(self.x)} numbers and y has {len(self.y)}; they must be equally many"
-            )
-        if self.x[0] != 0 or self.x[-1] != 1:
-            raise ValueError("x must begin at 0 and end at 1")
-        gaps = ((right - left) * (b - a) for left, right in pairwise(self.x))
-        if any(not gap >= MIN_WIDTH for gap in gaps):
-            raise ValueError("x must increase, by at least 1e-9 of the joint's range")
-        if max(map(abs, self.y)) > MAX_VALUE:
-            raise ValueError("y must lie between -1e15 and 1e15")
-        return self
-
-    def text(self) -> str:
-        """The component as in the plugin's attributes."""
-        numbers = [_numbers(part) for part in (self.interval, self.x, self.y)]
-        return (f"{self.label.strip()}: " if self.label.strip() else "") + " | ".join(numbers)
 
 
 class Channel(Frozen):
@@ -176,21 +127,57 @@ class JointLimitHint(Frozen):
 class Profile(File):
     """A joint's profile: the content of `composed.json`."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Literal[1, 2] = 1
     joint: Joint
     channels: Channels = Channels()
-    effects: tuple[Any, ...] = Field(default=(), max_length=0)
+    effects: tuple[AnyEffect, ...] = ()
     joint_limit_hint: JointLimitHint = JointLimitHint()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _version(cls, content: Any) -> Any:
+        """Effects need version 2: who reads only version 1 would leave them out."""
+        if isinstance(content, dict) and content.get("effects"):
+            return {**content, "schema_version": max(content.get("schema_version") or 2, 2)}
+        return content
+
+    @model_validator(mode="after")
+    def _check_effects(self) -> Self:
+        keys = [effect.key for effect in self.effects]
+        for number, (effect, key) in enumerate(zip(self.effects, keys, strict=True)):
+            if key in keys[:number]:
+                raise ValueError(f"effects[{number}]: the joint has {key} already")
+            if isinstance(effect, GravityOffset) and not effect.fits(self.joint.type):
+                needed = "sin and cos" if self.joint.type == "hinge" else "force"
+                raise ValueError(f"effects[{number}]: a {self.joint.type} needs {needed}")
+        if "quadratic_damping both" in keys and sum("quadratic_damping" in k for k in keys) > 1:
+            raise ValueError("quadratic_damping in both directions excludes that in one")
+        return self
+
+    def with_effect(self, effect: AnyEffect) -> Self:
+        """The profile with the effect, in the place of one of the same name and direction."""
+        kept = [other.model_dump() for other in self.effects if other.key != effect.key]
+        content = self.model_dump(exclude={"schema_version"})
+        return type(self).model_validate({**content, "effects": [*kept, effect.model_dump()]})
+
+    def with_component(self, channel: str, component: Component) -> Self:
+        """The profile with one more component in a channel."""
+        content = self.model_dump()
+        parts = content["channels"][channel]["components"]
+        content["channels"][channel]["components"] = [*parts, component.model_dump()]
+        return type(self).model_validate(content)
 
     def attributes(self) -> dict[str, str]:
         """The plugin's attributes for the joint, key to text; empty channels are left out."""
-        out = {"range": _numbers(self.joint.range)}
+        out = {"range": numbers(self.joint.range)}
         for name in CHANNELS:
             channel: Channel = getattr(self.channels, name)
             if channel.components:
                 out[name] = channel.text()
             if channel.combine != "sum":
                 out[f"{name}_combine"] = channel.combine
+        if self.effects:
+            out["effects"] = "; ".join(effect.text() for effect in self.effects)
         return out
 
     @classmethod
@@ -203,8 +190,10 @@ class Profile(File):
             }
             for name in CHANNELS
         }
+        effects = [Effect.fields_of(piece) for piece in _pieces(attributes.get("effects", ""))]
+        content = {"joint": joint.model_dump(), "channels": channels, "effects": effects}
         try:
-            return cls.model_validate({"joint": joint.model_dump(), "channels": channels})
+            return cls.model_validate(content)
         except ValidationError as error:
             raise JodaError(f"joint '{joint.name}': {describe(error)}") from None
 
@@ -223,10 +212,14 @@ def describe(error: ValidationError) -> str:
         what = "unknown key; remove it or mend its spelling"
     elif first["type"] == "missing":
         what = "missing; add it"
-    elif key == "effects":
-        what = "effects beyond the three channels are not supported by this version; leave it empty"
+    elif first["type"] == "union_tag_invalid":
+        what = (
+            f"there is no effect {first['ctx']['tag']!r}; known are {first['ctx']['expected_tags']}"
+        )
+    elif first["type"] == "union_tag_not_found":
+        what = 'the key "effect" is missing; it names the effect'
     elif key == "schema_version":
-        what = f"this version of joda reads schema_version 1, the file has {first['input']!r}"
+        what = f"this version of joda reads schema_version 1 and 2, the file has {first['input']!r}"
     elif first["type"] == "string_pattern_mismatch":
         what = "must not hold ';', '|' or line breaks"
     elif first["type"] == "json_invalid":
@@ -239,15 +232,15 @@ def describe(error: ValidationError) -> str:
     return f"{key}: {what}." if key else f"{what}."
 
 
-def _numbers(values: Iterable[float]) -> str:
-    """Numbers that read back exactly, 1 rather than 1.0."""
-    return " ".join(repr(value).removesuffix(".0") for value in values)
+def _pieces(text: str) -> list[str]:
+    """What an attribute lists, separated by ';'."""
+    return [piece for piece in text.split(";") if piece.strip()]
 
 
 def _parse(where: str, text: str) -> list[dict[str, Any]]:
     """Components from an attribute's text; the inverse of Channel.text."""
     components = []
-    for piece in filter(str.strip, text.split(";")):
+    for piece in _pieces(text):
         if piece.count("|") != 2:
             form = '"label: a b | x ... | y ..."'
             raise JodaError(f'{where}: expected {form}, got "{piece.strip()}".')

@@ -7,7 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from joda.profile import File, Frozen, JointLimitHint
+from joda.component import Frozen
+from joda.profile import File, JointLimitHint
 
 Label = Literal["none", "weak", "medium", "strong", "dominant"]
 Ratio = Annotated[float, Field(ge=0, le=1)]

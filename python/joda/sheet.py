@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from joda.component import Component
 from joda.draw import COLOURS, INK, Array, house_style, text_width
 from joda.field.reference import evaluate
-from joda.profile import CHANNELS, Channel, Component
+from joda.profile import CHANNELS, Channel
 from joda.template import Curve, Template
 
 if TYPE_CHECKING:

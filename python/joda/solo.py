@@ -6,30 +6,35 @@ increasing and piecewise linear, so its solution can be written down; MuJoCo and
 by iteration. That makes whole measured runs differentiable in milliseconds.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 import mujoco
 
+from joda import laws
 from joda._context import Context
-from joda.field import jaxfield
+from joda.field import jaxeffects, jaxfield
+from joda.field.jaxeffects import Effects, from_effects
 from joda.parameters import Slot
 from joda.profile import CHANNELS, Profile
 from joda.rig import gravity_factors
-from joda.stiffness import STIFF_ROW, implicit_stiffness, reach
+from joda.stiffness import implicit_stiffness, reach
 
 Array = jax.Array
 
 MIN_IMPEDANCE, MAX_IMPEDANCE = 1e-4, 0.9999
 """mjMINIMP, mjMAXIMP."""
+ONLY_SLIDES = 2
+"""In `mjModel.body_simple`."""
 
 
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=(
         *("conservative", "friction", "damping", "range", "inertia", "gravity", "solref", "solimp"),
+        *("effects", "seen"),
     ),
     meta_fields=("hinge",),
 )
@@ -40,11 +45,15 @@ class Solo:
     Attributes:
         conservative, friction, damping: the channels, N or N·m and per m/s or rad/s.
         range: ends of the range, rad or m, shape (2,).
-        inertia: kg·m² or kg.
+        inertia: kg·m² or kg, without the added inertia among the effects.
         gravity: hinge: factors of cos q and sin q of gravity's torque, N·m; slide: force and 0.
             Shape (2,).
-        solref: time constant (s) and damping ratio of the range's ends, shape (2,).
+        solref: time constant (s) and damping ratio of the range's ends, or minus their stiffness
+            (1/s²) and damping (1/s), shape (2,).
         solimp: impedance of the range's ends, shape (5,).
+        effects: beyond the three channels.
+        seen: what MuJoCo's rows take for the inertia of a body that only slides: its mass, without
+            armature (kg); None of others, where they take all.
         hinge: whether it is a hinge.
     """
 
@@ -56,23 +65,42 @@ class Solo:
     gravity: Array
     solref: Array
     solimp: Array
+    effects: Effects
+    seen: Array | None
     hinge: bool
 
 
-@partial(jax.tree_util.register_dataclass, data_fields=("q", "v", "held"), meta_fields=())
+@jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class State:
-    """Position (rad or m), velocity, and the friction force of the step before (N·m or N)."""
+    """What a step begins with.
+
+    Attributes:
+        q: position, rad or m.
+        v: velocity.
+        held: friction force of the step before, N·m or N.
+        g: with backlash, position of the handle minus that of the part.
+        w: with backlash, velocity of the handle.
+    """
 
     q: Array
     v: Array
     held: Array
+    g: Array = field(default_factory=lambda: jnp.zeros(()))
+    w: Array = field(default_factory=lambda: jnp.zeros(()))
 
 
 Prepared = tuple[Solo, jaxfield.Cubics, jaxfield.Cubics, jaxfield.Cubics]
 
 
-def from_context(context: Context, profile: Profile, model: mujoco.MjModel, joint: int) -> Solo:
+def from_context(
+    context: Context,
+    profile: Profile,
+    model: mujoco.MjModel,
+    joint: int,
+    *,
+    attached: bool = False,
+) -> Solo:
     """The joint of a model with a profile.
 
     Args:
@@ -80,16 +108,25 @@ def from_context(context: Context, profile: Profile, model: mujoco.MjModel, join
         profile: of the joint.
         model: compiled; the solver parameters of the joint's ends are taken from it.
         joint: its id in the model.
+        attached: whether the context is that of a scene to which the profile is attached: then its
+            inertia holds the profile's added inertia.
     """
+    effects = from_effects(profile.effects)
+    inertia = jnp.array(context.equivalent_inertia)
+    if attached and effects.added_inertia is not None:
+        inertia = inertia - effects.added_inertia.inertia
+    slides = model.body_simple[model.jnt_bodyid[joint]] == ONLY_SLIDES
     hinge = context.joint.type == "hinge"
     channels = {name: jaxfield.from_channel(getattr(profile.channels, name)) for name in CHANNELS}
     return Solo(
         **channels,
         range=jnp.array(profile.joint.range),
-        inertia=jnp.array(context.equivalent_inertia),
+        inertia=inertia,
         gravity=jnp.array(gravity_factors(context) if hinge else (context.gravity_force[0], 0.0)),
         solref=jnp.array(model.jnt_solref[joint]),
         solimp=jnp.array(model.jnt_solimp[joint]),
+        effects=effects,
+        seen=jnp.array(1 / model.dof_invweight0[model.jnt_dofadr[joint]]) if slides else None,
         hinge=hinge,
     )
 
@@ -130,7 +167,7 @@ def changed(first: Solo, slots: tuple[Slot, ...], values: jax.Array) -> Solo:
 def prepare(joint: Solo) -> Prepared:
     """Does once what does not depend on the state."""
     return (
-        joint,
+        replace(joint, effects=jaxeffects.prepare(joint.effects)),
         jaxfield.prepare(joint.conservative, pieces=True),
         jaxfield.prepare(joint.friction),
         jaxfield.prepare(joint.damping),
@@ -150,27 +187,28 @@ def step(prepared: Prepared, state: State, force: Array, h: float) -> State:
         the state after.
     """
     joint, conservative, friction, damping = prepared
+    own, q, v = joint.effects, state.q, state.v
     lo, hi = joint.range[0], joint.range[1]
-    inertia, span = joint.inertia, hi - lo
-    q, v = state.q, state.v
+    span, (inertia, seen) = hi - lo, _inertia(joint)
     s = (q - lo) / span
-    own = jaxfield.evaluate(conservative, s)[0]
-    drag = jaxfield.evaluate(damping, s)[0]
-    bound = jaxfield.evaluate(friction, s)[0]
-    far = reach(v, own, inertia, 1 / span, h)
-    steepest = jaxfield.max_descent(conservative, s - far, s + far)
-    drag = drag + h * implicit_stiffness(own, steepest, inertia, 1 / span, h)
-    if joint.hinge:
-        weight = joint.gravity[0] * jnp.cos(q) + joint.gravity[1] * jnp.sin(q)
-    else:
-        weight = joint.gravity[0]
-    drive = own + weight + force
+    lifted, descent = laws.gravity(own.gravity_offset, q)
+    spring = jaxfield.evaluate(conservative, s)[0] + lifted
+    far = reach(v, spring, seen, 1 / span, h)
+    steepest = jaxfield.max_descent(conservative, s - far, s + far) + descent * span
+    drag = jaxfield.evaluate(damping, s)[0] + laws.damping(own, s, v)
+    drag = drag + h * implicit_stiffness(spring, steepest, seen, 1 / span, h)
+    weight = _weight(joint, q)
+    up, down = laws.friction(own, s, v, weight + force)
+    bound = jaxfield.evaluate(friction, s)[0] + 0.5 * (up + down)
+    held = jnp.clip(state.held, -bound, bound)
+    stiff, bristles = laws.friction_row(own.presliding_friction, held, bound, v, seen, h)
+    drag = drag + bristles
+    pushed, g, w = laws.backlash(own.backlash, state.g, state.w, v, force, h)
+    drive = spring + 0.5 * (down - up) + weight + pushed
 
     # Optimality: mass * a = drive + friction(a) + limit(a); mass and drive hold the damping row.
     mass = inertia + h * drag
     drive = drive - drag * v
-    stiff = STIFF_ROW * inertia
-    held = jnp.clip(state.held, -bound, bound)
     # friction(a) = clamp(offset - stiff a, -bound, bound)
     offset = held - stiff * v / h
     sign, D, reference = _limit(joint, q, v, s)
@@ -189,7 +227,21 @@ def step(prepared: Prepared, state: State, force: Array, h: float) -> State:
     pushes = (D > 0) & (sign * free - reference < 0)
     a = jnp.where(pushes, held_back, free)
     after = v + h * a
-    return State(q + h * after, after, jnp.where(pushes, force_back, force_free))
+    return State(q + h * after, after, jnp.where(pushes, force_back, force_free), g, w)
+
+
+def _inertia(joint: Solo) -> tuple[Array, Array]:
+    """With the added inertia, and what of it MuJoCo's rows see; kg·m² or kg."""
+    added = joint.effects.added_inertia
+    whole = joint.inertia if added is None else joint.inertia + added.inertia
+    return whole, whole if joint.seen is None else joint.seen
+
+
+def _weight(joint: Solo, q: Array) -> Array:
+    """Gravity's force, N·m or N."""
+    if joint.hinge:
+        return joint.gravity[0] * jnp.cos(q) + joint.gravity[1] * jnp.sin(q)
+    return joint.gravity[0]
 
 
 def _limit(joint: Solo, q: Array, v: Array, s: Array) -> tuple[Array, Array, Array]:
@@ -201,7 +253,7 @@ def _limit(joint: Solo, q: Array, v: Array, s: Array) -> tuple[Array, Array, Arr
     low = s < 0.5
     sign = jnp.where(low, 1.0, -1.0)
     distance = jnp.where(low, q - lo, hi - q)
-    constant, ratio = joint.solref[0], joint.solref[1]
+    first, second = joint.solref[0], joint.solref[1]
     dmin, dmax, width, mid, power = (joint.solimp[k] for k in range(5))
     dmin, dmax, mid = (jnp.clip(x, MIN_IMPEDANCE, MAX_IMPEDANCE) for x in (dmin, dmax, mid))
     x = jnp.minimum(jnp.abs(distance) / width, 1.0)
@@ -209,9 +261,10 @@ def _limit(joint: Solo, q: Array, v: Array, s: Array) -> tuple[Array, Array, Arr
     above = (1 - jnp.where(x < mid, mid, x)) / (1 - mid)
     rise = jnp.where(x < mid, mid * below**power, 1 - (1 - mid) * above**power)
     impedance = dmin + rise * (dmax - dmin)
-    stiffness = 1 / (dmax**2 * constant**2 * ratio**2)
-    damping = 2 / (dmax * constant)
-    D = jnp.where(distance < 0, impedance / (1 - impedance) * joint.inertia, 0.0)
+    constant, ratio = (jnp.where(first > 0, x, 1.0) for x in (first, second))
+    stiffness = jnp.where(first > 0, 1 / (constant * ratio) ** 2, -first) / dmax**2
+    damping = jnp.where(first > 0, 2 / constant, -second) / dmax
+    D = jnp.where(distance < 0, impedance / (1 - impedance) * _inertia(joint)[1], 0.0)
     return sign, D, -damping * sign * v - stiffness * impedance * distance
 
 

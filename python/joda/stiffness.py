@@ -9,6 +9,7 @@ EXPLICIT_STIFFNESS = 1.0
 """As kExplicitStiffness in cpp/joint_dynamics.cc, and so on."""
 STRIDE = 0.25
 STIFF_ROW = 1e4
+IDLE_ROW = 1e-12
 
 
 def reach(v: Array, force: Array, inertia: Array, per_range: Array, h: Array | float) -> Array:

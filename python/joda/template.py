@@ -7,8 +7,9 @@ from typing import Self
 
 from pydantic import model_validator
 
+from joda.component import Component, Frozen
 from joda.errors import JodaError
-from joda.profile import Component, File, Frozen
+from joda.profile import File
 
 
 class Curve(Frozen):

@@ -1,6 +1,7 @@
-// Feeds texts to the attributes' parser: attributes_fuzz SEED COUNT. What it accepts must evaluate
-// to what its components give alone, within their control points' magnitude; what it refuses, it
-// refuses by std::invalid_argument (any other exception ends the program).
+// Feeds texts to the attributes' parsers: attributes_fuzz SEED COUNT. A channel that is accepted
+// must evaluate to what its components give alone, within their control points' magnitude, and the
+// laws of accepted effects must stay finite and resist; what is refused is refused by
+// std::invalid_argument (any other exception ends the program).
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "attributes.h"
+#include "effects.h"
 
 namespace {
 
@@ -53,21 +55,60 @@ std::vector<double> Knots(Random& random, int n) {
   return out;
 }
 
-// A component that mostly can be evaluated.
-std::string Component(Random& random) {
+// A component that mostly can be evaluated, without a label; its values may be kept from being
+// negative.
+std::string Curve(Random& random, bool nonnegative) {
   const std::vector<double> interval = Knots(random, Below(random, 2) ? 2 : 4);
   const size_t left = random() % (interval.size() - 1);
   const int n = Below(random, 100) == 0 ? 2000 : 2 + Below(random, 8);
   const double scale = std::pow(10, Below(random, 3) ? 0 : Below(random, 30) - 14);
   const bool flat = Below(random, 4) == 0;
-  std::string out = Below(random, 2) ? "label: " : "", y;
-  out += Print(interval[left]) + " " + Print(interval[left + 1]) + " |";
+  std::string out = Print(interval[left]) + " " + Print(interval[left + 1]) + " |", y;
   for (const double x : Knots(random, n)) {
     out += " " + Print(x);
     const double value = flat ? Below(random, 3) - 1 : 2 * Uniform(random) - 1;
-    y += " " + (Below(random, 200) ? Print(scale * value) : Number(random));
+    const double allowed = nonnegative ? std::abs(value) : value;
+    y += " " + (Below(random, 200) ? Print(scale * allowed) : Number(random));
   }
   return out + " |" + y;
+}
+
+std::string Component(Random& random) {
+  return (Below(random, 2) ? "label: " : "") + Curve(random, false);
+}
+
+std::string Positive(Random& random) {
+  return Below(random, 30) ? Print(std::pow(10, 4 * Uniform(random) - 2)) : Number(random);
+}
+
+std::string Effect(Random& random) {
+  static const char* const directions[] = {"positive", "negative", "both"};
+  const std::string direction = std::string(" direction=") + Pick(random, directions);
+  const std::string curve = ": " + Curve(random, true), part = Print(Uniform(random));
+  switch (Below(random, 10)) {
+    case 0:
+      return "direction_dependent_damping" + direction + curve;
+    case 1:
+      return "quadratic_damping" + direction + curve;
+    case 2:
+      return "asymmetric_friction" + direction + curve;
+    case 3:
+      return "stribeck_friction exponent=" + Positive(random) + " velocity=" + Positive(random) +
+             curve;
+    case 4:
+      return "load_dependent_friction coefficient=" + Positive(random);
+    case 5:
+      return "presliding_friction stiffness=" + Positive(random) + " damping=" + Positive(random) +
+             " breakaway=" + (Below(random, 4) ? part : Print(Below(random, 2)));
+    case 6:
+      return "gravity_offset sin=" + Number(random) + " cos=" + Number(random);
+    case 7:
+      return "backlash play=" + Positive(random) + " inertia=" + Positive(random);
+    case 8:
+      return "added_inertia inertia=" + Positive(random);
+    default:
+      return "end_stop_restitution restitution=" + part;
+  }
 }
 
 std::string Bytes(Random& random) {
@@ -101,11 +142,12 @@ std::string Mutate(Random& random, std::string text) {
   return text;
 }
 
-std::string Text(Random& random) {
+// One piece or more, by `write`.
+std::string Text(Random& random, std::string (*write)(Random&)) {
   if (Below(random, 10) == 0) return Bytes(random);
-  std::string out = Component(random);
+  std::string out = write(random);
   for (int k = Below(random, 40) == 0 ? 60 : Below(random, 5); k > 0; --k) {
-    out += "; " + Component(random);
+    out += "; " + write(random);
   }
   return Below(random, 3) ? out : Mutate(random, out);
 }
@@ -167,6 +209,58 @@ bool Check(Random& random, const Accepted& accepted) {
   return good;
 }
 
+// Whether the effects resist motion, and no law leaves its bounds, at some place and speed.
+bool Resist(Random& random, const joda::Effects& e) {
+  const double s = 3 * Uniform(random) - 1, v = 2 * Uniform(random) - 1, h = 0.002;
+  const double load = 10 * Uniform(random), held = 4 * Uniform(random) - 2;
+  const double damping = joda::ExtraDamping(e, s, v);
+  const joda::FrictionBounds bounds = joda::BoundFriction(e, 1, s, v, load);
+  const double left = joda::BristleLeft(e.presliding, held, bounds.Bound(), v);
+  joda::Handle handle = {0, v};
+  const joda::Backlash backlash = e.backlash.play > 0 ? e.backlash : joda::Backlash{1, 1};
+  const double force = joda::MoveHandle(backlash, h, load, -v, &handle);
+  return damping >= 0 && std::isfinite(damping) && bounds.positive >= 0 && bounds.negative >= 0 &&
+         std::isfinite(bounds.Bound()) && left > 0 && left <= 2 && std::isfinite(force) &&
+         std::abs(handle.gap) <= 0.5 * backlash.play &&
+         std::isfinite(joda::OffsetForce(e.gravity, v));
+}
+
+// Whether the effects are refused, or resist everywhere; counts those that are accepted.
+bool CheckEffects(Random& random, const std::string& text, int* accepted) {
+  joda::Effects effects;
+  try {
+    effects = joda::ParseEffects(text);
+  } catch (const std::invalid_argument&) {
+    return true;
+  }
+  ++*accepted;
+  for (int k = 0; k < 20; ++k) {
+    if (!Resist(random, effects)) return false;
+  }
+  return true;
+}
+
+bool CheckChannel(Random& random, const std::string& text, int* accepted) {
+  Accepted candidate;
+  if (!Parse(text, Below(random, 2) ? "sum" : "max", &candidate)) return true;
+  ++*accepted;
+  return Check(random, candidate);
+}
+
+// Tries `count` texts; returns whether all passed and enough were accepted.
+bool Fuzz(Random& random, const char* what, std::string (*write)(Random&),
+          bool (*check)(Random&, const std::string&, int*), int count) {
+  int accepted = 0;
+  for (int k = 0; k < count; ++k) {
+    const std::string text = Text(random, write);
+    if (check(random, text, &accepted)) continue;
+    std::fprintf(stderr, "text %d of %s: %s\n", k, what, text.c_str());
+    return false;
+  }
+  std::printf("%d texts of %s, %d of them accepted\n", count, what, accepted);
+  return accepted > count / 10;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -176,18 +270,7 @@ int main(int argc, char** argv) {
   }
   Random random(std::strtoull(argv[1], nullptr, 10));
   const int count = std::atoi(argv[2]);
-  int accepted = 0;
-  for (int k = 0; k < count; ++k) {
-    const std::string text = Text(random);
-    const char* const combine = Below(random, 2) ? "sum" : "max";
-    Accepted candidate;
-    if (!Parse(text, combine, &candidate)) continue;
-    ++accepted;
-    if (!Check(random, candidate)) {
-      std::fprintf(stderr, "text %d, %s: %s\n", k, combine, text.c_str());
-      return 1;
-    }
-  }
-  std::printf("%d texts, %d of them accepted\n", count, accepted);
-  return accepted > count / 10 ? 0 : 1;
+  const bool good = Fuzz(random, "channels", Component, CheckChannel, count) &&
+                    Fuzz(random, "effects", Effect, CheckEffects, count);
+  return good ? 0 : 1;
 }

@@ -28,7 +28,7 @@ def refine(
     check: Annotated[
         list[Path] | None, typer.Option(help="A run that is only compared, not fitted.")
     ] = None,
-    iterations: Annotated[int, typer.Option(min=1, help="At most so many.")] = 30,
+    iterations: Annotated[int, typer.Option(min=1, help="At most so many.")] = 60,
     method: Annotated[
         Literal["lm", "adam"], typer.Option(help="Levenberg-Marquardt or Adam.")
     ] = "lm",

@@ -17,6 +17,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from joda import profile
+from joda.component import Component
 from joda.field.jaxcubics import Array, Cubics, curve, pchip
 from joda.field.jaxmerge import merge
 
@@ -93,11 +94,11 @@ def to_channel(channel: Channel, labels: Sequence[str] = ()) -> profile.Channel:
         an optimiser has moved them by rounding.
     """
     a, b, x, y = (np.asarray(part, float) for part in (channel.a, channel.b, channel.x, channel.y))
-    parts: list[profile.Component] = []
+    parts: list[Component] = []
     for k in np.flatnonzero(a < 1.5):
         n = int((x[k] < 1.5).sum())
         parts.append(
-            profile.Component(
+            Component(
                 label=labels[len(parts)] if len(parts) < len(labels) else "",
                 interval=(float(max(a[k], 0)), float(min(b[k], 1))),
                 x=(0.0, *x[k, 1 : n - 1].tolist(), 1.0),

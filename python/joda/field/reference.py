@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from joda.profile import Channel, Component
+from joda.component import Component
+from joda.profile import Channel
 
 Array = NDArray[np.float64]
 

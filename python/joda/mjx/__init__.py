@@ -12,7 +12,7 @@ theorem, whatever the solver did to get there.
     d = jax.jit(joda.mjx.step)(m, d, fields)
 
 A joint's friction of the last step, which the plugin keeps in `plugin_state`, is read from
-`d._impl.efc_force`, so no state is needed beyond `mjx.Data`.
+`d._impl.efc_force`. Only backlash needs state beyond `mjx.Data`: `put_state` makes room for it.
 """
 
 from importlib import import_module
@@ -39,5 +39,16 @@ if not f"{version('mujoco-mjx')}.".startswith(f"{SUPPORTED}."):
 
 from joda.mjx.fields import Field, Fields, Place, Prepared, prepare, put_fields  # noqa: E402
 from joda.mjx.simulate import rollout, step  # noqa: E402
+from joda.mjx.state import put_state  # noqa: E402
 
-__all__ = ["Field", "Fields", "Place", "Prepared", "prepare", "put_fields", "rollout", "step"]
+__all__ = [
+    "Field",
+    "Fields",
+    "Place",
+    "Prepared",
+    "prepare",
+    "put_fields",
+    "put_state",
+    "rollout",
+    "step",
+]

@@ -1,6 +1,6 @@
 """Profiles as arrays for MJX, and where in its constraints their joints have rows."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -10,13 +10,22 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from joda.component import Curve
+from joda.effects import CurveEffect
 from joda.errors import JodaError
-from joda.field import jaxfield
+from joda.field import jaxeffects, jaxfield
+from joda.field.jaxeffects import Effects, from_effects
 from joda.model import find_joint
 from joda.profile import CHANNELS, Profile
 from joda.scene import DAMPING_ROW
 
 Array = jax.Array
+
+ON_FRICTION = (
+    *("asymmetric_friction", "stribeck_friction"),
+    *("load_dependent_friction", "presliding_friction"),
+)
+"""Effects that act through the friction row."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +51,7 @@ class Place:
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=("conservative", "friction", "damping", "range"),
+    data_fields=("conservative", "friction", "damping", "range", "effects"),
     meta_fields=("place",),
 )
 @dataclass(frozen=True)
@@ -54,6 +63,7 @@ class Field:
         friction: bound of the dry friction, N or N·m.
         damping: N·s/m or N·m·s/rad.
         range: joint position at s = 0 and at s = 1, m or rad, shape (2,).
+        effects: beyond the three channels.
         place: where the joint is in the model; not a number to differentiate by.
     """
 
@@ -61,10 +71,11 @@ class Field:
     friction: jaxfield.Channel
     damping: jaxfield.Channel
     range: Array
+    effects: Effects
     place: Place
 
     def replace(self, **changes: Any) -> "Field":
-        """The same with other channels or range."""
+        """The same with other channels, range or effects."""
         return replace(self, **changes)
 
 
@@ -74,7 +85,7 @@ Fields = dict[str, Field]
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=("conservative", "friction", "damping", "range"),
+    data_fields=("conservative", "friction", "damping", "range", "effects"),
     meta_fields=("places", "orders"),
 )
 @dataclass(frozen=True)
@@ -86,6 +97,7 @@ class Prepared:
         friction: the same.
         damping: the same.
         range: shape (joints, 2).
+        effects: those that any joint has, stacked.
         places: by joint.
         orders: for each channel, where in its stacks the joints are.
     """
@@ -94,6 +106,7 @@ class Prepared:
     friction: tuple[jaxfield.Cubics, ...]
     damping: tuple[jaxfield.Cubics, ...]
     range: Array
+    effects: Effects
     places: tuple[Place, ...]
     orders: tuple[tuple[int, ...], ...]
 
@@ -104,6 +117,7 @@ def put_fields(
     *,
     components: int = 0,
     knots: int = 0,
+    effects: Collection[str] = (),
     dtype: Any = None,
 ) -> Fields:
     """The fields of profiles that a scene carries.
@@ -114,10 +128,12 @@ def put_fields(
         components: at least so many places for components in each channel, so that profiles of
             different sizes can be stacked.
         knots: at least so many places for control points in each component.
+        effects: names of effects for which there is room at least.
         dtype: of the arrays; by default JAX's own.
 
     Returns:
-        joint name to field. All channels have the same shape.
+        joint name to field. All have the same shapes, and the effects that any of them has: for a
+        joint without it an effect does nothing.
 
     Raises:
         JodaError: a joint does not exist, has no friction row although its profile has friction,
@@ -126,22 +142,23 @@ def put_fields(
     _check_options(model)
     channels = [getattr(p.channels, name) for p in profiles.values() for name in CHANNELS]
     components = max([components, *(len(channel.components) for channel in channels)])
-    knots = max([knots, *(len(part.x) for channel in channels for part in channel.components)])
+    curves: list[Curve] = [part for channel in channels for part in channel.components]
+    listed = [effect for profile in profiles.values() for effect in profile.effects]
+    curves += [effect for effect in listed if isinstance(effect, CurveEffect)]
+    knots = max([knots, *(len(curve.x) for curve in curves)])
+    # the added inertia is in the model
+    present = {*effects, *(effect.effect for effect in listed)} - {"added_inertia"}
     fields = {}
     for name, profile in profiles.items():
         place = _place(model, find_joint(model, name))
-        enabled = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
-        if place.friction_row < 0 and enabled and profile.channels.friction.components:
-            raise JodaError(
-                f"joint '{name}' has friction in its profile and no friction row; "
-                'add frictionloss="1e-12" to the joint.'
-            )
+        _check_friction_row(model, name, profile, place)
         parts = {
             key: jaxfield.from_channel(getattr(profile.channels, key), components, knots, dtype)
             for key in CHANNELS
         }
         limits = jnp.asarray(profile.joint.range, dtype)
-        fields[name] = Field(**parts, range=limits, place=place)
+        own = from_effects(profile.effects, present, knots, dtype)
+        fields[name] = Field(**parts, range=limits, effects=own, place=place)
     return fields
 
 
@@ -165,7 +182,22 @@ def prepare(fields: Fields) -> Prepared:
         orders.append(tuple(np.argsort(members_in_turn).tolist()))
     places = tuple(field.place for field in fields.values())
     limits = jnp.stack([field.range for field in fields.values()]) if names else jnp.zeros((0, 2))
-    return Prepared(**stacks, range=limits, places=places, orders=tuple(orders))
+    own = [field.effects for field in fields.values()]
+    make_effects = jax.vmap(jaxeffects.prepare, axis_size=len(names))
+    effects = make_effects(_stack(own)) if names else Effects()
+    return Prepared(**stacks, range=limits, effects=effects, places=places, orders=tuple(orders))
+
+
+def _check_friction_row(model: mujoco.MjModel, name: str, profile: Profile, place: Place) -> None:
+    enabled = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
+    rubs = profile.channels.friction.components or any(
+        effect.effect in ON_FRICTION for effect in profile.effects
+    )
+    if place.friction_row < 0 and enabled and rubs:
+        raise JodaError(
+            f"joint '{name}' has friction in its profile and no friction row; "
+            'add frictionloss="1e-12" to the joint.'
+        )
 
 
 def _check_options(model: mujoco.MjModel) -> None:

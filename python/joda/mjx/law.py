@@ -7,16 +7,15 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
+from joda import laws
 from joda.field import jaxfield
+from joda.field.jaxeffects import Backlash
 from joda.mjx.fields import Prepared
 from joda.mjx.internals import Rows
 from joda.profile import CHANNELS
-from joda.stiffness import STIFF_ROW, implicit_stiffness, reach
+from joda.stiffness import IDLE_ROW, implicit_stiffness, reach
 
 Array = jax.Array
-
-IDLE_ROW = 1e-12
-"""As kIdleRow in cpp/joint_dynamics.cc."""
 
 
 def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
@@ -34,34 +33,47 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
         return d
     index = {
         key: np.array([getattr(place, key) for place in prepared.places])
-        for key in ("dof", "qpos", "friction_row", "damping_row", "equality")
+        for key in ("joint", "dof", "qpos", "friction_row", "damping_row", "equality")
     }
-    dof, h = index["dof"], m.opt.timestep
-    inertia, v = 1 / m.dof_invweight0[dof], d.qvel[dof]
+    dof, h, own = index["dof"], m.opt.timestep, prepared.effects
+    inertia, v, q = 1 / m.dof_invweight0[dof], d.qvel[dof], d.qpos[index["qpos"]]
     lo, hi = prepared.range[:, 0], prepared.range[:, 1]
     per_range = 1 / (hi - lo)
-    s = (d.qpos[index["qpos"]] - lo) * per_range
+    s = (q - lo) * per_range
     order = dict(zip(CHANNELS, prepared.orders, strict=True))
 
-    force = stiffness = drag = friction = jnp.zeros_like(v)
+    force, descent = jax.vmap(laws.gravity)(own.gravity_offset, q)
+    steepest, drag, up = descent / per_range, jnp.zeros_like(v), jnp.zeros_like(v)
     if spring:
         stacks = prepared.conservative
-        force, _ = _each(stacks, order["conservative"], jaxfield.evaluate, s)
+        force = force + _each(stacks, order["conservative"], jaxfield.evaluate, s)[0]
         far = reach(v, force, inertia, per_range, h)
-        descent = jaxfield.max_descent
-        steepest = _each(stacks, order["conservative"], descent, s - far, s + far)
-        stiffness = implicit_stiffness(force, steepest, inertia, per_range, h)
-        drag = h * stiffness
+        near = _each(stacks, order["conservative"], jaxfield.max_descent, s - far, s + far)
+        steepest = steepest + near
+    stiffness = implicit_stiffness(force, steepest, inertia, per_range, h)
     if damper:
-        drag = drag + _each(prepared.damping, order["damping"], jaxfield.evaluate, s)[0]
+        drag = _each(prepared.damping, order["damping"], jaxfield.evaluate, s)[0]
+        drag = drag + jax.vmap(laws.damping)(own, s, v)
+    drag, down = drag + h * stiffness, up
     if not off & bit.FRICTIONLOSS:
         friction, _ = _each(prepared.friction, order["friction"], jaxfield.evaluate, s)
+        load = jnp.zeros_like(v)
+        if own.load_dependent_friction is not None:
+            load = _gravity(m, d, index["joint"]) + d.qfrc_applied[dof]
+        up, down = (friction + more for more in jax.vmap(laws.friction)(own, s, v, load))
 
     rows, at = Rows(d), np.flatnonzero(index["friction_row"] >= 0)
     row = index["friction_row"][at]
-    bound = friction[at] + m.dof_frictionloss[dof[at]]
-    rows.set(row, STIFF_ROW * inertia[at], bound, jnp.clip(psi[row], -bound, bound), v[at] / h)
-    friction = friction.at[at].set(0)
+    bound = 0.5 * (up + down)[at] + m.dof_frictionloss[dof[at]]
+    last = jnp.clip(psi[row], -bound, bound)
+    bristles = jax.tree.map(lambda x: x[at], own.presliding_friction)
+    stiff = jax.vmap(laws.friction_row, in_axes=(0, 0, 0, 0, 0, None))
+    D, slipping = stiff(bristles, last, bound, v[at], inertia[at], h)
+    rows.set(row, D, bound, last, v[at] / h)
+    if damper:
+        drag = drag.at[at].add(slipping)
+    shift = jnp.zeros_like(v).at[at].set(0.5 * (down - up)[at])  # as the row is symmetric
+    up, down = up.at[at].set(0), down.at[at].set(0)
 
     at = np.flatnonzero(index["damping_row"] >= 0)
     row, on = index["damping_row"][at], d.eq_active[index["equality"][at]] != 0
@@ -72,11 +84,37 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
     drag = jnp.where(held, 0, drag)
 
     # what has no row becomes a force that at most stops the joint within the step
-    stop = inertia * jnp.abs(v) / h
-    limited = jnp.minimum(friction + drag * jnp.abs(v) / (1 + h * drag / inertia), stop)
-    force = force - jnp.sign(v) * limited
-    d = rows.write(d)
-    return d.replace(qfrc_passive=d.qfrc_passive.at[dof].add(force))
+    stop, dry = inertia * jnp.abs(v) / h, jnp.where(v < 0, down, up)
+    limited = jnp.minimum(dry + drag * jnp.abs(v) / (1 + h * drag / inertia), stop)
+    force = force + shift - jnp.sign(v) * limited
+    d, pushed = _move_handles(m, rows.write(d), dof, own.backlash)
+    return d.replace(qfrc_passive=d.qfrc_passive.at[dof].add(force + pushed))
+
+
+def _gravity(m: mjx.Model, d: mjx.Data, joint: Any) -> Array:
+    """Gravity's force on joints, from all that they move, N·m or N."""
+    if m.opt.disableflags & mjx.DisableBit.GRAVITY:
+        return jnp.zeros(len(joint))
+    body, axis = m.jnt_bodyid[joint], d.xaxis[joint]
+    hinge = m.jnt_type[joint] == mjx.JointType.HINGE
+    arm = d.subtree_com[body] - d.xanchor[joint]
+    along = jnp.where(hinge[:, None], jnp.cross(axis, arm), axis)
+    weight: Array = m.body_subtreemass[body] * (along @ m.opt.gravity)
+    return weight
+
+
+def _move_handles(
+    m: mjx.Model, d: mjx.Data, dof: Any, backlash: Backlash | None
+) -> tuple[mjx.Data, Array]:
+    """Steps the handles; what they push more than is applied to them, N·m or N."""
+    applied = d.qfrc_applied[dof]
+    if backlash is None:
+        return d, jnp.zeros_like(applied)
+    g, w = d.userdata[m.nuserdata :].reshape(-1, 2).T
+    step = jax.vmap(laws.backlash, in_axes=(0, 0, 0, 0, 0, None))
+    force, g, w = step(backlash, g, w, d.qvel[dof], applied, m.opt.timestep)
+    state = jnp.stack([g, w], axis=1).ravel()
+    return d.replace(userdata=d.userdata.at[m.nuserdata :].set(state)), force - applied
 
 
 def _each(

@@ -11,6 +11,7 @@ from joda.errors import JodaError
 from joda.mjx.fields import Fields, Prepared, prepare
 from joda.mjx.internals import pipeline
 from joda.mjx.law import act
+from joda.mjx.state import check_state
 
 
 def step(m: mjx.Model, d: mjx.Data, fields: Fields | Prepared) -> mjx.Data:
@@ -25,13 +26,14 @@ def step(m: mjx.Model, d: mjx.Data, fields: Fields | Prepared) -> mjx.Data:
         the state after the step, as of `mjx.step`.
 
     Raises:
-        JodaError: the integrator is RK4.
+        JodaError: the integrator is RK4, or a joint has backlash and `put_state` was not called.
     """
     if m.opt.integrator not in (mjx.IntegratorType.EULER, mjx.IntegratorType.IMPLICITFAST):
         raise JodaError(
             f"joda.mjx steps with the integrators Euler and implicitfast, not "
             f"{m.opt.integrator.name}; set option/integrator."
         )
+    check_state(m, d, fields)
     prepared = fields if isinstance(fields, Prepared) else prepare(fields)
     return pipeline(m, d, partial(act, prepared=prepared) if prepared.places else None)
 

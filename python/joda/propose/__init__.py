@@ -11,8 +11,9 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 from joda._context import Context
 from joda.behaviour import Behaviour
+from joda.component import Frozen
 from joda.errors import JodaError
-from joda.profile import Frozen, Profile
+from joda.profile import Profile
 from joda.proposal import Proposal
 from joda.template import Template
 

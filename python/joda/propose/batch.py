@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from joda.component import Frozen
 from joda.errors import JodaError
 from joda.files import write_text
-from joda.profile import File, Frozen
+from joda.profile import File
 
 if TYPE_CHECKING:
     from anthropic import Anthropic as Client

@@ -1,0 +1,221 @@
+// The text of the effects, as it stands in the plugin's MJCF attributes.
+//
+//   name key=value key=value: a b | x0 x1 ... | y0 y1 ... ; name key=value ; ...
+//
+// One effect after another, separated by ';'. Only effects with a curve have the part from ':' on.
+#include "effects.h"
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "attributes.h"
+
+namespace joda {
+namespace {
+
+[[noreturn]] void Fail(const std::string& what) { throw std::invalid_argument(what); }
+
+// One effect: its name, parameters and curve.
+class EffectText {
+ public:
+  explicit EffectText(std::string_view text) {
+    const auto colon = text.find(':');
+    const auto words = internal::Words(text.substr(0, colon));
+    if (words.empty()) Fail("expected the name of an effect, got " + internal::Quote(text));
+    name_ = words[0];
+    values_.assign(words.begin() + 1, words.end());
+    has_curve_ = colon != std::string_view::npos;
+    if (has_curve_) curve_ = text.substr(colon + 1);
+  }
+
+  const std::string_view& name() const { return name_; }
+
+  // Throws unless each word is key=value with one of the keys ("a b c"), and no key comes twice.
+  void CheckKeys(std::string_view keys) const {
+    const auto known = internal::Words(keys);
+    std::set<std::string_view> seen;
+    for (const std::string_view word : values_) {
+      const std::string_view key = word.substr(0, word.find('='));
+      if (key.size() == word.size()) Fail("expected key=value, got " + internal::Quote(word));
+      if (std::find(known.begin(), known.end(), key) == known.end()) {
+        Fail("unknown key " + internal::Quote(key) + "; its keys: " + std::string(keys));
+      }
+      if (!seen.insert(key).second) Fail(std::string(key) + " is given twice");
+    }
+  }
+
+  bool Has(std::string_view key) const { return Find(key) != values_.end(); }
+
+  std::string_view Value(std::string_view key) const {
+    const auto found = Find(key);
+    if (found == values_.end()) Fail(std::string(key) + " is missing");
+    return found->substr(key.size() + 1);
+  }
+
+  double Number(const std::string& key) const {
+    const std::string_view text = Value(key);
+    const auto numbers = ParseNumbers(text);
+    if (numbers.size() != 1) Fail(key + " must be one number, got " + internal::Quote(text));
+    if (std::abs(numbers[0]) > kMaxValue) Fail(key + " must lie between -1e15 and 1e15");
+    return numbers[0];
+  }
+
+  double Number(const std::string& key, double missing) const {
+    return Has(key) ? Number(key) : missing;
+  }
+
+  double NotNegative(const std::string& key) const {
+    const double value = Number(key);
+    if (value < 0) Fail(key + " must not be negative");
+    return value;
+  }
+
+  double Positive(const std::string& key) const {
+    const double value = Number(key);
+    if (!(value > 0)) Fail(key + " must be positive");
+    return value;
+  }
+
+  PiecewiseCubic Curve() const {
+    const auto parts = internal::Split(curve_, '|');
+    if (!has_curve_ || parts.size() != 3) {
+      Fail("expected its curve, \": a b | x ... | y ...\", got " + internal::Quote(curve_));
+    }
+    return PiecewiseCubic({ParseComponent(parts[0], parts[1], parts[2], true)}, Combine::kSum);
+  }
+
+  void CheckNoCurve() const {
+    if (has_curve_) Fail("it has no curve, but a \":\" follows");
+  }
+
+  // Puts the curve where `direction` says.
+  void PlaceCurve(bool may_be_both, Directed* out) const {
+    const std::string_view direction = Value("direction");
+    const bool both = may_be_both && direction == "both";
+    if (!both && direction != "positive" && direction != "negative") {
+      Fail(std::string("direction must be positive") +
+           (may_be_both ? ", negative or both" : " or negative") + ", got " +
+           internal::Quote(direction));
+    }
+    if (both || direction == "positive") PlaceCurve(&out->positive, "positive");
+    if (both || direction == "negative") PlaceCurve(&out->negative, "negative");
+  }
+
+ private:
+  std::vector<std::string_view>::const_iterator Find(std::string_view key) const {
+    return std::find_if(values_.begin(), values_.end(), [key](std::string_view word) {
+      return word.substr(0, word.find('=')) == key;
+    });
+  }
+
+  void PlaceCurve(PiecewiseCubic* out, const std::string& direction) const {
+    if (out->coefficients().size()) Fail("there are two of it for the " + direction + " direction");
+    *out = Curve();
+  }
+
+  std::string_view name_, curve_;
+  std::vector<std::string_view> values_;
+  bool has_curve_;
+};
+
+void ReadStribeck(const EffectText& text, Effects* out) {
+  out->stribeck.velocity = text.Positive("velocity");
+  if (text.Has("exponent")) out->stribeck.exponent = text.Positive("exponent");
+  out->stribeck.excess = text.Curve();
+}
+
+void ReadPresliding(const EffectText& text, Effects* out) {
+  out->presliding.stiffness = text.Positive("stiffness");
+  if (text.Has("damping")) out->presliding.damping = text.NotNegative("damping");
+  const double breakaway = text.Number("breakaway", 1);
+  if (breakaway < 0 || breakaway > 1) Fail("breakaway must lie between 0 and 1");
+  out->presliding.breakaway = breakaway;
+}
+
+void ReadGravityOffset(const EffectText& text, Effects* out) {
+  const bool hinge = text.Has("sin") || text.Has("cos");
+  if (hinge == text.Has("force")) Fail("it takes sin and cos for a hinge, or force for a slide");
+  const double sin = text.Number("sin", 0), cos = text.Number("cos", 0);
+  out->gravity = {sin, cos, text.Number("force", 0), std::hypot(sin, cos)};
+}
+
+void CheckRestitution(const EffectText& text) {
+  if (text.NotNegative("restitution") >= 1) Fail("restitution must be less than 1");
+}
+
+struct Kind {
+  const char* name;
+  const char* keys;
+  bool has_curve;
+  bool needs_row;  // acts through the solver's friction row
+  void (*read)(const EffectText& text, Effects* out);
+};
+
+// What the plugin does not read is in the scene.
+constexpr Kind kKinds[] = {
+    {"direction_dependent_damping", "direction", true, false,
+     [](const EffectText& text, Effects* out) { text.PlaceCurve(false, &out->damping); }},
+    {"quadratic_damping", "direction", true, false,
+     [](const EffectText& text, Effects* out) { text.PlaceCurve(true, &out->quadratic); }},
+    {"asymmetric_friction", "direction", true, true,
+     [](const EffectText& text, Effects* out) { text.PlaceCurve(false, &out->asymmetry); }},
+    {"stribeck_friction", "velocity exponent", true, true, ReadStribeck},
+    {"load_dependent_friction", "coefficient", false, true,
+     [](const EffectText& text, Effects* out) { out->load = text.NotNegative("coefficient"); }},
+    {"presliding_friction", "stiffness damping breakaway", false, true, ReadPresliding},
+    {"gravity_offset", "sin cos force", false, false, ReadGravityOffset},
+    {"backlash", "play inertia", false, false,
+     [](const EffectText& text, Effects* out) {
+       out->backlash = {text.Positive("play"), text.Positive("inertia")};
+     }},
+    {"added_inertia", "inertia", false, false,
+     [](const EffectText& text, Effects* out) { out->added_inertia = text.Positive("inertia"); }},
+    {"end_stop_restitution", "restitution", false, false,
+     [](const EffectText& text, Effects*) { CheckRestitution(text); }},
+};
+
+const Kind& FindKind(std::string_view name) {
+  std::string names;
+  for (const Kind& kind : kKinds) {
+    if (name == kind.name) return kind;
+    names += std::string(names.empty() ? "" : ", ") + kind.name;
+  }
+  Fail("there is no such effect; there are " + names);
+}
+
+void ReadEffect(const EffectText& text, std::set<std::string_view>* seen, Effects* out) {
+  const Kind& kind = FindKind(text.name());
+  text.CheckKeys(kind.keys);
+  if (!kind.has_curve) text.CheckNoCurve();
+  const bool may_repeat = std::string_view(kind.keys) == "direction";
+  if (!seen->insert(kind.name).second && !may_repeat) Fail("there are two of it");
+  kind.read(text, out);
+  if (kind.needs_row) out->needs_row = kind.name;
+}
+
+}  // namespace
+
+Effects ParseEffects(std::string_view text) {
+  Effects out;
+  std::set<std::string_view> seen;
+  const auto pieces = internal::Split(internal::Trim(text), ';');
+  for (size_t i = 0; i < pieces.size(); ++i) {
+    const std::string_view piece = internal::Trim(pieces[i]);
+    if (piece.empty() && i + 1 == pieces.size()) break;  // a closing ';', or no effect at all
+    std::string where = "effect " + std::to_string(i + 1);
+    try {
+      const EffectText effect(piece);
+      where += " " + internal::Quote(effect.name());
+      ReadEffect(effect, &seen, &out);
+    } catch (const std::invalid_argument& error) {
+      Fail(where + ": " + error.what());
+    }
+  }
+  return out;
+}
+
+}  // namespace joda

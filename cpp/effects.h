@@ -1,0 +1,158 @@
+// The effects of a joint beyond its three channels: what it has, and their laws.
+//
+// s is the normalised joint position, v the velocity before the step. Units are those of a hinge
+// (N m, rad, kg m^2); for a slide read N, m and kg. See docs/physics.md for the laws' place in the
+// step.
+#ifndef JODA_EFFECTS_H_
+#define JODA_EFFECTS_H_
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "field.h"
+
+namespace joda {
+
+// A curve for each direction of motion.
+struct Directed {
+  PiecewiseCubic positive, negative;
+
+  const PiecewiseCubic& Along(double v) const { return v < 0 ? negative : positive; }
+};
+
+struct Stribeck {
+  PiecewiseCubic excess;  // static minus Coulomb friction (N m)
+  double velocity = 1;    // Stribeck velocity (rad/s)
+  double exponent = 2;
+};
+
+struct Presliding {
+  double stiffness = 0;  // of the bristle (N m/rad), 0: none
+  double damping = 0;    // of the bristle (N m s/rad)
+  double breakaway = 1;  // 0: Dahl's model, 1: elastic-perfectly plastic (Prandtl)
+};
+
+struct GravityOffset {
+  double sin = 0, cos = 0;  // torque sin sin(q) + cos cos(q) of a hinge (N m)
+  double force = 0;         // of a slide (N)
+  double descent = 0;       // largest stiffness, hypot(sin, cos)
+};
+
+// A handle that moves the part only at the ends of its play.
+struct Backlash {
+  double play = 0;     // total width (rad), 0: none
+  double inertia = 0;  // of the handle (kg m^2)
+};
+
+// All effects of one joint; what it lacks is zero. Immutable after parsing.
+struct Effects {
+  Directed damping;            // added to the damping while moving that way (N m s/rad)
+  Directed quadratic;          // times |v|, added to the damping (N m s^2/rad^2)
+  Directed asymmetry;          // added to the friction against motion that way (N m)
+  Stribeck stribeck;           // added to the friction
+  double load = 0;             // times |load|, added to the friction
+  Presliding presliding;       // of the friction row
+  GravityOffset gravity;       // a passive force
+  Backlash backlash;           // between the applied force and the part
+  double added_inertia = 0;    // that the joint's armature must hold (kg m^2)
+  const char* needs_row = "";  // an effect that needs the friction row, "": none of them does
+};
+
+// Throws std::invalid_argument, one sentence; the text is the one of the attribute "effects".
+Effects ParseEffects(std::string_view text);
+
+// Largest friction while moving in positive and in negative direction, both >= 0.
+struct FrictionBounds {
+  double positive, negative;
+
+  // The friction lies in [-positive, negative]: a symmetric bound about a constant force.
+  double Bound() const { return 0.5 * (positive + negative); }
+  double Shift() const { return 0.5 * (negative - positive); }
+};
+
+// Speed below which a joint counts as still: what a stuck joint has left is rounding, and so would
+// be its direction (rad/s).
+inline constexpr double kStill = 1e-9;
+
+// What the effects add to the damping (N m s/rad).
+inline double ExtraDamping(const Effects& e, double s, double v) {
+  if (std::abs(v) < kStill) return 0;
+  const double out = e.damping.Along(v)(s).value + e.quadratic.Along(v)(s).value * std::abs(v);
+  return std::max(0.0, out);  // a curve's zero may be -1e-17
+}
+
+// Friction above Coulomb's that fades as the joint moves: e(s) exp(-(|v| / vs)^exponent).
+inline double StribeckFriction(const Stribeck& stribeck, double s, double v) {
+  const double excess = stribeck.excess(s).value;
+  if (!(excess > 0)) return 0;
+  const double x = std::abs(v) / stribeck.velocity;
+  if (stribeck.exponent == 2) return excess * std::exp(-x * x);
+  if (stribeck.exponent == 1) return excess * std::exp(-x);
+  return excess * std::exp(-std::pow(x, stribeck.exponent));
+}
+
+// The bounds where the channel, the joint's own frictionloss included, gives `friction`.
+inline FrictionBounds BoundFriction(const Effects& e, double friction, double s, double v,
+                                    double load) {
+  const double both = friction + StribeckFriction(e.stribeck, s, v) + e.load * std::abs(load);
+  return {std::max(0.0, both + e.asymmetry.positive(s).value),
+          std::max(0.0, both + e.asymmetry.negative(s).value)};
+}
+
+// How far the bristle gives plastically (0 to 1) where it carries the part r of its largest force
+// against the motion (Dupont et al. 2002).
+inline double PlasticPart(double breakaway, double r) {
+  constexpr double kPi = 3.141592653589793;
+  if (breakaway == 0 || r >= 1) return 1;
+  if (r <= breakaway) return 0;
+  return 0.5 + 0.5 * std::sin(kPi * (r - 0.5 * (1 + breakaway)) / (1 - breakaway));
+}
+
+// The least part of the bristle that is left: while it slips.
+inline constexpr double kLeastBristle = 1e-6;
+
+// Part of the bristle's stiffness and damping that is left where it holds with the force `held`
+// within +-bound: 1 at rest, 2 for Dahl's model at a reversal, (almost) 0 while it slips.
+inline double BristleLeft(const Presliding& presliding, double held, double bound, double v) {
+  const double against = std::abs(v) < kStill ? 0 : -held * internal::Sign(v);
+  const double r = bound > 0 ? std::clamp(against / bound, -1.0, 1.0) : 0;
+  return std::max(kLeastBristle, 1 - PlasticPart(presliding.breakaway, r) * r);
+}
+
+// The same for a step of the solver's row, which must also stop a part that turns back within the
+// step. While it slips the row's bound gives the law's force, so that all of the stiffness can be
+// there; else what is too stiff for the step to resolve (h^2 stiffness / inertia > 20) keeps 5 %.
+inline double BristleLeftInRow(double left, double h, double stiffness, double inertia) {
+  if (left <= kLeastBristle) return 1;
+  return std::max(left, 0.05 - inertia / (h * h * stiffness));
+}
+
+// The force at the joint position q.
+inline double OffsetForce(const GravityOffset& gravity, double q) {
+  if (gravity.descent == 0) return gravity.force;
+  return gravity.force + gravity.sin * std::sin(q) + gravity.cos * std::cos(q);
+}
+
+// The handle: its position minus the part's (within +-play / 2), and its velocity.
+struct Handle {
+  double gap = 0, velocity = 0;
+};
+
+// Moves the handle, on which `applied` acts, by a step beside the part that moves at v; returns the
+// force that it exerts on the part.
+inline double MoveHandle(const Backlash& backlash, double h, double applied, double v,
+                         Handle* handle) {
+  const double half = 0.5 * backlash.play;
+  const double gap = std::clamp(handle->gap, -half, half);  // the profile may have been replaced
+  const double free = handle->velocity + h * applied / backlash.inertia;
+  const double next = std::clamp(gap + h * (free - v), -half, half);
+  const double velocity = v + (next - gap) / h;
+  const double force = applied - backlash.inertia * (velocity - handle->velocity) / h;
+  *handle = {next, velocity};
+  return force;
+}
+
+}  // namespace joda
+
+#endif  // JODA_EFFECTS_H_

@@ -1,0 +1,80 @@
+// The solver's constraint rows of the step being computed: finding them, and setting their laws.
+#ifndef JODA_ROWS_H_
+#define JODA_ROWS_H_
+
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cstddef>
+
+namespace joda {
+
+// Row among [first, last) of this step's constraints that belongs to the object, -1: none. Rows
+// come in the order of their objects. `expected` is tried first, then bisection.
+inline int FindRow(const mjData* d, int first, int last, int expected, int type, int id) {
+  int row = first + expected;
+  if (row < last && d->efc_type[row] == type && d->efc_id[row] == id) return row;
+  int lo = first, hi = last;
+  while (lo < hi) {
+    row = (lo + hi) / 2;
+    if (d->efc_type[row] == type && d->efc_id[row] == id) return row;
+    const bool before =
+        d->efc_type[row] < type || (d->efc_type[row] == type && d->efc_id[row] < id);
+    (before ? lo : hi) = before ? row + 1 : row;
+  }
+  return -1;
+}
+
+// What of the step is the same for all joints.
+struct Step {
+  double h, per_h;
+  bool spring, damper, friction;  // not disabled
+  bool keeps_rows;                // the solver will use the rows as they are set here
+  bool dual, sparse;
+
+  explicit Step(const mjModel* m)
+      : h(m->opt.timestep),
+        per_h(1 / h),
+        spring(!(m->opt.disableflags & mjDSBL_SPRING)),
+        damper(!(m->opt.disableflags & mjDSBL_DAMPER)),
+        friction(!(m->opt.disableflags & mjDSBL_FRICTIONLOSS)),
+        // the discrete integrator makes the rows anew behind the plugin, and noslip drops the
+        // compliance of friction rows
+        keeps_rows(m->opt.integrator != mjINT_DISCRETE && m->opt.noslip_iterations == 0),
+        dual(m->opt.solver == mjSOL_PGS || m->opt.noslip_iterations > 0),
+        sparse(dual && mj_isSparse(m)) {}
+};
+
+// Makes the row resist the velocity at the end of the step: force = offset - D (a + v / h), within
+// +-bound.
+inline void SetRow(const Step& step, mjData* d, int row, double D, double bound, double offset) {
+  const double R = 1 / D;
+  if (step.dual) {  // the dual solvers see R on the diagonal of A + R
+    mjtNum* diagonal = d->efc_AR + static_cast<std::ptrdiff_t>(row) * (d->nefc + 1);
+    if (step.sparse) {
+      const int* colind = d->efc_AR_colind + d->efc_AR_rowadr[row];
+      const int* found = std::find(colind, colind + d->efc_AR_rownnz[row], row);
+      diagonal = d->efc_AR + (found - d->efc_AR_colind);
+    }
+    *diagonal += R - d->efc_R[row];
+  }
+  d->efc_D[row] = D;
+  d->efc_R[row] = R;
+  d->efc_frictionloss[row] = bound;
+  // the engine computes the reference a = -B v - K I pos from these right after the passive forces
+  d->efc_pos[row] = -offset * R;
+  mjtNum* KBIP = d->efc_KBIP + 4 * row;
+  KBIP[0] = 1;
+  KBIP[1] = step.per_h;
+  KBIP[2] = 1;
+  if (d->nisland > 0) {
+    const int i = d->map_efc2iefc[row];
+    d->iefc_D[i] = D;
+    d->iefc_R[i] = R;
+    d->iefc_frictionloss[i] = bound;
+  }
+}
+
+}  // namespace joda
+
+#endif  // JODA_ROWS_H_

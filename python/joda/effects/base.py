@@ -1,0 +1,113 @@
+"""What every effect has: a name, a law, parameters with units, a text for the plugin."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from joda.component import Curve, Frozen, numbers
+
+Direction = Literal["positive", "negative"]
+
+
+def parameter(
+    description: str, hinge: str, slide: str, typical: tuple[float, float], **bounds: Any
+) -> Any:
+    """A parameter of an effect.
+
+    Args:
+        description: what it is.
+        hinge, slide: its unit for a hinge and for a slide.
+        typical: smallest and largest value that is usual on doors, drawers, lids and knobs.
+        bounds: default, gt, ge, lt, le of pydantic's Field.
+    """
+    unit = hinge if hinge == slide else f"{hinge} or {slide}"
+    return Field(
+        description=f"{description} ({unit}; typically {typical[0]:g} to {typical[1]:g})",
+        json_schema_extra={"unit": [hinge, slide], "typical": list(typical)},
+        **bounds,
+    )
+
+
+class Effect(Frozen):
+    """An effect beyond the three channels.
+
+    Attributes:
+        effect: its name.
+        DESCRIPTION: in plain words.
+        LAW: the formula; v is the joint's velocity, s its normalised position.
+        SOURCE: where the formula is from.
+        SHOWS: how it shows in measurements.
+    """
+
+    DESCRIPTION: ClassVar[str]
+    LAW: ClassVar[str]
+    SOURCE: ClassVar[str]
+    SHOWS: ClassVar[str]
+
+    effect: str
+
+    @property
+    def key(self) -> str:
+        """What a joint may have only once: the name, with the direction where there is one."""
+        direction = getattr(self, "direction", None)
+        return f"{self.effect} {direction}" if direction else self.effect
+
+    @classmethod
+    def parameters(cls) -> tuple[str, ...]:
+        """Names of its parameters but for the curve."""
+        return tuple(k for k in cls.model_fields if k not in ("effect", *Curve.model_fields))
+
+    def text(self) -> str:
+        """The effect as in the plugin's attribute; numbers that are the default are left out."""
+        words = [self.effect]
+        for key in self.parameters():
+            value = getattr(self, key)
+            if isinstance(value, str):
+                words.append(f"{key}={value}")
+            elif value != type(self).model_fields[key].default:
+                words.append(f"{key}={numbers([value])}")
+        return " ".join(words)
+
+    def described(self) -> str:
+        """Name and numbers for a person; those that are zero are left out."""
+        values = ((key, getattr(self, key)) for key in self.parameters())
+        words = [
+            f"{key} {value if isinstance(value, str) else f'{value:.4g}'}"
+            for key, value in values
+            if value not in (0, "both")
+        ]
+        return ", ".join([self.effect.replace("_", " "), *words])
+
+    @classmethod
+    def fields_of(cls, text: str) -> Mapping[str, Any]:
+        """The inverse of `text`, as fields that are still to be checked."""
+        head, _, curve = text.partition(":")
+        name, *words = head.split()
+        fields: dict[str, Any] = {"effect": name}
+        fields |= dict(word.partition("=")[::2] for word in words)
+        if curve.strip():
+            parts = [part.split() for part in curve.split("|")]
+            fields |= dict(zip(Curve.model_fields, parts, strict=False))
+        return fields
+
+
+class CurveEffect(Curve, Effect):
+    """An effect whose size is a curve over the joint's position; by default all over the range."""
+
+    interval: tuple[float, float] = (0.0, 1.0)
+    x: tuple[float, ...] = (0.0, 1.0)
+
+    @model_validator(mode="after")
+    def _not_negative(self) -> Self:
+        if min(self.y) < 0:
+            raise ValueError("y must not be negative")
+        return self
+
+    def text(self) -> str:
+        """The effect as in the plugin's attribute."""
+        return f"{super().text()}: {self.curve_text()}"
+
+    def described(self) -> str:
+        """Name and numbers for a person."""
+        return f"{super().described()}, up to {max(self.y):.4g}"

@@ -1,0 +1,35 @@
+"""Effects that change the joint's damping."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from joda.effects.base import CurveEffect, Direction, parameter
+
+
+class DirectionDependentDamping(CurveEffect):
+    """More damping in one direction than in the other."""
+
+    DESCRIPTION = "Damping is larger in one direction: a soft-close damper, a door closer."
+    LAW = "force -y(s) v while v has the direction, 0 otherwise"
+    SOURCE = "Janot, Young and Gautier, Control Eng. Practice 73 (2018) on the EMPS drive"
+    SHOWS = "A force that grows with speed in one direction more than in the other."
+
+    effect: Literal["direction_dependent_damping"] = "direction_dependent_damping"
+    direction: Direction = Field(description="in which damping is larger; positive: q grows")
+    y: tuple[float, ...] = parameter("additional damping", "N·m·s/rad", "N·s/m", (0.1, 50))
+
+
+class QuadraticDamping(CurveEffect):
+    """Drag that grows with the square of speed."""
+
+    DESCRIPTION = "Drag grows with the square of speed: air, oil through an orifice."
+    LAW = "force -y(s) v |v|"
+    SOURCE = "Newton's drag; Blevins, Applied Fluid Dynamics Handbook (1984)"
+    SHOWS = "Fast motions lose more than in proportion; slow ones hardly anything."
+
+    effect: Literal["quadratic_damping"] = "quadratic_damping"
+    direction: Literal["both", "positive", "negative"] = Field(
+        default="both", description="in which it acts; positive: q grows"
+    )
+    y: tuple[float, ...] = parameter("drag", "N·m·s²/rad²", "N·s²/m²", (0.01, 50))

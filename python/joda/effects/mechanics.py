@@ -1,0 +1,76 @@
+"""Effects of what the joint is part of: masses, tilt, play, end stops."""
+
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from joda.effects.base import Effect, parameter
+
+
+class AddedInertia(Effect):
+    """More inertia than the bodies have."""
+
+    DESCRIPTION = "The joint is harder to set in motion than its bodies' masses make it."
+    LAW = "force -inertia dv/dt"
+    SOURCE = "Newton's second law; `armature` of the joint in the scene"
+    SHOWS = "All accelerations under a known force are too small by one factor."
+
+    effect: Literal["added_inertia"] = "added_inertia"
+    inertia: float = parameter("additional inertia", "kg·m²", "kg", (0.001, 5), gt=0)
+
+
+class GravityOffset(Effect):
+    """Gravity acts otherwise than the bodies' masses say: tilt, or a wrong centre of mass."""
+
+    DESCRIPTION = "The axis is tilted, or the centre of mass is elsewhere than in the model."
+    LAW = "force sin sin(q) + cos cos(q) on a hinge, force on a slide"
+    SOURCE = "torque of a weight on an arm"
+    SHOWS = (
+        "A force over position like a sine, the same in both directions and at rest; the joint "
+        "drifts to another place than the model does. On a slide it is a constant force."
+    )
+
+    effect: Literal["gravity_offset"] = "gravity_offset"
+    sin: float = parameter("factor of sin q, of a hinge", "N·m", "-", (-5, 5), default=0.0)
+    cos: float = parameter("factor of cos q, of a hinge", "N·m", "-", (-5, 5), default=0.0)
+    force: float = parameter("constant, of a slide", "-", "N", (-20, 20), default=0.0)
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if not (self.sin or self.cos or self.force):
+            raise ValueError("give sin or cos for a hinge, force for a slide")
+        return self
+
+    def fits(self, kind: Literal["hinge", "slide"]) -> bool:
+        """Whether only those numbers are set that such a joint has."""
+        return not (self.force if kind == "hinge" else self.sin or self.cos)
+
+
+class Backlash(Effect):
+    """Play between the handle, which is pushed, and the part that moves."""
+
+    DESCRIPTION = "What pushes the joint has play: a loose handle, gears, a slack linkage."
+    LAW = (
+        "the applied force moves a handle of its own inertia, which takes the part along at the "
+        "ends of the play, without bounce"
+    )
+    SOURCE = "Nordin and Gutman, Automatica 38 (2002) 1633"
+    SHOWS = "After each reversal of the force nothing happens for a moment, then a knock."
+
+    effect: Literal["backlash"] = "backlash"
+    play: float = parameter("whole width of the play", "rad", "m", (0.001, 0.1), gt=0)
+    inertia: float = parameter("of the handle", "kg·m²", "kg", (1e-4, 0.5), gt=0)
+
+
+class EndStopRestitution(Effect):
+    """How the ends of the range throw the joint back."""
+
+    DESCRIPTION = "The ends of the range bounce more, or less, than the model's."
+    LAW = "speed after / speed before = restitution; the limit's solver parameters are set so"
+    SOURCE = "Newton's coefficient of restitution"
+    SHOWS = "After a knock at an end the speed is another one than simulated."
+
+    effect: Literal["end_stop_restitution"] = "end_stop_restitution"
+    restitution: float = parameter(
+        "speed after a knock per speed before", "1", "1", (0, 0.8), ge=0, lt=1
+    )

@@ -1,0 +1,188 @@
+"""A joint's effects beyond the three channels in JAX: differentiable in every number.
+
+Units are those of a hinge; for a slide read N, m and kg. Their laws are in `joda.laws`.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import Any, cast
+
+import jax
+import jax.numpy as jnp
+
+from joda import effects
+from joda.component import Component
+from joda.field import jaxfield
+from joda.profile import Channel
+
+Array = jax.Array
+Curve = jaxfield.Channel | jaxfield.Cubics
+register = jax.tree_util.register_dataclass
+
+RIGID = 1e30
+"""Stiffness of bristles that do not give: beyond any row's."""
+
+
+@register
+@dataclass(frozen=True)
+class Directed:
+    """A curve for each direction of motion; `both` directions have the same one twice."""
+
+    positive: Curve
+    negative: Curve
+
+
+@register
+@dataclass(frozen=True)
+class Stribeck:
+    """Friction at rest above that in motion, N·m; its velocity, rad/s; its exponent."""
+
+    curve: Curve
+    velocity: Array
+    exponent: Array
+
+
+@register
+@dataclass(frozen=True)
+class LoadFriction:
+    """Friction per load."""
+
+    coefficient: Array
+
+
+@register
+@dataclass(frozen=True)
+class Presliding:
+    """Bristles: stiffness, N·m/rad; damping, N·m·s/rad; share of friction at which they slip."""
+
+    stiffness: Array
+    damping: Array
+    breakaway: Array
+
+
+@register
+@dataclass(frozen=True)
+class GravityOffset:
+    """Factors of sin q and cos q, N·m: 0 for a slide; a constant force, N: 0 for a hinge."""
+
+    sin: Array
+    cos: Array
+    force: Array
+
+
+@register
+@dataclass(frozen=True)
+class Backlash:
+    """Width of the play, rad; inertia of the handle, kg·m². Without inertia there is no handle."""
+
+    play: Array
+    inertia: Array
+
+
+@register
+@dataclass(frozen=True)
+class AddedInertia:
+    """kg·m²; MJX has it in the joint's armature."""
+
+    inertia: Array
+
+
+@register
+@dataclass(frozen=True)
+class Effects:
+    """A joint's effects, named as in the profile; a pytree whose leaves are numbers.
+
+    An end stop's restitution is in the scene's solver parameters.
+    """
+
+    direction_dependent_damping: Directed | None = None
+    quadratic_damping: Directed | None = None
+    asymmetric_friction: Directed | None = None
+    stribeck_friction: Stribeck | None = None
+    load_dependent_friction: LoadFriction | None = None
+    presliding_friction: Presliding | None = None
+    gravity_offset: GravityOffset | None = None
+    backlash: Backlash | None = None
+    added_inertia: AddedInertia | None = None
+
+    def replace(self, **changes: Any) -> "Effects":
+        """The same with other effects."""
+        return replace(self, **changes)
+
+
+NAMES = tuple(field.name for field in fields(Effects))
+NEUTRAL: dict[str, dict[str, float]] = {
+    "stribeck_friction": {"velocity": 1.0, "exponent": 1.0},
+    "load_dependent_friction": {"coefficient": 0.0},
+    "presliding_friction": {"stiffness": RIGID, "damping": 0.0, "breakaway": 1.0},
+    "gravity_offset": {"sin": 0.0, "cos": 0.0, "force": 0.0},
+    "backlash": {"play": 0.0, "inertia": 0.0},
+    "added_inertia": {"inertia": 0.0},
+}
+"""Numbers with which an effect does nothing."""
+
+NUMBERS = {
+    "load_dependent_friction": LoadFriction,
+    "presliding_friction": Presliding,
+    "gravity_offset": GravityOffset,
+    "backlash": Backlash,
+    "added_inertia": AddedInertia,
+}
+"""Effects that have numbers and no curve."""
+
+WAYS = ("positive", "negative")
+
+
+def from_effects(
+    listed: Collection[effects.Effect],
+    present: Collection[str] | None = None,
+    knots: int = 0,
+    dtype: Any = None,
+) -> Effects:
+    """A profile's effects as arrays.
+
+    Args:
+        listed: the effects.
+        present: names of those that are put there, also where the joint does not have them: they
+            do nothing then. By default those that it has.
+        knots: at least so many places for control points in each curve.
+        dtype: of the arrays; by default JAX's own.
+    """
+    present = {effect.effect for effect in listed} if present is None else present
+    own = {effect.key: effect for effect in listed}
+    put = partial(jnp.asarray, dtype=dtype)
+
+    def curve(*keys: str) -> jaxfield.Channel:
+        parts = tuple(_component(own[key]) for key in keys if key in own)
+        return jaxfield.from_channel(Channel(components=parts), 1, knots, dtype)
+
+    def numbers(name: str) -> dict[str, Array]:
+        effect = own.get(name)
+        return {key: put(getattr(effect, key, none)) for key, none in NEUTRAL[name].items()}
+
+    def make(name: str) -> Any:
+        if name == "stribeck_friction":
+            return Stribeck(curve(name), **numbers(name))
+        if name in NUMBERS:
+            return NUMBERS[name](**numbers(name))
+        return Directed(*(curve(f"{name} {way}", f"{name} both") for way in WAYS))
+
+    return Effects(**{name: make(name) for name in NAMES if name in present})
+
+
+def prepare(own: Effects) -> Effects:
+    """Does once what does not depend on the state."""
+
+    def is_curve(node: Any) -> bool:
+        return isinstance(node, jaxfield.Channel)
+
+    def once(node: Any) -> Any:
+        return jaxfield.prepare(node) if is_curve(node) else node
+
+    return cast(Effects, jax.tree.map(once, own, is_leaf=is_curve))
+
+
+def _component(effect: effects.Effect) -> Component:
+    assert isinstance(effect, effects.CurveEffect)
+    return Component(interval=effect.interval, x=effect.x, y=effect.y)

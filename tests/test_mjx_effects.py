@@ -1,0 +1,237 @@
+"""Effects beyond the three channels in MJX: the plugin's trajectories, batches, derivatives."""
+
+import re
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from jax.flatten_util import ravel_pytree
+from mujoco import mjx
+from test_solo_effects import FAST, cases, check_slopes, profile_of, pushes, run
+
+import joda
+
+jax.config.update("jax_enable_x64", True)
+import joda.mjx  # noqa: E402
+from joda import solo  # noqa: E402
+from joda.field.jaxeffects import NAMES, from_effects  # noqa: E402
+from joda.profile import Channels  # noqa: E402
+
+H, STEPS = 0.004, 300
+JOINTS = {"arm": "hinge", "drawer": "slide"}
+SCENE = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="{h}" integrator="{integrator}" iterations="50" ls_iterations="50"
+          tolerance="1e-14"/>
+  <worldbody>
+    <body name="arm"><joint name="arm" axis="0 1 0" range="-0.2 1.3"/>
+      <geom type="capsule" fromto="0 0 0 0.5 0 0" size="0.03" mass="0.1" contype="0"
+            conaffinity="0"/></body>
+    <body name="drawer" pos="0 1 -0.3" euler="0 0.1 0">
+      <joint name="drawer" type="slide" axis="1 0 0" range="0 0.3"/>
+      <geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.03" mass="0.5" contype="0"
+            conaffinity="0"/></body>
+  </worldbody>
+</mujoco>"""
+FORCES = {"arm": 0.6, "drawer": 3.0}
+"""What is strong for the joint, N·m and N."""
+
+
+CASES = list(cases("hinge", 1, 1, 1))
+SPANS = np.array([1.5, 0.3])
+LOW = np.array([-0.2, 0.0])
+
+
+class Scene:
+    """The two joints with the effects of a case: the plugin's motion and that of MJX."""
+
+    found: ClassVar = {}
+
+    def __init__(self, folder, case, integrator="Euler"):
+        path = folder / "bare.xml"
+        path.write_text(SCENE.format(h=H, integrator=integrator))
+        self.profiles = {}
+        for name, kind in JOINTS.items():
+            if name not in self.found:
+                self.found[name] = joda.context(path, name)
+            found, force = self.found[name], FORCES[name]
+            lo, hi = found.joint.range
+            own = cases(kind, force, found.equivalent_inertia, 0.03 * (hi - lo))[case]
+            self.profiles[name] = profile_of(found.joint, own, force)
+            joda.attach(path, self.profiles[name], folder / f"{name}.xml", force=True)
+            path = folder / f"{name}.xml"
+        self.model = mujoco.MjModel.from_xml_path(str(path))
+        # one program for all cases; MJX runs no plugins
+        self.m = mjx.put_model(self.model).replace(npluginstate=0)
+        self.fields = joda.mjx.put_fields(self.model, self.profiles, effects=NAMES)
+
+    def start(self, part=0.4):
+        """Data with both joints at this part of their range."""
+        d = mjx.make_data(self.m).replace(qpos=jnp.array(LOW + part * SPANS))
+        return joda.mjx.put_state(self.m, d, self.fields)
+
+    def plugin(self, forces):
+        """Positions, shape (steps, 2), and states, shape (steps, 2, 3), by the plugin."""
+        d, positions, states = mujoco.MjData(self.model), [], []
+        d.qpos[:] = LOW + 0.4 * SPANS
+        bodies = [self.model.joint(name).bodyid[0] for name in JOINTS]
+        instances = self.model.body_plugin[bodies]
+        size = self.model.plugin_statenum[instances[0]]
+        for force in forces:
+            d.qfrc_applied[:] = force
+            mujoco.mj_step(self.model, d)
+            positions.append(d.qpos.copy())
+            parts = [d.plugin_state[k : k + size] for k in self.model.plugin_stateadr[instances]]
+            states.append(np.pad(parts, ((0, 0), (0, 3 - size))))
+        return np.array(positions), np.array(states)
+
+    def mjx(self, forces):
+        """The same by MJX; handles without backlash have no state."""
+        q, held, handles = roll(self.m, self.start(), self.fields, jnp.array(forces))[1]
+        rows = [field.place.friction_row for field in self.fields.values()]
+        states = np.concatenate([held[:, rows, None], handles.reshape(-1, 2, 2)], axis=2)
+        if not any(e.effect == "backlash" for e in self.profiles["arm"].effects):
+            states[:, :, 1:] = 0
+        return np.array(q), states
+
+
+roll = jax.jit(
+    partial(joda.mjx.rollout, read=lambda d: (d.qpos, d._impl.efc_force, d.userdata)),
+    compiler_options=FAST,
+)
+
+
+def random_forces():
+    return np.stack([pushes(f, STEPS * H, H, k) for k, f in enumerate(FORCES.values())], 1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("scenes")
+
+
+def check_states(actual, expected):
+    """Friction as part of a strong force, handles as part of the range and per step."""
+    force = np.array(list(FORCES.values()))
+    scales = np.stack([1e3 * force, SPANS, SPANS / H], axis=1)
+    assert np.abs((actual - expected) / scales).max() < 1e-6
+
+
+# --- trajectories
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+@pytest.mark.parametrize("case", CASES)
+def test_trajectories_are_the_plugins(folder, case, integrator):
+    scene = Scene(folder, case, integrator)
+    forces = random_forces()
+    positions, states = scene.plugin(forces)
+    found, found_states = scene.mjx(forces)
+    assert (np.abs(found - positions).max(0) < 2e-8 * SPANS).all()
+    check_states(found_states, states)
+    assert (np.ptp(positions, axis=0) > 0.4 * SPANS).all()
+
+    if integrator == "Euler":  # and the joints by themselves
+        for k, name in enumerate(JOINTS):
+            place, profile = scene.fields[name].place, scene.profiles[name]
+            joint = solo.from_context(scene.found[name], profile, scene.model, place.joint)
+            joint = replace(joint, effects=from_effects(profile.effects, NAMES))
+            start = (jnp.array(x) for x in (LOW[k] + 0.4 * SPANS[k], 0.0, 0.0))
+            path = run(joint, solo.State(*start), jnp.array(forces[:, k]), H)
+            assert np.abs(path.q - found[:, k]).max() < 2e-8 * SPANS[k]
+
+
+def test_joints_with_different_effects_stand_side_by_side(folder):
+    """Each does what it does beside one with the same effects; only what is there is computed."""
+    forces = random_forces()
+    both = [Scene(folder, case) for case in ("asymmetric_friction", "presliding_friction")]
+    alone = [scene.mjx(forces)[0][:, k] for k, scene in enumerate(both)]
+    mixed = {n: scene.profiles[n] for n, scene in zip(JOINTS, both, strict=True)}
+    fields = joda.mjx.put_fields(both[0].model, mixed)
+    assert fields["arm"].effects.backlash is None
+    d = mjx.make_data(both[0].m).replace(qpos=jnp.array(LOW + 0.4 * SPANS))
+    found = roll(both[0].m, d, fields, jnp.array(forces))[1][0]
+    assert (np.abs(found - np.stack(alone, 1)).max(0) < 1e-9 * SPANS).all()
+
+
+def test_a_batch_of_effects_is_its_environments_one_by_one(folder):
+    scenes = [Scene(folder, case) for case in ("stribeck_friction", "prandtl", "backlash")]
+    forces = jnp.array(random_forces())
+    alone = [np.array(scene.mjx(forces)[0]) for scene in scenes]
+    many = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(scene.fields for scene in scenes))
+    d, m = scenes[0].start(), scenes[0].m
+    batch = jax.jit(
+        jax.vmap(partial(joda.mjx.rollout, read=lambda d: d.qpos), in_axes=(None, None, 0, None)),
+        compiler_options=FAST,
+    )
+    together = batch(m, d, many, forces)[1]
+    assert (np.abs(together - np.array(alone)).max((0, 1)) < 1e-8 * SPANS).all()
+
+
+def test_the_example_of_the_docs(folder):
+    scene = Scene(folder, "stribeck_friction")
+    text = (Path(__file__).parents[1] / "docs/mjx.md").read_text()
+    (code,) = re.findall(r"```py\n(.*?)```", text, re.DOTALL)
+    names = {"jax": jax, "jnp": jnp, "joda": joda, "mjx": mjx, "model": scene.model}
+    names |= {"m": scene.m, "fields": {"knob": scene.fields["arm"]}, "torque": None}
+    names["rollout"] = lambda m, d, fields, torque: (d, (fields, m))
+    exec(code, names)
+    assert names["d"].userdata.shape == (2,)
+    velocity = names["angle"]["knob"].effects.stribeck_friction.velocity
+    np.testing.assert_array_equal(velocity, [0.05, 0.1, 0.2])
+
+
+# --- derivatives
+
+
+def test_derivatives_by_all_numbers_are_those_of_central_differences(folder):
+    """Of the hinge; `test_solo_effects.py` has those of a slide."""
+    scene = Scene(folder, "all")
+    scene.model.opt.tolerance = 1e-30
+    m, d, t = mjx.put_model(scene.model), scene.start(0.02), H * np.arange(250)
+    swing = np.stack([3.6 * np.sin(2 * np.pi * t) + 0.18, 4.5 * np.sin(2 * np.pi * t / 0.6)], 1)
+    values, back = ravel_pytree(scene.fields["arm"].effects)
+
+    def positions(values):
+        fields = scene.fields | {"arm": scene.fields["arm"].replace(effects=back(values))}
+        return joda.mjx.rollout(m, d, fields, jnp.array(swing), read=lambda d: d.qpos[0])[1]
+
+    run = jax.jit(lambda x, along: jax.jvp(positions, (x,), (along,)), compiler_options=FAST)
+    path = (run(values, 0 * values)[0] - LOW[0]) / SPANS[0]
+    assert path.min() > 0 and path.max() < 1 and np.ptp(path) > 0.8
+    check_slopes(run, values, back)
+
+
+# --- state
+
+
+def test_backlash_without_state_is_refused(folder):
+    scene = Scene(folder, "backlash")
+    d = mjx.make_data(scene.m)
+    with pytest.raises(joda.JodaError, match=r"no state for it; call d = joda.mjx.put_state\(m"):
+        joda.mjx.step(scene.m, d, scene.fields)
+
+
+def test_the_state_is_behind_the_users_own_data(folder):
+    scene = Scene(folder, "backlash")
+    m = scene.m.replace(nuserdata=3)
+    d = mjx.make_data(scene.m).replace(userdata=jnp.arange(3.0))
+    d = joda.mjx.put_state(m, d, scene.fields)
+    np.testing.assert_array_equal(d.userdata, [0, 1, 2, 0, 0, 0, 0])
+    none = joda.mjx.put_fields(scene.model, {})
+    assert joda.mjx.put_state(m, d, none).userdata.shape == (3,)
+
+
+def test_an_effect_on_friction_needs_the_row(folder):
+    scene = Scene(folder, "all")
+    scene.model.dof_frictionloss[:] = 0
+    profile = scene.profiles["arm"].model_copy(update={"channels": Channels()})
+    with pytest.raises(joda.JodaError, match=r"'arm' has friction .* add frictionloss="):
+        joda.mjx.put_fields(scene.model, {"arm": profile})
