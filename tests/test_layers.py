@@ -21,8 +21,11 @@ LAYERS = [
     {"studio", "_context"},
     {"_attach", "_compile", "draw", "suspicions"},  # stages, never each other
     # what combines them
+    {"native", "page"},
     {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx", "parameters"},
-    {"behaviour", "_templates", "solo"},
+    {"behaviour", "_templates", "replay", "solo"},
+    {"comparison"},
+    {"_compare"},
     {"stretches"},
     {"misfit"},
     {"fitting"},

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from joda import JodaError
-from joda.runs import read_run
+from joda.runs import QuasiStatic, Run, read_measurement, read_run
 
 HEAD = "time,position,force\n"
 ROWS = "0,0.1,1\n0.1,0.2,2\n0.3,0.3,\n0.4,0.5,4\n"
@@ -60,7 +60,7 @@ def test_without_a_force_column_none_was_applied(tmp_path):
         (HEAD + ROWS.replace("0.3,0.3", "0.05,0.3"), "line 4: time does not increase"),
         ("time,time,position\n" + ROWS, "line 1: column 'time' is there twice"),
         (HEAD + ROWS.replace(",2\n", "\n"), "line 3: 2 cells, the header has 3 columns"),
-        (HEAD + "0,1,2\n1,1,2\n2,1,2\n", "3 samples; a run needs at least 4"),
+        (HEAD + "0,1,2\n1,1,2\n2,1,2\n", "3 samples; a measurement needs at least 4"),
         (b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "run.csv"),
     ],
 )
@@ -74,3 +74,46 @@ def test_a_file_that_is_no_run_is_refused_with_its_place(text, said, tmp_path):
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(JodaError, match=r"none\.csv"):
         read_run(tmp_path / "none.csv")
+
+
+CURVE = "position,force\n0,1\n0.2,1.5\n0.4,2\n0.2,0.5\n"
+
+
+def measurement(folder, text):
+    path = folder / "curve.csv"
+    path.write_text(text)
+    return read_measurement(path)
+
+
+def test_a_file_without_time_is_a_quasi_static_curve_in_the_order_measured(tmp_path):
+    curve = measurement(tmp_path, "# by hand\n" + CURVE)
+    assert isinstance(curve, QuasiStatic)
+    assert curve.name == "curve.csv"
+    np.testing.assert_array_equal(curve.position, [0, 0.2, 0.4, 0.2])
+    np.testing.assert_array_equal(curve.force, [1, 1.5, 2, 0.5])
+
+
+def test_a_file_with_time_is_a_run(tmp_path):
+    run = measurement(tmp_path, HEAD + ROWS)
+    assert isinstance(run, Run)
+    np.testing.assert_array_equal(run.time, [0, 0.1, 0.3, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("position\n1\n2\n3\n4\n", "no column 'force'; it has position, and without time"),
+        ("force\n1\n2\n3\n4\n", "no column 'position'; it has force"),
+        ("1,2\n3,4\n", "no header row with time and position (or position and force)"),
+        (CURVE.replace("0.4,2", "0.4,"), "line 4: force is empty; fill it in or leave the row out"),
+        (CURVE.replace("0.4,2", ",2"), "line 4: position is empty"),
+        (CURVE.replace("0.4,2", "0.4,high"), "line 4: force is 'high'; it must be a number"),
+        ("position,force\n0,1\n1,1\n", "2 samples; a measurement needs at least 4"),
+        ("time,force\n1,2\n", "no column 'position'; it has time, force"),
+    ],
+)
+def test_a_file_that_is_neither_is_refused_with_its_place(text, said, tmp_path):
+    with pytest.raises(JodaError) as error:
+        measurement(tmp_path, text)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)

@@ -13,6 +13,7 @@ from joda.plugin import load, plugin_path
 if TYPE_CHECKING:
     from joda._attach import attach
     from joda._bench import bench
+    from joda._compare import compare
     from joda._compile import compile
     from joda._context import context
     from joda._demo import demo
@@ -38,6 +39,7 @@ __all__ = [
     "Profile",
     "attach",
     "bench",
+    "compare",
     "compile",
     "context",
     "demo",
@@ -57,6 +59,7 @@ __all__ = [
 COMMANDS = (
     "attach",
     "bench",
+    "compare",
     "compile",
     "context",
     "demo",

@@ -28,12 +28,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-COLOURS = {
-    "conservative": "#c8202f",
-    "friction": "#d98c1f",
-    "damping": "#1f8a70",
-    "effects": "#6b4fa0",
-}
+COLOURS = {"conservative": "#c8202f", "friction": "#d98c1f", "damping": "#1f8a70"}
+EFFECTS = "#6b4fa0"
 GRAVITY = "#1f5fbf"
 INK = "#333333"
 
@@ -210,7 +206,7 @@ def _component_strip(figure: "Figure", axes: "Axes", profile: Profile) -> None:
         rule = "\n(max)" if channel.combine == "max" and len(bars) > 1 else ""
         row = _bars(figure, axes, profile, name + rule, COLOURS[name], bars, row)
     effects = [(e.described(), getattr(e, "interval", (0, 1))) for e in profile.effects]
-    row = _bars(figure, axes, profile, "effects", COLOURS["effects"], effects, row)
+    row = _bars(figure, axes, profile, "effects", EFFECTS, effects, row)
     if not row:
         _note(axes, "no components")
     axes.set_ylim(max(row, 1) - 0.5, -0.5)

@@ -1,4 +1,4 @@
-"""Measured motions of a joint, one CSV file each: time, position, and what else was recorded."""
+"""Measurements of a joint, one CSV file each: timed runs, and quasi-static curves."""
 
 import csv
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 COLUMNS = ("time", "position", "velocity", "force")
 LEAST = 4
-"""Fewest samples that make a run."""
+"""Fewest samples that make a run or a curve."""
 
 
 @dataclass(frozen=True)
@@ -41,35 +41,50 @@ class Run:
     forced: bool
 
 
-def read_run(path: str | Path) -> Run:
-    """Reads a timed run.
+@dataclass(frozen=True)
+class QuasiStatic:
+    """Force against position, as with a hand-held gauge; arrays have shape (n,).
+
+    Attributes:
+        name: of its file.
+        position: rad or m, in the order measured: the direction of travel follows from it.
+        force: that slowly moves the joint there, N·m or N.
+    """
+
+    name: str
+    position: Array
+    force: Array
+
+
+def read_measurement(path: str | Path) -> Run | QuasiStatic:
+    """Reads a timed run or, where there is no column `time`, a quasi-static curve.
 
     Args:
-        path: CSV with a header row: `time` and `position`, optionally `velocity` and `force`; other
-            columns are ignored, lines beginning with # are comments.
+        path: CSV with a header row: `time` and `position`, optionally `velocity` and `force`; or
+            `position` and `force`. Other columns are ignored, lines beginning with # are comments.
 
     Returns:
-        the run.
+        the run or the curve.
 
     Raises:
         JodaError: it cannot be read; file, line and column are named.
     """
     path = Path(path)
     lines, columns = _table(path)
-    for name in ("time", "position"):
-        if name not in columns:
-            raise JodaError(
-                f"{path}: no column '{name}'; it has {', '.join(columns) or 'none'}, and a run "
-                "needs time (s) and position (rad or m)."
-            )
-    if len(lines) < LEAST:
-        raise JodaError(f"{path}: {len(lines)} samples; a run needs at least {LEAST}.")
-    for name in ("time", "position", "velocity"):
-        missing = np.flatnonzero(np.isnan(columns.get(name, np.zeros(1))))
-        if len(missing):
-            raise JodaError(
-                f"{path}, line {lines[missing[0]]}: {name} is empty; only force may be."
-            )
+    return _run(path, lines, columns) if "time" in columns else _curve(path, lines, columns)
+
+
+def read_run(path: str | Path) -> Run:
+    """Reads a timed run, as `read_measurement` does; a file without time is refused."""
+    path = Path(path)
+    lines, columns = _table(path)
+    return _run(path, lines, columns)
+
+
+def _run(path: Path, lines: list[int], columns: dict[str, Array]) -> Run:
+    needs = "a run needs time (s) and position (rad or m)"
+    _complete(path, lines, columns, ("time", "position"), needs)
+    _filled(path, lines, columns, ("time", "position", "velocity"), "only force may be")
     time = columns["time"]
     back = np.flatnonzero(np.diff(time) <= 0)
     if len(back):
@@ -83,6 +98,38 @@ def read_run(path: str | Path) -> Run:
         force=columns.get("force", np.zeros(len(time))),
         forced="force" in columns,
     )
+
+
+def _curve(path: Path, lines: list[int], columns: dict[str, Array]) -> QuasiStatic:
+    needs = (
+        "without time it is a quasi-static curve, which needs position (rad or m) and force "
+        "(N·m or N); a timed run needs time (s)"
+    )
+    _complete(path, lines, columns, ("position", "force"), needs)
+    _filled(path, lines, columns, ("position", "force"), "fill it in or leave the row out")
+    return QuasiStatic(path.name, columns["position"], columns["force"])
+
+
+def _complete(
+    path: Path, lines: list[int], columns: dict[str, Array], names: tuple[str, ...], needs: str
+) -> None:
+    """Raises JodaError where a column or samples are missing."""
+    for name in names:
+        if name not in columns:
+            has = ", ".join(columns) or "none"
+            raise JodaError(f"{path}: no column '{name}'; it has {has}, and {needs}.")
+    if len(lines) < LEAST:
+        raise JodaError(f"{path}: {len(lines)} samples; a measurement needs at least {LEAST}.")
+
+
+def _filled(
+    path: Path, lines: list[int], columns: dict[str, Array], names: tuple[str, ...], remedy: str
+) -> None:
+    """Raises JodaError where a cell is empty."""
+    for name in names:
+        missing = np.flatnonzero(np.isnan(columns.get(name, np.zeros(1))))
+        if len(missing):
+            raise JodaError(f"{path}, line {lines[missing[0]]}: {name} is empty; {remedy}.")
 
 
 def write_run(path: Path, run: Run) -> None:
@@ -105,7 +152,8 @@ def _table(path: Path) -> tuple[list[int], dict[str, Array]]:
     names = [name.strip().lower() for name in header]
     if not set(names) & set(COLUMNS):
         raise JodaError(
-            f"{path}: no header row with time and position; the first row must name the columns."
+            f"{path}: no header row with time and position (or position and force); the first row "
+            "must name the columns."
         )
     for name in COLUMNS:
         if names.count(name) > 1:

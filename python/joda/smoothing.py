@@ -17,6 +17,7 @@ WINDOWS = (0.02, 0.03, 0.045, 0.07)
 """Half widths (s) that are tried, from the narrowest on."""
 LEAST = 7
 """Fewest samples in a window."""
+REST = 2.0
 CONFIDENCE = 1.0
 """Half width of the intervals, in standard deviations."""
 
@@ -37,6 +38,11 @@ class Smooth:
     velocity: Array
     position_error: Array
     velocity_error: Array
+
+
+def rests(velocity: float, error: float) -> bool:
+    """Whether a joint at the beginning of a run counts as at rest: within twice the error."""
+    return abs(velocity) < REST * error
 
 
 def noise(time: Array, position: Array) -> float:

@@ -18,10 +18,8 @@ Traced = Any
 
 LEAST = 4
 """Fewest samples of a stretch."""
-REST = 2.0
-"""A run whose first velocity is less than so many of its standard deviations begins at rest."""
 SURE = 0.1
-"""Share of the standard deviation that is left then."""
+"""Share of the velocity's standard deviation that is left where a run begins at rest."""
 
 
 @partial(
@@ -97,7 +95,7 @@ def cut(runs: Sequence[Run], h: float, sigma: float, window: float | None) -> St
                     continue
                 rows.append(_row(time - start, position, force, inside, h, round(length / h)))
                 velocity, doubt = begun.velocity[k], begun.velocity_error[k]
-                if k == 0 and abs(velocity) < REST * doubt:
+                if k == 0 and smoothing.rests(velocity, doubt):
                     velocity, doubt = 0.0, SURE * doubt
                 starts.append((begun.position[k], velocity))
                 doubts.append((begun.position_error[k], doubt))

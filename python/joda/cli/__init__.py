@@ -5,7 +5,7 @@ import sys
 import typer
 
 from joda.cli.make import attach, compile, demo, generate, revise
-from joda.cli.measure import bench, refine
+from joda.cli.measure import bench, compare, refine
 from joda.cli.observe import context, plot, render
 from joda.cli.reference import schema, templates
 from joda.errors import JodaError
@@ -22,8 +22,8 @@ app = typer.Typer(
 )
 
 for command in (
-    demo, attach, compile, context, generate, revise, plot, refine, render, bench, schema,
-    templates,
+    demo, attach, compile, context, generate, revise, plot, compare, refine, render, bench,
+    schema, templates,
 ):  # fmt: skip
     app.command()(command)
 

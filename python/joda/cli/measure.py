@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from joda.cli.options import Force, Joint, Json, Scene
+from joda.cli.options import Force, Joint, Json, Model, Scene
 from joda.cli.progress import loss_bar, spinner
 from joda.cli.tell import (
     print_json,
@@ -71,6 +71,41 @@ def refine(
     for note in result.notes:
         print(note)
     for path in (result.scene, result.composed, result.picture, result.history):
+        print(path)
+
+
+def compare(
+    model: Model,
+    runs: Annotated[list[Path], typer.Argument(help="Measured runs (CSV: time, position, force).")],
+    joint: Joint,
+    as_json: Annotated[
+        Path | None, typer.Option("--json", help="Write all numbers to this file.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Write an HTML page with pictures to this file.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Replay measured runs in the model: how far off it is, and where it fails.
+
+    Example:
+
+        joda compare scene.xml run1.csv run2.csv --joint door --report compare.html
+    """
+    from joda import compare as run
+    from joda.comparison import sentences
+
+    with spinner("compare") as progress:
+        found = run(
+            model, joint, runs, json=as_json, report=report, picture=output, force=force,
+            progress=progress,
+        )  # fmt: skip
+    for sentence in (*found.notes, *sentences(found)):
+        print(sentence)
+    for path in filter(None, (as_json, report, output)):
         print(path)
 
 

@@ -1,0 +1,289 @@
+"""A model against measurements: its errors against the noise, and where it fails."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from json import dumps
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda import smoothing
+from joda._context import Context, context
+from joda.errors import JodaError
+from joda.model import describe_joint, find_joint, joint_name, load
+from joda.native import whole_profile
+from joda.profile import Profile
+from joda.replay import Replayer, Window
+from joda.runs import Run, read_run
+from joda.scene import profiles_of
+from joda.suspicions import suspicions
+
+Array = NDArray[np.float64]
+By = Literal["position", "velocity", "direction", "time", "load"]
+
+SHORT = 0.1
+"""Length of the windows that tell where a model fails, s."""
+BINS = 10
+LEAST = 3
+"""Fewest windows in a bin that can be significant."""
+CERTAIN = 5.0
+"""Standard deviations above what noise makes, from which an error counts as significant."""
+NOTICEABLE = 1.2
+"""Least error of a bin, in units of the noise."""
+
+
+@dataclass(frozen=True)
+class RunError:
+    """Errors of one run, rad or m.
+
+    Attributes:
+        file: its name.
+        rmse: of an open-loop replay of the whole run from its measured start.
+        rmse_window: of windows of 0.4 s from fresh measured starts.
+        noise_floor: the measurement's noise: no model gets below it.
+    """
+
+    file: str
+    rmse: float
+    rmse_window: float
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class Failing:
+    """Where the model fails.
+
+    Attributes:
+        by: what is told apart.
+        interval: of it: normalised position, rad/s or m/s, -1 to 0 or 0 to 1 (direction), s, N·m
+            or N.
+        error: RMS position error of windows of 0.1 s there, rad or m.
+        force: mean force that the model has too much there, N·m or N.
+        share: of the sum of squared errors beyond the noise, 0 to 1.
+        significant: whether noise alone would hardly ever make such an error.
+    """
+
+    by: By
+    interval: tuple[float, float]
+    error: float
+    force: float
+    share: float
+    significant: bool
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model against measured runs.
+
+    Attributes:
+        joint: its name.
+        unit: of position, rad or m.
+        runs: errors by run.
+        rmse, rmse_window, noise_floor: of all runs together, rad or m.
+        failing: where it fails, the largest share first.
+        notes: what is suspicious about the data, a sentence each.
+    """
+
+    joint: str
+    unit: str
+    runs: tuple[RunError, ...]
+    rmse: float
+    rmse_window: float
+    noise_floor: float
+    failing: tuple[Failing, ...]
+    notes: tuple[str, ...]
+
+    def to_json(self) -> str:
+        """The comparison as JSON."""
+        content = {
+            "joint": self.joint,
+            "unit": self.unit,
+            "runs": [vars(run) for run in self.runs],
+            **{key: getattr(self, key) for key in ("rmse", "rmse_window", "noise_floor")},
+            "failing": [vars(place) for place in self.failing],
+            "notes": list(self.notes),
+        }
+        return dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A joint of a model with measured runs.
+
+    Attributes:
+        context: of the joint.
+        profile: all that acts on it (`joda.native`).
+        replayer: of that profile.
+        runs: measured.
+        sigma: noise of each run's position, rad or m.
+        notes: what is suspicious about them.
+    """
+
+    context: Context
+    profile: Profile
+    replayer: Replayer
+    runs: tuple[Run, ...]
+    sigma: tuple[float, ...]
+    notes: tuple[str, ...]
+
+
+def sentences(comparison: Comparison) -> list[str]:
+    """The comparison for a person: how far off, where most."""
+    unit, floor = comparison.unit, comparison.noise_floor
+    out = [
+        f"Whole runs are missed by {comparison.rmse:.3g} {unit} RMS, windows of 0.4 s by "
+        f"{comparison.rmse_window:.3g} {unit}; the measurement's noise is {floor:.2g} {unit}."
+    ]
+    if not comparison.failing:
+        out.append("Nothing beyond the noise: these runs show no fault of the model.")
+    force = "N·m" if unit == "rad" else "N"
+    for place in comparison.failing[:6]:
+        a, b = place.interval
+        where = {
+            "position": f"at s = {a:.2f} to {b:.2f}",
+            "velocity": f"at {a:.3g} to {b:.3g} {unit}/s",
+            "direction": "while moving towards " + ("+q" if b > 0 else "\N{MINUS SIGN}q"),
+            "time": f"at {a:.3g} to {b:.3g} s",
+            "load": f"under a load of {a:.3g} to {b:.3g} {force}",
+        }[place.by]
+        much = "much" if place.force > 0 else "little"
+        out.append(
+            f"By {place.by}: {100 * place.share:.0f} % of the error is {where}, where the model "
+            f"pushes {abs(place.force):.2g} {force} too {much} towards +q in the mean."
+        )
+    return out
+
+
+def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
+    """Reads a joint and its runs; raises JodaError, also for runs that cannot be of this joint."""
+    if not runs:
+        raise JodaError("no runs; give at least one CSV file with time and position.")
+    source = Path(model)
+    spec, compiled = load(source)
+    number = find_joint(compiled, joint)
+    name = joint_name(compiled, number)
+    found = context(source, name)
+    bare = Profile(joint=describe_joint(compiled, number))
+    profile = whole_profile(compiled, number, profiles_of(spec, compiled).get(name, bare))
+    read = tuple(read_run(path) for path in runs)
+    doubts = [doubt for run in read for doubt in suspicions(run, found)]
+    for doubt in doubts:
+        if doubt.fatal:
+            raise JodaError(doubt.sentence)
+    least = 1e-6 * float(np.ptp(profile.joint.range))
+    return Measured(
+        context=found,
+        profile=profile,
+        replayer=Replayer(found, profile, compiled, number),
+        runs=read,
+        sigma=tuple(max(smoothing.noise(run.time, run.position), least) for run in read),
+        notes=tuple(doubt.sentence for doubt in doubts),
+    )
+
+
+def failing(measured: Measured) -> list[Failing]:
+    """Where windows of 0.1 s are missed by more than noise, the largest share first."""
+    rows = window_rows(measured)
+    if not len(rows):
+        return []
+    values, found = rows[:, :5], rows[:, 5:]
+    beyond = np.maximum(found[:, 2] - found[:, 1], 0.0)
+    out = []
+    for column, by in enumerate(("position", "velocity", "direction", "time", "load")):
+        out += _by(by, values[:, column], found, beyond)  # type: ignore[arg-type]
+    return sorted(out, key=lambda place: (not place.significant, -place.share))
+
+
+FORCE = 8
+"""Column of `_rows`: force too much; the next is its standard deviation."""
+
+
+def window_rows(measured: Measured) -> Array:
+    """A row per window of 0.2 s.
+
+    Columns: normalised position, velocity, direction / 2, time, load; RMS misfit, samples, sum of
+    squares in units of the noise, force too much, its standard deviation.
+    """
+    lo, hi = measured.profile.joint.range
+    found = measured.context
+    rows = []
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        for window in measured.replayer.windows(run, sigma, SHORT):
+            ends = window.samples[[0, -1]]
+            middle = run.position[window.samples].mean()
+            speed = float(np.diff(run.position[ends])[0] / np.diff(run.time[ends])[0])
+            gravity = np.interp(middle, found.positions, found.gravity_force)
+            load = run.force[window.samples].mean() + gravity
+            place = (middle - lo) / (hi - lo)
+            square = np.sum(window.misfit**2) / sigma**2
+            row = [place, speed, np.sign(speed) * 0.5, run.time[ends].mean(), load]
+            row += [rms(window.misfit), len(window.misfit), square, window.force, window.doubt]
+            rows.append(row)
+    return np.array(rows).reshape(-1, 10)
+
+
+def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
+    """Neighbouring bins of one quantity that fail, as intervals."""
+    edges = _edges(by, values)
+    if not beyond.sum():
+        return []
+    bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    bad = [_significant(found[bins == k]) for k in range(len(edges) - 1)]
+    out, first = [], None
+    for k in range(len(bad) + 1):
+        ends = k == len(bad) or not bad[k] or (by in ("velocity", "load") and edges[k] == 0)
+        if first is not None and ends:
+            inside = (bins >= first) & (bins < k)
+            rows = found[inside]
+            out.append(
+                Failing(
+                    by=by,
+                    interval=(float(edges[first]), float(edges[k])),
+                    error=float(np.sqrt(np.average(rows[:, 0] ** 2, weights=rows[:, 1]))),
+                    force=float(np.average(rows[:, 3], weights=rows[:, 4] ** -2.0)),
+                    share=float(beyond[inside].sum() / beyond.sum()),
+                    significant=True,
+                )
+            )
+            first = None
+        if first is None and k < len(bad) and bad[k]:
+            first = k
+    return out
+
+
+def _edges(by: By, values: Array) -> Array:
+    """Of the bins: even, and never on both sides of zero where the sign is a direction."""
+    if by == "direction":
+        return np.array([-1.0, 0.0, 1.0])
+    if by == "position":
+        return np.linspace(0, 1, BINS + 1)
+    lo, hi = float(values.min()), float(values.max()) + 1e-9
+    if by == "time" or lo * hi >= 0:
+        return np.linspace(lo, hi, BINS + 1)
+    below = min(max(round(BINS * lo / (lo - hi)), 1), BINS - 1)
+    return np.concatenate([np.linspace(lo, 0, below + 1), np.linspace(0, hi, BINS - below + 1)[1:]])
+
+
+def _significant(rows: Array) -> bool:
+    """Whether the windows' sum of squares is beyond what noise makes, and the error noticeable.
+
+    Without the worst window: one that begins in a knock may have a wrong start.
+    """
+    if len(rows) < LEAST:
+        return False
+    kept = np.argsort(rows[:, 2] / rows[:, 1])[:-1]
+    samples, squares = rows[kept, 1].sum(), rows[kept, 2].sum()
+    certain = squares > samples + CERTAIN * np.sqrt(2 * samples)
+    return bool(certain and squares > NOTICEABLE**2 * samples)
+
+
+def joined(windows: Sequence[Window]) -> Array:
+    """The misfits of all windows."""
+    return np.concatenate([window.misfit for window in windows] or [np.zeros(0)])
+
+
+def rms(values: Array) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
