@@ -27,6 +27,8 @@ STEP = 0.005
 SECONDS = 2.0
 NOISE = 5e-4
 """Of the measured position, as a part of the range."""
+PACES = (4.0, 2.0, 1.0)
+"""A slow run, a faster one, a fast one: together they tell friction from damping."""
 NEAR = 0.01
 """How far from a jump curves are compared."""
 
@@ -190,12 +192,15 @@ def planted(name: str, seed: int) -> Planted:
     true = profile(interval, lambda: 1.0)
     start = profile(at, lambda: 2 ** rng.uniform(-1, 1))
     model = quiet_rig(found, true)
-    runs = [measured(pushed(model, span, force, rng), span, rng, True) for _ in range(3)]
+    runs = [measured(pushed(model, span, force, rng, pace), span, rng, True) for pace in PACES]
     return Planted(found, true, start, runs)
 
 
-def pushed(model: mujoco.MjModel, span: float, force: float, rng, seconds: float = 6.0):
-    """A hand pushes the joint to and fro between random places, at random speeds, all recorded."""
+def pushed(model: mujoco.MjModel, span: float, force: float, rng, pace=1.0, seconds: float = 8.0):
+    """A hand pushes the joint to and fro between random places, at random speeds, all recorded.
+
+    `pace` times 0.3 to 1.2 s are taken from one end to the other.
+    """
     data = mujoco.MjData(model)
     data.qpos[0] = rng.uniform(0.1, 0.9) * span
     mujoco.mj_forward(model, data)
@@ -206,7 +211,7 @@ def pushed(model: mujoco.MjModel, span: float, force: float, rng, seconds: float
     low = bool(places[0] > 0.5)
     while times[-1] < seconds:
         places.append(rng.uniform(0.0, 0.12) if low else rng.uniform(0.88, 1.0))
-        times.append(times[-1] + rng.uniform(0.3, 1.2))
+        times.append(times[-1] + pace * rng.uniform(0.3, 1.2))
         low = not low
     out = []
     for k in range(round(seconds / STEP) + 1):
