@@ -19,7 +19,7 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 import numpy as np
 
-from joda.effects import AddedInertia, EndStopRestitution
+from joda.effects import EndStopRestitution
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes
 from joda.limits import limit_parameters
@@ -300,7 +300,7 @@ class _Scene:
         """The armature with the profile's added inertia, without that of the one it replaces."""
         name = joint_name(self.model, joint)
         replaced = profiles_of(self.spec, self.model).get(name)
-        before, after = (_added_inertia(one) for one in (replaced, profile))
+        before, after = replaced.added_inertia if replaced else 0.0, profile.added_inertia
         if before == after:
             return {}
         own = float(self.model.dof_armature[self.model.jnt_dofadr[joint]])
@@ -323,11 +323,6 @@ class _Scene:
         body = self.model.body(self.model.jnt_bodyid[joint]).name or "unnamed"
         base = re.sub(r"\W+", "_", f"{body}_joint")
         return next(n for n in (base, *(f"{base}{k}" for k in range(10**6))) if n not in self.names)
-
-
-def _added_inertia(profile: Profile | None) -> float:
-    effects = profile.effects if profile else ()
-    return sum(effect.inertia for effect in effects if isinstance(effect, AddedInertia))
 
 
 def _verify(output: Path, content: bytes, before: mujoco.MjModel, heavier: bool) -> None:

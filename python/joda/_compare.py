@@ -77,6 +77,7 @@ def compare(
         rows.append(RunError(run.name, rms(whole), rms(left), sigma))
         wholes.append(whole)
         windows.append(left)
+    short = window_rows(measured)
     floor = float(np.sqrt(np.mean(np.square(measured.sigma))))
     comparison = Comparison(
         joint=measured.profile.joint.name,
@@ -85,13 +86,13 @@ def compare(
         rmse=rms(np.concatenate(wholes)),
         rmse_window=rms(np.concatenate(windows)),
         noise_floor=floor,
-        failing=tuple(failing(measured)),
+        failing=tuple(failing(short)),
         notes=measured.notes,
     )
     if json:
         write_text(Path(json), comparison.to_json())
     if report or picture:
-        drawn = png(_picture(measured, paths))
+        drawn = png(_picture(measured, paths, short))
         if picture:
             write_bytes(Path(picture), drawn)
         if report:
@@ -113,7 +114,7 @@ def _page(comparison: Comparison, drawn: bytes) -> str:
     )
 
 
-def _picture(measured: Measured, paths: Sequence[Array]) -> "Figure":
+def _picture(measured: Measured, paths: Sequence[Array], rows: Array) -> "Figure":
     """Measured and replayed runs; the force that the model has too much by place and speed."""
     from matplotlib.figure import Figure
 
@@ -132,7 +133,6 @@ def _picture(measured: Measured, paths: Sequence[Array]) -> "Figure":
         plots[0].legend(frameon=False, fontsize=8, ncols=2)
         plots[-1].set_xlabel("time (s)")
         panels = right.subplots(2, 1)
-        rows = window_rows(measured)
         usual = np.median(rows[:, FORCE + 1]) if len(rows) else 0.0
         for row in rows[rows[:, FORCE + 1] < UNCLEAR * usual]:
             colour = COLOURS["friction" if row[1] > 0 else "damping"]

@@ -183,9 +183,12 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
     )
 
 
-def failing(measured: Measured) -> list[Failing]:
-    """Where windows of 0.1 s are missed by more than noise, the largest share first."""
-    rows = window_rows(measured)
+def failing(rows: Array) -> list[Failing]:
+    """Where windows are missed by more than noise, the largest share first.
+
+    Args:
+        rows: of `window_rows`.
+    """
     if not len(rows):
         return []
     values, found = rows[:, :5], rows[:, 5:]

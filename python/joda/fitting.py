@@ -74,23 +74,6 @@ class Fit:
     interrupted: bool = False
 
 
-@dataclass(frozen=True)
-class Stage:
-    """A part of a fit.
-
-    Attributes:
-        name: for the user.
-        data: the stretches.
-        iterations: at most so many.
-        doubt: standard deviations of the parameters before any data, shape (n,).
-    """
-
-    name: str
-    data: Stretches
-    iterations: int
-    doubt: Array
-
-
 class Problem:
     """A joint, its parameters and its measured runs.
 
@@ -206,7 +189,7 @@ class Problem:
                 told(name, len(history), misfit)
 
             if count > 0:
-                self._stage(Stage(name, data, count, doubt), method, heard)
+                self._stage(data, doubt, count, method, heard)
 
         try:
             run("short windows, intervals held", self.short, min(FIRST, iterations // 3), held)
@@ -236,29 +219,50 @@ class Problem:
             least = misfit
         self._best = best
 
-    def _stage(self, stage: Stage, method: Method, told: Callable[[float], None]) -> None:
-        """Rounds of a stage, until one gains too little."""
-        size = ROUND if method == "lm" else stage.iterations
+    def _stage(
+        self,
+        data: Stretches,
+        doubt: Array,
+        iterations: int,
+        method: Method,
+        told: Callable[[float], None],
+    ) -> None:
+        """Rounds with some stretches, until one gains too little.
+
+        Args:
+            data: the stretches.
+            doubt: standard deviations of the parameters before any data, shape (n,).
+            iterations: at most so many.
+            method: as for `fit`.
+            told: after each iteration, the RMS misfit.
+        """
+        size = ROUND if method == "lm" else iterations
         told_so_far: list[float] = []
 
         def heard(rms: float) -> None:
             told_so_far.append(rms)
             told(rms)
 
-        while len(told_so_far) < stage.iterations:
+        while len(told_so_far) < iterations:
             before = told_so_far[-1] if told_so_far else np.inf
-            self._round(stage, min(size, stage.iterations - len(told_so_far)), method, heard)
+            count = min(size, iterations - len(told_so_far))
+            self._round(data, doubt, count, method, heard)
             if not told_so_far or told_so_far[-1] > (1 - GAIN) * before:
                 break
 
     def _round(
-        self, stage: Stage, iterations: int, method: Method, told: Callable[[float], None]
+        self,
+        data: Stretches,
+        doubt: Array,
+        iterations: int,
+        method: Method,
+        told: Callable[[float], None],
     ) -> None:
         """Fits the parameters, and the starts of the stretches.
 
         While the misfit is larger than the noise, it counts as if that were the noise.
         """
-        n, data = len(self._best), stage.data
+        n = len(self._best)
         x = np.concatenate([self._best, self._moved.get(id(data), np.zeros(data.start.size))])
         misfit = self._slopes(x, data)[0]
         misfits = np.sqrt((misfit**2).sum(axis=1) / data.real.sum(axis=1))
@@ -269,7 +273,7 @@ class Problem:
 
         def linear(x: Array) -> tuple[Array, Array, float]:
             if not last or not np.array_equal(last[0][0], x):
-                last[:] = [(x, self._linear(x, data, sigmas, stage.doubt))]
+                last[:] = [(x, self._linear(x, data, sigmas, doubt))]
             return last[0][1]
 
         def heard(_: int, x: Array, __: float) -> None:

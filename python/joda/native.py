@@ -1,10 +1,9 @@
 """A joint of a scene as one profile: what MuJoCo gives it natively, besides what it carries."""
 
 import mujoco
-import numpy as np
 
 from joda.component import Component
-from joda.effects import AddedInertia, QuadraticDamping
+from joda.effects import QuadraticDamping
 from joda.profile import Profile
 from joda.scene import TRACE
 
@@ -41,11 +40,6 @@ def whole_profile(model: mujoco.MjModel, joint: int, profile: Profile) -> Profil
     if square and not any(isinstance(effect, QuadraticDamping) for effect in out.effects):
         out = out.with_effect(QuadraticDamping(y=(square, square)))
     return out
-
-
-def added_inertia(profile: Profile) -> float:
-    """What the profile adds to the joint's inertia, kg·m² or kg."""
-    return float(np.sum([e.inertia for e in profile.effects if isinstance(e, AddedInertia)]))
 
 
 def _line(label: str, first: float, last: float) -> Component:

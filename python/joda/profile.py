@@ -19,7 +19,7 @@ from typing import Any, Literal, Self
 from pydantic import ValidationError, model_validator
 
 from joda.component import Component, Frozen, numbers
-from joda.effects import AnyEffect, Effect, GravityOffset
+from joda.effects import AddedInertia, AnyEffect, Effect, GravityOffset
 from joda.errors import JodaError
 from joda.files import read_text
 
@@ -153,6 +153,11 @@ class Profile(File):
         if "quadratic_damping both" in keys and sum("quadratic_damping" in k for k in keys) > 1:
             raise ValueError("quadratic_damping in both directions excludes that in one")
         return self
+
+    @property
+    def added_inertia(self) -> float:
+        """What its effects add to the joint's inertia, kg·m² or kg."""
+        return sum((e.inertia for e in self.effects if isinstance(e, AddedInertia)), 0.0)
 
     def with_effect(self, effect: AnyEffect) -> Self:
         """The profile with the effect, in the place of one of the same name and direction."""

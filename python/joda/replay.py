@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from joda import smoothing
 from joda._context import Context
-from joda.native import added_inertia
 from joda.profile import Profile
 from joda.rig import rig
 from joda.runs import Run
@@ -54,7 +53,7 @@ class Replayer:
         self, context: Context, profile: Profile, model: mujoco.MjModel, joint: int
     ) -> None:
         """Args: the joint in its scene; its whole profile (`joda.native`); the scene; its id."""
-        own = context.equivalent_inertia - added_inertia(profile)
+        own = context.equivalent_inertia - profile.added_inertia
         self.model = rig(context.model_copy(update={"equivalent_inertia": own}), profile)
         self.model.opt.timestep = self.h = float(model.opt.timestep)
         self.model.jnt_solref[0], self.model.jnt_solimp[0] = (
