@@ -1,10 +1,13 @@
-// joda._core: the C++ field in Python, and the swap of a profile in an existing mjData.
+// joda._core in Python: the field, a joint by itself, and the swap of a profile in an existing
+// mjData.
 #include <mujoco/mujoco.h>
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -13,11 +16,73 @@
 #include "attributes.h"
 #include "field.h"
 #include "joint_dynamics.h"
+#include "solo.h"
 
 namespace py = pybind11;
 
+namespace {
+
+template <typename T>
+using Dense = py::array_t<T, py::array::c_style | py::array::forcecast>;
+
+using Texts = std::array<std::string, 7>;
+
+std::array<const char*, 7> Pointers(const Texts& texts) {
+  std::array<const char*, 7> out;
+  for (size_t i = 0; i < texts.size(); ++i) out[i] = texts[i].c_str();
+  return out;
+}
+
+joda::Solo MakeSolo(double lo, double hi, const Texts& texts, double inertia, double row_inertia,
+                    const std::array<double, 2>& weight, bool hinge,
+                    const std::array<double, 2>& solref, const std::array<double, 5>& solimp) {
+  const joda::Body body = {{lo, hi}, inertia, row_inertia, weight, hinge, solref, solimp};
+  return joda::Solo(body, Pointers(texts).data());
+}
+
+std::vector<joda::Solo::Start> ReadStarts(const Dense<std::int64_t>& at, const Dense<double>& start,
+                                          const Dense<bool>& fresh, py::ssize_t n) {
+  const py::ssize_t count = at.size();
+  if (at.ndim() != 1 || start.ndim() != 2 || fresh.ndim() != 1 || start.shape(0) != count ||
+      start.shape(1) != 2 || fresh.size() != count) {
+    throw py::value_error("at, start and fresh must have the shapes (m,), (m, 2) and (m,)");
+  }
+  std::vector<joda::Solo::Start> out;
+  out.reserve(count);
+  for (py::ssize_t i = 0; i < count; ++i) {
+    out.push_back({at.at(i), start.at(i, 0), start.at(i, 1), fresh.at(i)});
+  }
+  const auto later = [](const auto& a, const auto& b) { return a.step >= b.step; };
+  if (out.empty() || out.front().step != 0 || out.back().step >= n ||
+      std::adjacent_find(out.begin(), out.end(), later) != out.end()) {
+    throw py::value_error("at must begin with 0, increase and stay below the number of forces");
+  }
+  return out;
+}
+
+std::pair<Dense<double>, Dense<double>> Replay(const joda::Solo& solo, const Dense<double>& force,
+                                               const Dense<std::int64_t>& at,
+                                               const Dense<double>& start, const Dense<bool>& fresh,
+                                               double h) {
+  if (force.ndim() != 1) throw py::value_error("force must have the shape (n,)");
+  if (!(h > 0)) throw py::value_error("h must be positive");
+  const auto starts = ReadStarts(at, start, fresh, force.size());
+  Dense<double> before(force.size()), after(force.size());
+  const double* applied = force.data();
+  double* first = before.mutable_data();
+  double* second = after.mutable_data();
+  {
+    py::gil_scoped_release release;
+    solo.Replay(h, applied, force.size(), starts, first, second);
+  }
+  return {before, after};
+}
+
+}  // namespace
+
 PYBIND11_MODULE(_core, module) {
-  module.doc() = "C++ core of JODA: channels of a profile, and profiles inside mjData.";
+  module.doc() =
+      "C++ core of JODA: channels of a profile, a joint by itself, and profiles inside mjData.";
 
   py::class_<joda::PiecewiseCubic>(module, "Channel", R"(A channel of a profile, merged at load.
 
@@ -54,13 +119,11 @@ Raises:
   module.def(
       "set_profile",
       [](std::uintptr_t model, std::uintptr_t data, int joint, double lo, double hi,
-         const std::array<std::string, 7>& texts) {
-        const char* pointers[7];
-        for (int i = 0; i < 7; ++i) pointers[i] = texts[i].c_str();
+         const Texts& texts) {
         char error[1024];
         if (joda_set_profile(reinterpret_cast<const mjModel*>(model),
-                             reinterpret_cast<mjData*>(data), joint, lo, hi, pointers, error,
-                             sizeof error)) {
+                             reinterpret_cast<mjData*>(data), joint, lo, hi, Pointers(texts).data(),
+                             error, sizeof error)) {
           throw py::value_error(error);
         }
       },
@@ -69,4 +132,41 @@ Raises:
       "Replaces the profile of a joint in one mjData; texts: channel and combine, three times, "
       "then "
       "the effects.");
+
+  py::class_<joda::Solo>(module, "Solo",
+                         R"(A joint by itself, stepped as MuJoCo does with the plugin.
+
+Units are those of a hinge; for a slide read N, m and kg.
+
+Args:
+  lo, hi: ends of the range.
+  texts: channel and combine, three times, then the effects.
+  inertia: without the added inertia among the effects, kg m^2.
+  row_inertia: what MuJoCo's rows take for it, the mass of a body that only slides; 0: all of it.
+  weight: hinge: factors of cos q and sin q of gravity's torque; slide: its force, and 0.
+  hinge: whether it is a hinge.
+  solref, solimp: of the range's ends.
+
+Raises:
+  ValueError: a text cannot be read, or a number is impossible; one sentence says why.)")
+      .def(py::init(&MakeSolo), py::arg("lo"), py::arg("hi"), py::arg("texts"), py::arg("inertia"),
+           py::arg("row_inertia"), py::arg("weight"), py::arg("hinge"), py::arg("solref"),
+           py::arg("solimp"))
+      .def("replay", &Replay, py::arg("force"), py::arg("at"), py::arg("start"), py::arg("fresh"),
+           py::arg("h"), R"(Steps through forces, set to a start here and there.
+
+Args:
+  force: applied at each step, shape (n,).
+  at: steps before which the joint is set to a start, increasing from 0, shape (m,).
+  start: position and velocity there, shape (m, 2).
+  fresh: whether the joint forgets its friction's force there and centres its handle; otherwise
+    both stay, the handle in its motion beside the part. Shape (m,).
+  h: timestep, s.
+
+Returns:
+  positions before and after each step, each of shape (n,); NaN from where a number is not finite
+  until the next start, which then is fresh.
+
+Raises:
+  ValueError: a shape or the order is wrong.)");
 }

@@ -47,7 +47,8 @@ std::vector<JointConfig> ReadConfig(const mjModel* m, int instance);
 
 // A profile from the seven texts: components and combine of conservative, friction and damping,
 // then the effects; `prefix` stands before the attributes' names in errors.
-Profile ParseProfile(const std::string& prefix, double lo, double hi, const char* const texts[7]);
+MJAPI Profile ParseProfile(const std::string& prefix, double lo, double hi,
+                           const char* const texts[7]);
 
 // Throws if the profile cannot act on the joint as the model has it.
 void CheckProfile(const mjModel* m, int joint, const Profile& profile);

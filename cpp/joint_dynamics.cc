@@ -9,23 +9,10 @@
 
 #include "config.h"
 #include "rows.h"
+#include "stiffness.h"
 
 namespace joda {
 namespace {
-
-// Stiffest spring that stays explicit, as h^2 K / inertia (symplectic Euler is stable below 4).
-// What is stiffer goes implicitly into the damping row; what is softer behaves as MuJoCo's own.
-constexpr double kExplicitStiffness = 1;
-
-// Largest part of the range through which the field alone may move the joint in one step.
-constexpr double kStride = 0.25;
-
-// The friction row's D over the joint's inertia. Larger is stiffer, but the solver's line search
-// (50 evaluations) must still find the narrow zone in which the joint sticks.
-constexpr double kStiffRow = 1e4;
-
-// The damping row's D over the joint's inertia where there is no damping: as good as no row.
-constexpr double kIdleRow = 1e-12;
 
 // The equality constraint on the joint alone that is there to carry the damping, -1: none.
 int FindEquality(const mjModel* m, int joint) {
@@ -41,24 +28,6 @@ int FindEquality(const mjModel* m, int joint) {
 
 int CountPositive(const mjtNum* values, int n) {
   return static_cast<int>(std::count_if(values, values + n, [](mjtNum x) { return x > 0; }));
-}
-
-// Part of the springs' force that must act implicitly for stability, as a stiffness: what is
-// stiffer than kExplicitStiffness at the steepest place that the joint may reach within this step,
-// or would move it by more than a fraction of its range (kStride).
-double ImplicitStiffness(const Step& step, const Profile& p, double s, double v, double force,
-                         double inertia) {
-  const double soft = kExplicitStiffness * inertia * step.per_h * step.per_h;
-  const double gravity = p.effects ? p.effects->gravity.descent : 0;
-  const double steepest = step.spring ? p.conservative.MaxDescent() * p.per_range : 0;
-  double stiffness = std::abs(force) * p.per_range * (1 / kStride);
-  if (steepest + gravity > soft) {
-    const double free = step.h * (std::abs(v) + step.h / inertia * std::abs(force));
-    const double reach = free * p.per_range;
-    const double near = p.conservative.MaxDescent(s - reach, s + reach) * p.per_range;
-    stiffness = std::max(stiffness, gravity + std::min(near, steepest));
-  }
-  return std::max(0.0, stiffness - soft);
 }
 
 // Generalised force of gravity on the joint, over all bodies that it moves, and of what is applied
@@ -136,17 +105,11 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
 double JointDynamics::SetFrictionRow(const Step& step, mjData* d, int row, const Joint& joint,
                                      double bound, double state, double inertia) {
   const double held = step.keeps_rows ? std::clamp(state, -bound, bound) : 0;
-  double D = kStiffRow * inertia, drag = 0;
-  const Effects* effects = joint.profile.effects.get();
-  if (effects && effects->presliding.stiffness > 0 && step.keeps_rows) {
-    const Presliding& bristle = effects->presliding;
-    const double left = BristleLeft(bristle, held, bound, d->qvel[joint.dof]);
-    const double in_row = BristleLeftInRow(left, step.h, bristle.stiffness, inertia);
-    D = std::clamp(step.h * step.h * bristle.stiffness * in_row, kIdleRow * inertia, D);
-    drag = bristle.damping * left;
-  }
-  SetRow(step, d, row, D, bound, held);
-  return drag;
+  const Effects* effects = step.keeps_rows ? joint.profile.effects.get() : nullptr;
+  const FrictionRow stiffened =
+      StiffenFrictionRow(effects, step.h, held, bound, d->qvel[joint.dof], inertia);
+  SetRow(step, d, row, stiffened.D, bound, held);
+  return stiffened.damping;
 }
 
 double JointDynamics::PushThroughPlay(const mjData* d, const mjtNum* state, double h,
@@ -175,7 +138,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
       spring += OffsetForce(effects->gravity, q);
       if (step.damper) drag += ExtraDamping(*effects, s, v);
     }
-    const double stiffness = ImplicitStiffness(step, p, s, v, spring, inertia);
+    const double stiffness = ImplicitStiffness(p, step.spring, h, s, v, spring, inertia);
     drag += h * stiffness;
 
     const int friction_row = FindFrictionRow(d, joint);

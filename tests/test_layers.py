@@ -23,7 +23,8 @@ LAYERS = [
     # what combines them
     {"native", "page"},
     {"_plot", "_bench", "_render", "sheet", "rig", "changes", "mjx", "parameters"},
-    {"behaviour", "_templates", "replay", "solo"},
+    {"behaviour", "_templates", "replay", "solo", "gauge", "places"},
+    {"curves"},
     {"comparison"},
     {"_compare"},
     {"stretches"},

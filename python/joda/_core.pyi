@@ -19,3 +19,22 @@ class Channel:
 def set_profile(
     model_address: int, data_address: int, joint: int, lo: float, hi: float, texts: Sequence[str]
 ) -> None: ...
+
+class Solo:
+    """A joint by itself, stepped as MuJoCo does with the plugin."""
+
+    def __init__(
+        self,
+        lo: float,
+        hi: float,
+        texts: Sequence[str],
+        inertia: float,
+        row_inertia: float,
+        weight: Sequence[float] | NDArray[np.float64],
+        hinge: bool,
+        solref: Sequence[float] | NDArray[np.float64],
+        solimp: Sequence[float] | NDArray[np.float64],
+    ) -> None: ...
+    def replay(
+        self, force: ArrayLike, at: ArrayLike, start: ArrayLike, fresh: ArrayLike, h: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...

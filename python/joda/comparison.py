@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 
 from joda import smoothing
 from joda._context import Context, context
+from joda.curves import CurveError, FailingForce, told
 from joda.errors import JodaError
+from joda.gauge import Gauged, gauged
 from joda.model import describe_joint, find_joint, joint_name, load
 from joda.native import whole_profile
+from joda.places import BINS, places
 from joda.profile import Profile
 from joda.replay import Replayer, Window
-from joda.runs import Run, read_run
+from joda.runs import QuasiStatic, Run, read_measurement
 from joda.scene import profiles_of
 from joda.suspicions import suspicions
 
@@ -25,13 +28,6 @@ By = Literal["position", "velocity", "direction", "time", "load"]
 
 SHORT = 0.1
 """Length of the windows that tell where a model fails, s."""
-BINS = 10
-LEAST = 3
-"""Fewest windows in a bin that can be significant."""
-CERTAIN = 5.0
-"""Standard deviations above what noise makes, from which an error counts as significant."""
-NOTICEABLE = 1.2
-"""Least error of a bin, in units of the noise."""
 
 
 @dataclass(frozen=True)
@@ -75,24 +71,28 @@ class Failing:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A model against measured runs.
+    """A model against measured runs and quasi-static curves.
 
     Attributes:
         joint: its name.
         unit: of position, rad or m.
         runs: errors by run.
-        rmse, rmse_window, noise_floor: of all runs together, rad or m.
+        rmse, rmse_window, noise_floor: of all runs together, rad or m; None without a run.
         failing: where it fails, the largest share first.
+        curves: errors by quasi-static curve.
+        failing_force: where its quasi-static force fails, the largest share first.
         notes: what is suspicious about the data, a sentence each.
     """
 
     joint: str
     unit: str
     runs: tuple[RunError, ...]
-    rmse: float
-    rmse_window: float
-    noise_floor: float
+    rmse: float | None
+    rmse_window: float | None
+    noise_floor: float | None
     failing: tuple[Failing, ...]
+    curves: tuple[CurveError, ...]
+    failing_force: tuple[FailingForce, ...]
     notes: tuple[str, ...]
 
     def to_json(self) -> str:
@@ -103,6 +103,8 @@ class Comparison:
             "runs": [vars(run) for run in self.runs],
             **{key: getattr(self, key) for key in ("rmse", "rmse_window", "noise_floor")},
             "failing": [vars(place) for place in self.failing],
+            "curves": [vars(curve) for curve in self.curves],
+            "failing_force": [vars(place) for place in self.failing_force],
             "notes": list(self.notes),
         }
         return dumps(content, indent=2, ensure_ascii=False) + "\n"
@@ -110,7 +112,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Measured:
-    """A joint of a model with measured runs.
+    """A joint of a model with measured runs and quasi-static curves.
 
     Attributes:
         context: of the joint.
@@ -118,6 +120,7 @@ class Measured:
         replayer: of that profile.
         runs: measured.
         sigma: noise of each run's position, rad or m.
+        curves: measured, each beside the model's.
         notes: what is suspicious about them.
     """
 
@@ -126,11 +129,17 @@ class Measured:
     replayer: Replayer
     runs: tuple[Run, ...]
     sigma: tuple[float, ...]
+    curves: tuple[Gauged, ...]
     notes: tuple[str, ...]
 
 
 def sentences(comparison: Comparison) -> list[str]:
     """The comparison for a person: how far off, where most."""
+    curves = told(comparison.curves, comparison.failing_force)
+    return (_of_runs(comparison) if comparison.runs else []) + curves
+
+
+def _of_runs(comparison: Comparison) -> list[str]:
     unit, floor = comparison.unit, comparison.noise_floor
     out = [
         f"Whole runs are missed by {comparison.rmse:.3g} {unit} RMS, windows of 0.4 s by "
@@ -157,7 +166,7 @@ def sentences(comparison: Comparison) -> list[str]:
 
 
 def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
-    """Reads a joint and its runs; raises JodaError, also for runs that cannot be of this joint."""
+    """Reads a joint and what was measured; raises JodaError, also for what cannot be of it."""
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
     source = Path(model)
@@ -167,19 +176,28 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
     found = context(source, name)
     bare = Profile(joint=describe_joint(compiled, number))
     profile = whole_profile(compiled, number, profiles_of(spec, compiled).get(name, bare))
-    read = tuple(read_run(path) for path in runs)
+    read = [read_measurement(path) for path in runs]
     doubts = [doubt for run in read for doubt in suspicions(run, found)]
     for doubt in doubts:
         if doubt.fatal:
             raise JodaError(doubt.sentence)
+    notes = [doubt.sentence for doubt in doubts]
+    curves = []
+    for curve in read:
+        if isinstance(curve, QuasiStatic):
+            beside, more = gauged(curve, profile, found)
+            curves.append(beside)
+            notes += more
+    timed = tuple(run for run in read if isinstance(run, Run))
     least = 1e-6 * float(np.ptp(profile.joint.range))
     return Measured(
         context=found,
         profile=profile,
         replayer=Replayer(found, profile, compiled, number),
-        runs=read,
-        sigma=tuple(max(smoothing.noise(run.time, run.position), least) for run in read),
-        notes=tuple(doubt.sentence for doubt in doubts),
+        runs=timed,
+        sigma=tuple(max(smoothing.noise(run.time, run.position), least) for run in timed),
+        curves=tuple(curves),
+        notes=tuple(notes),
     )
 
 
@@ -232,27 +250,19 @@ def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
     edges = _edges(by, values)
     if not beyond.sum():
         return []
-    bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-    bad = [_significant(found[bins == k]) for k in range(len(edges) - 1)]
-    out, first = [], None
-    for k in range(len(bad) + 1):
-        ends = k == len(bad) or not bad[k] or (by in ("velocity", "load") and edges[k] == 0)
-        if first is not None and ends:
-            inside = (bins >= first) & (bins < k)
-            rows = found[inside]
-            out.append(
-                Failing(
-                    by=by,
-                    interval=(float(edges[first]), float(edges[k])),
-                    error=float(np.sqrt(np.average(rows[:, 0] ** 2, weights=rows[:, 1]))),
-                    force=float(np.average(rows[:, 3], weights=rows[:, 4] ** -2.0)),
-                    share=float(beyond[inside].sum() / beyond.sum()),
-                    significant=True,
-                )
+    out = []
+    for interval, inside in places(edges, values, found, apart=by in ("velocity", "load")):
+        rows = found[inside]
+        out.append(
+            Failing(
+                by=by,
+                interval=interval,
+                error=float(np.sqrt(np.average(rows[:, 0] ** 2, weights=rows[:, 1]))),
+                force=float(np.average(rows[:, 3], weights=rows[:, 4] ** -2.0)),
+                share=float(beyond[inside].sum() / beyond.sum()),
+                significant=True,
             )
-            first = None
-        if first is None and k < len(bad) and bad[k]:
-            first = k
+        )
     return out
 
 
@@ -267,19 +277,6 @@ def _edges(by: By, values: Array) -> Array:
         return np.linspace(lo, hi, BINS + 1)
     below = min(max(round(BINS * lo / (lo - hi)), 1), BINS - 1)
     return np.concatenate([np.linspace(lo, 0, below + 1), np.linspace(0, hi, BINS - below + 1)[1:]])
-
-
-def _significant(rows: Array) -> bool:
-    """Whether the windows' sum of squares is beyond what noise makes, and the error noticeable.
-
-    Without the worst window: one that begins in a knock may have a wrong start.
-    """
-    if len(rows) < LEAST:
-        return False
-    kept = np.argsort(rows[:, 2] / rows[:, 1])[:-1]
-    samples, squares = rows[kept, 1].sum(), rows[kept, 2].sum()
-    certain = squares > samples + CERTAIN * np.sqrt(2 * samples)
-    return bool(certain and squares > NOTICEABLE**2 * samples)
 
 
 def joined(windows: Sequence[Window]) -> Array:

@@ -49,7 +49,7 @@ def noise(time: Array, position: Array) -> float:
     """Standard deviation of the noise in a position, from what a local cubic cannot follow.
 
     Fourth divided differences, scaled to that of white noise; their median, so that knocks and
-    stops hardly count.
+    stops hardly count. Of a quantised position at least the steps' own, a twelfth of their square.
 
     Args:
         time: s, shape (n,).
@@ -58,17 +58,47 @@ def noise(time: Array, position: Array) -> float:
     Returns:
         in the position's unit; 0 for fewer than 5 samples.
     """
-    n = len(time)
-    if n < 5:
+    if len(time) < 5:
         return 0.0
+    # Median of |x| of a normal distribution is 0.6745 of its standard deviation.
+    white = float(np.median(np.abs(departures(time, position))) / 0.6745)
+    return max(white, resolution(position) / 12**0.5)
+
+
+def departures(time: Array, position: Array) -> Array:
+    """Fourth divided differences of a position, scaled to white noise's standard deviation.
+
+    Args:
+        time: s, shape (n,), at least 5.
+        position: shape (n,).
+
+    Returns:
+        in the position's unit, about the samples from the third to the last but two; shape (n - 4,).
+    """
+    n = len(time)
     t = np.stack([time[k : n - 4 + k] for k in range(5)], axis=1)
     y = np.stack([position[k : n - 4 + k] for k in range(5)], axis=1)
     gaps = t[:, :, None] - t[:, None, :]
     np.einsum("nkk->nk", gaps)[:] = 1.0
     weights = 1 / gaps.prod(axis=2)
     weights /= np.sqrt((weights**2).sum(axis=1, keepdims=True))
-    # Median of |x| of a normal distribution is 0.6745 of its standard deviation.
-    return float(np.median(np.abs((weights * y).sum(axis=1))) / 0.6745)
+    return np.asarray((weights * y).sum(axis=1))
+
+
+def resolution(position: Array) -> float:
+    """Smallest step of a quantised signal, in its unit; 0 where it is not seen to be quantised."""
+    values = np.unique(position)
+    steps = np.diff(values)
+    steps = steps[steps > 1e-6 * (values[-1] - values[0])]  # smaller ones are rounding
+    if len(steps) < 3:
+        return 0.0
+    for parts in (1, 2, 3):  # the smallest difference that occurs may be a few steps
+        step = steps.min() / parts
+        near = steps[steps < 10 * step * parts]
+        counts = np.round(near / step)
+        if 2 * len(near) > len(steps) and np.mean(np.abs(near / step - counts) < 0.15) > 0.95:
+            return float(near.sum() / counts.sum())
+    return 0.0
 
 
 def smooth(time: Array, position: Array, at: Array, sigma: float) -> Smooth:

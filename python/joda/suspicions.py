@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from joda import smoothing
 from joda._context import Context
+from joda.smoothing import resolution
 from joda.runs import QuasiStatic, Run
 
 Array = NDArray[np.float64]
@@ -107,22 +108,6 @@ def suspicions(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
 
 def _suspicion(run: Run | QuasiStatic, kind: Kind, told: str) -> Suspicion:
     return Suspicion(kind, f"{run.name}: {told}.", kind in FATAL)
-
-
-def resolution(position: Array) -> float:
-    """Smallest step of a quantised signal, in its unit; 0 where it is not seen to be quantised."""
-    values = np.unique(position)
-    steps = np.diff(values)
-    steps = steps[steps > 1e-6 * (values[-1] - values[0])]  # smaller ones are rounding
-    if len(steps) < 3:
-        return 0.0
-    for parts in (1, 2, 3):  # the smallest difference that occurs may be a few steps
-        step = steps.min() / parts
-        near = steps[steps < 10 * step * parts]
-        counts = np.round(near / step)
-        if 2 * len(near) > len(steps) and np.mean(np.abs(near / step - counts) < 0.15) > 0.95:
-            return float(near.sum() / counts.sum())
-    return 0.0
 
 
 def _noise(run: Run | QuasiStatic, position: Array) -> float:

@@ -1,0 +1,165 @@
+#include "solo.h"
+
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "stiffness.h"
+
+namespace joda {
+namespace {
+
+// Friction: force = offset - stiff a, within +-bound.
+struct Friction {
+  double offset, stiff, bound;
+};
+
+struct Motion {
+  double acceleration, held;
+};
+
+// Solves mass a = drive + friction(a).
+Motion Solve(double mass, double drive, const Friction& friction) {
+  const double stuck = (drive + friction.offset) / (mass + friction.stiff);
+  const double held = friction.offset - friction.stiff * stuck;
+  if (held > friction.bound) return {(drive + friction.bound) / mass, friction.bound};
+  if (held < -friction.bound) return {(drive - friction.bound) / mass, -friction.bound};
+  return {stuck, held};
+}
+
+bool IsFinite(const Solo::State& state) {
+  return std::isfinite(state.q + state.v + state.held + state.handle.gap + state.handle.velocity);
+}
+
+void Restart(const Solo::Start& start, bool fresh, Solo::State* state) {
+  if (fresh) {
+    *state = {start.q, start.v, 0, {0, start.v}};
+    return;
+  }
+  state->handle.velocity += start.v - state->v;
+  state->q = start.q;
+  state->v = start.v;
+}
+
+}  // namespace
+
+Solo::Solo(const Body& body, const char* const texts[7])
+    : body_(body), profile_(ParseProfile("", body.range[0], body.range[1], texts)) {
+  if (!(body_.range[0] < body_.range[1])) {
+    throw std::invalid_argument("the range must be two increasing numbers");
+  }
+  if (profile_.effects) body_.inertia += profile_.effects->added_inertia;
+  if (!(body_.inertia > 0)) throw std::invalid_argument("the inertia must be positive");
+  if (!(body_.row_inertia > 0)) body_.row_inertia = body_.inertia;
+  for (const int k : {0, 1, 3}) {
+    body_.solimp[k] = std::clamp<double>(body_.solimp[k], mjMINIMP, mjMAXIMP);
+  }
+}
+
+void Solo::Advance(double h, double force, State* state) const {
+  const Profile& p = profile_;
+  const Effects* effects = p.effects.get();
+  const double q = state->q, v = state->v, s = (q - p.lo) * p.per_range;
+  const double inertia = body_.row_inertia, weight = Weight(q);
+
+  double spring = p.conservative(s).value;
+  double drag = p.damping(s).value;
+  const double dry = p.friction(s).value;
+  FrictionBounds bounds = {dry, dry};
+  if (effects) {
+    spring += OffsetForce(effects->gravity, q);
+    drag += ExtraDamping(*effects, s, v);
+    bounds = BoundFriction(*effects, dry, s, v, weight + force);
+  }
+  drag += h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
+
+  const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
+  const FrictionRow row = StiffenFrictionRow(effects, h, held, bound, v, inertia);
+  drag += row.damping;
+  const Friction friction = {held - row.D * v / h, row.D, bound};
+
+  double pushed = force;
+  if (effects && effects->backlash.play > 0) {
+    pushed = MoveHandle(effects->backlash, h, force, v, &state->handle);
+  }
+
+  const double mass = body_.inertia + h * drag;
+  const double drive = spring + bounds.Shift() + weight + pushed - drag * v;
+  Motion motion = Solve(mass, drive, friction);
+  if (q < body_.range[0] || q > body_.range[1]) {
+    const Limit limit = EndAt(h, q, v);
+    if (limit.sign * motion.acceleration < limit.reference) {
+      motion = Solve(mass + limit.D, drive + limit.D * limit.sign * limit.reference, friction);
+    }
+  }
+  state->v = v + h * motion.acceleration;
+  state->q = q + h * state->v;
+  state->held = motion.held;
+}
+
+void Solo::Replay(double h, const double* force, std::int64_t n, const std::vector<Start>& starts,
+                  double* before, double* after) const {
+  State state;
+  bool lost = true;
+  for (size_t i = 0; i < starts.size(); ++i) {
+    Restart(starts[i], starts[i].fresh || lost, &state);
+    lost = false;
+    const std::int64_t end = i + 1 < starts.size() ? starts[i + 1].step : n;
+    std::int64_t k = starts[i].step;
+    for (; k < end && !lost; ++k) {
+      before[k] = state.q;
+      Advance(h, force[k], &state);
+      after[k] = state.q;
+      lost = !IsFinite(state);
+    }
+    if (lost) {
+      constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+      after[k - 1] = kNan;
+      std::fill(before + k, before + end, kNan);
+      std::fill(after + k, after + end, kNan);
+    }
+  }
+}
+
+double Solo::Weight(double q) const {
+  const auto [first, second] = body_.weight;
+  if (!body_.hinge || (first == 0 && second == 0)) return first;
+  return first * std::cos(q) + second * std::sin(q);
+}
+
+// MuJoCo's solver parameters, as in "Solver parameters" of its documentation.
+Solo::Limit Solo::EndAt(double h, double q, double v) const {
+  const auto [lo, hi] = body_.range;
+  const bool low = q < lo;
+  const double sign = low ? 1 : -1, distance = low ? q - lo : hi - q;
+  const double dmax = body_.solimp[1], impedance = Impedance(-distance);
+  double stiffness = -body_.solref[0], damping = -body_.solref[1];
+  if (body_.solref[0] > 0) {
+    const double constant = std::max(body_.solref[0], 2 * h);  // the engine's "refsafe"
+    const double per_second = 1 / (constant * body_.solref[1]);
+    stiffness = per_second * per_second;
+    damping = 2 / constant;
+  }
+  stiffness /= dmax * dmax;
+  damping /= dmax;
+  return {sign, impedance / (1 - impedance) * body_.row_inertia,
+          -damping * sign * v - stiffness * impedance * distance};
+}
+
+double Solo::Impedance(double depth) const {
+  const auto [dmin, dmax, width, middle, exponent] = body_.solimp;
+  if (dmin == dmax || width <= mjMINVAL) return 0.5 * (dmin + dmax);
+  const double x = std::min(depth / width, 1.0);
+  const double power = std::max(exponent, 1.0);
+  const auto raise = [power](double base) {
+    return power == 2 ? base * base : std::pow(base, power);
+  };
+  const double rise =
+      x < middle ? middle * raise(x / middle) : 1 - (1 - middle) * raise((1 - x) / (1 - middle));
+  return dmin + rise * (dmax - dmin);
+}
+
+}  // namespace joda

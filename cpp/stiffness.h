@@ -1,0 +1,65 @@
+// How stiff a step may be: the part of a spring that must act implicitly, and the solver's rows.
+#ifndef JODA_STIFFNESS_H_
+#define JODA_STIFFNESS_H_
+
+#include <algorithm>
+#include <cmath>
+
+#include "config.h"
+#include "effects.h"
+
+namespace joda {
+
+// Stiffest spring that stays explicit, as h^2 K / inertia (symplectic Euler is stable below 4).
+// What is stiffer goes implicitly into the damping row; what is softer behaves as MuJoCo's own.
+inline constexpr double kExplicitStiffness = 1;
+
+// Largest part of the range through which the field alone may move the joint in one step.
+inline constexpr double kStride = 0.25;
+
+// The friction row's D over the joint's inertia. Larger is stiffer, but the solver's line search
+// (50 evaluations) must still find the narrow zone in which the joint sticks.
+inline constexpr double kStiffRow = 1e4;
+
+// The damping row's D over the joint's inertia where there is no damping: as good as no row.
+inline constexpr double kIdleRow = 1e-12;
+
+// Part of the springs' force that must act implicitly for stability, as a stiffness: what is
+// stiffer than kExplicitStiffness at the steepest place that the joint may reach within this step,
+// or would move it by more than a fraction of its range (kStride). `field` says whether the
+// conservative channel acts.
+inline double ImplicitStiffness(const Profile& p, bool field, double h, double s, double v,
+                                double force, double inertia) {
+  const double soft = kExplicitStiffness * inertia / (h * h);
+  const double gravity = p.effects ? p.effects->gravity.descent : 0;
+  const double steepest = field ? p.conservative.MaxDescent() * p.per_range : 0;
+  double stiffness = std::abs(force) * p.per_range * (1 / kStride);
+  if (steepest + gravity > soft) {
+    const double free = h * (std::abs(v) + h / inertia * std::abs(force));
+    const double reach = free * p.per_range;
+    const double near = p.conservative.MaxDescent(s - reach, s + reach) * p.per_range;
+    stiffness = std::max(stiffness, gravity + std::min(near, steepest));
+  }
+  return std::max(0.0, stiffness - soft);
+}
+
+// The friction row that held with the force `held` within +-bound, and what its bristles add to
+// the damping.
+struct FrictionRow {
+  double D, damping;
+};
+
+inline FrictionRow StiffenFrictionRow(const Effects* effects, double h, double held, double bound,
+                                      double v, double inertia) {
+  const double stiff = kStiffRow * inertia;
+  if (!effects || !(effects->presliding.stiffness > 0)) return {stiff, 0};
+  const Presliding& bristle = effects->presliding;
+  const double left = BristleLeft(bristle, held, bound, v);
+  const double in_row = BristleLeftInRow(left, h, bristle.stiffness, inertia);
+  return {std::clamp(h * h * bristle.stiffness * in_row, kIdleRow * inertia, stiff),
+          bristle.damping * left};
+}
+
+}  // namespace joda
+
+#endif  // JODA_STIFFNESS_H_

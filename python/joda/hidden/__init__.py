@@ -1,0 +1,8 @@
+"""An independent simulator of joints that hide a physical effect, to examine a diagnosis with.
+
+Its laws are analytic, and it shares nothing with MuJoCo, the plugin or the templates.
+"""
+
+from joda.hidden.cases import EFFECTS, OUTSIDE, Case, draw, write
+
+__all__ = ["EFFECTS", "OUTSIDE", "Case", "draw", "write"]

@@ -1,0 +1,70 @@
+"""Effects that no catalogue has."""
+
+import numpy as np
+
+from joda.hidden import laws, rubbing, truth
+from joda.hidden.die import Builder, Die, Hidden, everywhere
+
+
+def _relaxation(die: Die) -> Hidden:
+    force, joint = die.force(0.3, 1.0), die.joint
+    law = truth.Maxwell(2 * force / joint.span, die.between(0.15, 0.6) * joint.time)
+    return everywhere(law, law.stiffness, die.unit("1"))
+
+
+def _ageing(die: Die) -> Hidden:
+    force, joint = die.force(0.2, 0.6), die.joint
+    law = truth.Ageing(
+        force, die.between(0.05, 0.2) * joint.time, die.between(0.005, 0.02) * joint.span
+    )
+    return everywhere(law, force, die.unit())
+
+
+def _warming(die: Die) -> Hidden:
+    time = die.between(0.8, 2.0) * die.joint.time
+    if die.chance():
+        force = die.force(0.2, 0.6)
+        return everywhere(rubbing.Cold(force, 0.0, time), force, die.unit())
+    size = die.damping(0.3, 0.8)
+    return everywhere(rubbing.Cold(0.0, size, time), size, die.unit("s"))
+
+
+def _cogging(die: Die) -> Hidden:
+    force = die.force(0.15, 0.6)
+    law = laws.Ripple(force, die.between(6, 12), die.between(0, 2 * np.pi))
+    return everywhere(law, force, die.unit())
+
+
+def _root(die: Die) -> Hidden:
+    size = die.force(0.2, 0.6) * (die.joint.time / die.joint.span) ** 0.5
+    return everywhere(rubbing.RootDamping(size), size, f"{die.unit()}·(s/x)^½")
+
+
+def _delay(die: Die) -> Hidden:
+    time = die.between(0.03, 0.08)
+    return everywhere(truth.Delay(time), time, "s")
+
+
+def _shaking(die: Die) -> Hidden:
+    force = die.force(0.2, 0.5)
+    return everywhere(
+        laws.Shaking(force, die.between(0.8, 2.5) / die.joint.time), force, die.unit()
+    )
+
+
+def _cable(die: Die) -> Hidden:
+    force, taut = die.force(0.3, 0.8), die.between(0.2, 0.5)
+    law = truth.Cable(force, taut, die.between(0.1, 0.25), die.between(0.5, 1.5) * die.joint.time)
+    return Hidden((law,), (taut, 1.0), force, die.unit(), "positive")
+
+
+BEYOND: dict[str, Builder] = {
+    "maxwell_relaxation": _relaxation,
+    "friction_ageing": _ageing,
+    "warming_up": _warming,
+    "cogging": _cogging,
+    "square_root_damping": _root,
+    "actuation_delay": _delay,
+    "periodic_disturbance": _shaking,
+    "pulling_cable": _cable,
+}
