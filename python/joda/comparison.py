@@ -21,6 +21,7 @@ from joda.profile import Profile
 from joda.replay import Replayer, Window
 from joda.runs import QuasiStatic, Run, read_measurement
 from joda.scene import profiles_of
+from joda.single import Single, single
 from joda.suspicions import suspicions
 
 Array = NDArray[np.float64]
@@ -117,6 +118,8 @@ class Measured:
     Attributes:
         context: of the joint.
         profile: all that acts on it (`joda.native`).
+        single: all of the joint but its profile.
+        timestep: of the model, s.
         replayer: of that profile.
         runs: measured.
         sigma: noise of each run's position, rad or m.
@@ -126,6 +129,8 @@ class Measured:
 
     context: Context
     profile: Profile
+    single: Single
+    timestep: float
     replayer: Replayer
     runs: tuple[Run, ...]
     sigma: tuple[float, ...]
@@ -193,6 +198,8 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
     return Measured(
         context=found,
         profile=profile,
+        single=single(found, profile, compiled, number),
+        timestep=float(compiled.opt.timestep),
         replayer=Replayer(found, profile, compiled, number),
         runs=timed,
         sigma=tuple(max(smoothing.noise(run.time, run.position), least) for run in timed),

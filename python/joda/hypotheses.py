@@ -4,7 +4,7 @@ The numbers are in the joint's own units: forces in its usual force, positions n
 its usual speed.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -27,7 +27,7 @@ from joda.effects import (
     StribeckFriction,
 )
 from joda.judge import Unknowns
-from joda.profile import Channel, Profile, Resistance
+from joda.profile import Channel, Profile
 from joda.template import Template
 
 Array = NDArray[np.float64]
@@ -36,11 +36,13 @@ Write = Callable[[Profile, Array], Profile]
 WIDTHS = (0.08, 0.15, 0.28, 0.5)
 """Of the intervals that are tried, in normalised position."""
 NARROWEST = 0.02
-KNOTS = 6
+KNOTS = 9
 """Control points of a free curve."""
 FORCES = (0.0, 30.0)
 TRIAL = 0.1
 """Strength with which an effect is tried, in usual forces."""
+RARE = 3.0
+"""Rarity of a constant force all over a slide's range: a tilt is the same, and more usual."""
 TINY = 1e-12
 """As good as no force."""
 Direction = Literal["both", "positive", "negative"]
@@ -87,6 +89,7 @@ class Hypothesis:
         magnitude: how large it is, in `unit`.
         unit: of the magnitude.
         ends: how many of the last numbers are ends of its interval.
+        rarity: twice the logarithm of how much rarer it is than others.
     """
 
     effect: str
@@ -98,6 +101,7 @@ class Hypothesis:
     magnitude: Callable[[Array], float]
     unit: str
     ends: int = 0
+    rarity: float = 0.0
 
 
 def with_component(profile: Profile, channel: str, component: Component) -> Profile:
@@ -139,7 +143,9 @@ WIDEST = 0.5
 """Of a latch."""
 
 
-def hypotheses(units: Units, templates: dict[str, Template], profile: Profile) -> list[Hypothesis]:
+def hypotheses(
+    units: Units, templates: Mapping[str, Template], profile: Profile
+) -> list[Hypothesis]:
     """All that may be missing."""
     out = [*_templates(units, templates), *_curves(units), *_effects(units)]
     present = {effect.key for effect in profile.effects}
@@ -152,7 +158,7 @@ def _there(h: Hypothesis, present: set[str]) -> bool:
 
 
 # --- templates
-def _templates(units: Units, templates: dict[str, Template]) -> Iterator[Hypothesis]:
+def _templates(units: Units, templates: Mapping[str, Template]) -> Iterator[Hypothesis]:
     for name, template in templates.items():
         if name.startswith("constant_"):
             yield from _constant(units, name, template)
@@ -160,14 +166,14 @@ def _templates(units: Units, templates: dict[str, Template]) -> Iterator[Hypothe
             yield from _spring(units, name)
         elif name.startswith("spring_loaded_snap"):
             yield _snap(units, name)
+        elif name.startswith("magnetic"):
+            yield _magnet(units, name)
         elif name == "bistable_mechanism":
             yield _bistable(units, name)
-        elif name.endswith("_to_low_end"):
-            yield _shape(units, name, template, "low")
-        elif name.endswith("_to_high_end"):
-            yield _shape(units, name, template, "high")
-        else:
-            yield _shape(units, name, template, "anywhere")
+        elif name == "bistable_mechanism_internal":
+            yield _wells(units, name, (1.0, -1.0, 1.0, -1.0))
+        elif name == "detent_internal":
+            yield _wells(units, name, (1.0, -1.0))
 
 
 def _ends(place: str, x: Array) -> tuple[float, float]:
@@ -211,28 +217,81 @@ def _caught(profile: Profile, name: str, interval: tuple[float, float], most: fl
     return with_component(profile, "friction", part)
 
 
-def _shape(units: Units, name: str, template: Template, place: str) -> Hypothesis:
-    """A template's conservative curve and, besides, friction in its interval."""
-    curve = template.channels.conservative
-    assert curve is not None
-    bounds, tries = _places(place)
-    y = units.force * np.array(curve.y)
+def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
+    """Potential wells: strength, where within its part each pulls most, friction, the interval.
+
+    Args:
+        units: of the joint.
+        name: of the template.
+        lobes: signs of the force from one end of the interval to the other, of even count.
+    """
+    parts = len(lobes)
+    zeros = np.arange(parts // 2 + 1) * 2 / parts
+    centres = 0.5 * (zeros[1:] + zeros[:-1])
 
     def write(profile: Profile, x: Array) -> Profile:
-        interval = _ends(place, x)
-        part = Component(label=name, interval=interval, x=curve.x, y=tuple(x[0] * y))
-        return _caught(with_component(profile, "conservative", part), name, interval, units.force * x[0] * x[1])
+        half = float(x[1]) / parts
+        tops = np.stack([centres - half, centres + half], axis=1).ravel()
+        at = np.concatenate([zeros, centres, tops])
+        order = np.argsort(at)
+        y = np.concatenate([np.zeros(len(zeros) + len(centres)), lobes])[order]
+        interval = _ends("anywhere", x)
+        own = tuple(units.force * x[0] * y)
+        part = Component(label=name, interval=interval, x=tuple(at[order]), y=own)
+        most = units.force * x[0] * x[2]
+        return _caught(with_component(profile, "conservative", part), name, interval, most)
+
+    bounds, tries = _places("anywhere")
+    return Hypothesis(
+        name,
+        "both",
+        _unknowns(STRENGTH, (0.3, 0.7, 0.02), CATCH, *bounds),
+        np.array([(TRIAL, 0.45, 0.0, *t) for t in tries]),
+        write,
+        lambda x: _ends("anywhere", x),
+        lambda x: units.force * float(x[0]),
+        _unit(units),
+        len(bounds),
+    )
+
+
+NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
+"""Control points of a magnet, in units of its gap: there its force has fallen to 2 %."""
+SEEN = 3.47
+"""Where it has fallen to 5 %."""
+
+
+def _magnet(units: Units, name: str) -> Hypothesis:
+    """An attraction 1 / (distance + gap)²: strength, friction, gap."""
+    low = name.endswith("low_end")
+    law = (1 + NEAR) ** -2.0 - (1 + NEAR[-1]) ** -2.0
+    law /= law[0]
+
+    def write(profile: Profile, x: Array) -> Profile:
+        reach = min(float(x[2]) * NEAR[-1], 1.0)
+        at, y = NEAR * float(x[2]) / reach, units.force * x[0] * law
+        kept = at < 1
+        end = np.interp(1.0, at, y)
+        at, y = np.append(at[kept], 1.0), np.append(y[kept], end)
+        interval = (0.0, reach) if low else (1 - reach, 1.0)
+        at, y = (at, -y) if low else (1 - at[::-1], y[::-1])
+        part = Component(label=name, interval=interval, x=tuple(at), y=tuple(y))
+        most = units.force * x[0] * x[1]
+        return _caught(with_component(profile, "conservative", part), name, interval, most)
+
+    def interval(x: Array) -> tuple[float, float]:
+        reach = min(SEEN * float(x[2]), 1.0)
+        return (0.0, reach) if low else (1 - reach, 1.0)
 
     return Hypothesis(
         name,
         "both",
-        _unknowns(STRENGTH, CATCH, *bounds),
-        np.array([(TRIAL, 0.0, *t) for t in tries]),
+        _unknowns(STRENGTH, CATCH, (0.004, 0.4, 0.002)),
+        np.array([(2 * TRIAL, 0.0, gap) for gap in (0.02, 0.04, 0.08, 0.16)]),
         write,
-        lambda x: _ends(place, x),
+        interval,
         lambda x: units.force * float(x[0]),
         _unit(units),
-        len(bounds),
     )
 
 
@@ -264,27 +323,30 @@ def _spring(units: Units, name: str) -> Iterator[Hypothesis]:
 
 
 def _snap(units: Units, name: str) -> Hypothesis:
-    """A latch: how it holds, its barrier, the hold at the very end, where it tips, friction."""
+    """A latch: how it holds, its barrier, the hold at the very end, where it tips over, where it
+    holds most, friction, how far it reaches."""
     low = name.endswith("low_end")
     place = "low" if low else "high"
 
     def write(profile: Profile, x: Array) -> Profile:
-        hold, barrier, end, tip = (float(value) for value in x[:4])
-        at = np.array((0.0, 0.3 * tip, 0.65 * tip, tip, 0.5 * (1 + tip), 1.0))
-        y = units.force * np.array((-end * hold, -hold, -0.6 * hold, 0.0, barrier, 0.0))
+        hold, barrier, end, tip, most = (float(value) for value in x[:5])
+        rest = 1 - tip
+        at = np.array((0.0, most * tip, tip, tip + 0.4 * rest, tip + 0.75 * rest, 1.0))
+        y = units.force * np.array((-end * hold, -hold, 0.0, barrier, 0.35 * barrier, 0.0))
         if not low:
             at, y = 1 - at[::-1], -y[::-1]
         interval = _ends(place, x)
         part = Component(label=name, interval=interval, x=tuple(at), y=tuple(y))
-        return _caught(with_component(profile, "conservative", part), name, interval, units.force * x[0] * x[4])
+        rubs = units.force * max(hold, barrier) * float(x[5])
+        return _caught(with_component(profile, "conservative", part), name, interval, rubs)
 
     bounds, tries = _places(place, WIDEST)
-    own = [STRENGTH, STRENGTH, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), CATCH]
+    own = [STRENGTH, STRENGTH, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), (0.15, 0.7, 0.02), CATCH]
     return Hypothesis(
         name,
         "both",
         _unknowns(*own, *bounds),
-        np.array([(TRIAL, TRIAL, 0.6, tip, 0.0, *t) for t in tries for tip in (0.4, 0.6)]),
+        np.array([(TRIAL, TRIAL, 0.5, tip, 0.45, 0.0, *t) for t in tries for tip in (0.4, 0.6)]),
         write,
         lambda x: _ends(place, x),
         lambda x: units.force * float(x[:2].max()),
@@ -352,6 +414,7 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
             lambda x: abs(float(unit)) * float(x[0]),
             _unit(units, int(channel == "damping")),
             len(bounds),
+            RARE if place == "whole" and channel == "conservative" and not units.hinge else 0.0,
         )
 
 

@@ -46,15 +46,17 @@ class Unknowns:
 
     def and_(self, other: "Unknowns") -> "Unknowns":
         """Both, one after the other."""
-        return Unknowns(*(np.concatenate(pair) for pair in zip(*map(_parts, (self, other)), strict=True)))
-
-    def part(self, count: int) -> "Unknowns":
-        """The first so many."""
-        return Unknowns(*(values[:count] for values in _parts(self)))
+        return Unknowns(
+            *(np.concatenate(pair) for pair in zip(*map(_parts, (self, other)), strict=True))
+        )
 
     def penalty(self, x: Array) -> float:
         """What the numbers lose by being off what was known."""
         return float(np.sum(((x - self.mean) / self.doubt) ** 2))
+
+
+NOTHING = Unknowns(*(np.zeros(0) for _ in range(5)))
+"""No numbers: only starts are fitted."""
 
 
 def _parts(unknowns: Unknowns) -> tuple[Array, ...]:
@@ -114,7 +116,9 @@ class Linear:
         Sb = np.einsum("mni,mnq->miq", self.S, b)
         w = self.weight
         out = np.einsum("m,mnp,mnq->pq", w, a, b, optimize=True)
-        return np.asarray(out - np.einsum("m,mip,mij,mjq->pq", w, Sa, self.inverse, Sb, optimize=True))
+        return np.asarray(
+            out - np.einsum("m,mip,mij,mjq->pq", w, Sa, self.inverse, Sb, optimize=True)
+        )
 
     def normal(self) -> tuple[Array, Array]:
         """The normal equations of the numbers: matrix and gradient."""

@@ -1,18 +1,21 @@
 """What may be missing, ranked: each hypothesis is fitted together with the model's own numbers."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
 
 from joda._core import Solo
-from joda.component import Component
-from joda.hypotheses import Hypothesis, Units
-from joda.judge import BEND, Fit, Judge, Linear, Make, Unknowns
+from joda._templates import templates
+from joda.comparison import Measured
+from joda.hypotheses import Hypothesis, Units, hypotheses
+from joda.judge import BEND, NOTHING, Fit, Judge, Linear, Make, Unknowns
 from joda.profile import CHANNELS, Profile
 from joda.single import Single
-from joda.windows import Windows
+from joda.windows import Windows, windows_of
 
 Array = NDArray[np.float64]
 
@@ -24,6 +27,8 @@ KNOCKS = 2
 """Fewest windows with knocks that tell of the ends."""
 MOVES = (0.1, 0.04, 0.015)
 """How far ends of intervals are moved on trial, in normalised position."""
+FAR = 10.0
+"""How far other numbers are moved, in their steps."""
 FEW = 4
 """Iterations after that."""
 ROUGH = 6
@@ -32,6 +37,8 @@ BEST = 3
 """How many trials of a hypothesis are fitted."""
 APART = 0.06
 """How much these must differ in one of their numbers."""
+POLISHED = 4
+"""Of how many effects the numbers are tried elsewhere."""
 EXPLAINED = 0.8
 """Part of the knocks' excess that bouncy ends must explain."""
 
@@ -90,16 +97,16 @@ def base_of(profile: Profile, single: Single, h: float) -> Base:
     return Base(profile, single, h, places, unknowns)
 
 
-def units_of(windows: Windows, base: Base, profile: Profile, forced: bool, weight: float) -> Units:
+def units_of(windows: Windows, measured: Measured) -> Units:
     """The joint's own units, from the measured motion."""
-    inertia = base.single.inertia
+    profile, inertia = measured.profile, measured.single.inertia
     velocity = windows.start[:, 1]
     same = ~windows.fresh[1:]
     pace = np.diff(windows.at)[same] * windows.h
     acceleration = np.diff(velocity)[same] / pace
     speed = float(np.sqrt(np.mean(velocity**2)))
     pushed = float(np.sqrt(np.mean(windows.force**2)))
-    force = max(pushed, inertia * float(np.sqrt(np.mean(acceleration**2))))
+    force = max(pushed, inertia * float(np.sqrt(np.mean(acceleration**2))) if len(pace) else 0.0)
     friction = max((max(c.y) for c in profile.channels.friction.components), default=0.0)
     return Units(
         force=force or inertia,
@@ -107,9 +114,9 @@ def units_of(windows: Windows, base: Base, profile: Profile, forced: bool, weigh
         inertia=inertia,
         span=float(np.ptp(profile.joint.range)),
         friction=friction,
-        forced=forced,
-        weight=weight,
-        hinge=base.single.hinge,
+        forced=any(run.forced for run in measured.runs),
+        weight=max(map(abs, measured.context.gravity_force)),
+        hinge=measured.single.hinge,
     )
 
 
@@ -120,10 +127,17 @@ class Guess:
     Attributes:
         hypothesis: what is missing.
         fit: of the model's factors and the hypothesis' numbers.
+        score: its loss, and what its numbers cost.
     """
 
     hypothesis: Hypothesis
     fit: Fit
+    score: float
+
+    @property
+    def x(self) -> Array:
+        """The hypothesis' numbers."""
+        return self.fit.x[-len(self.hypothesis.unknowns.low) :]
 
 
 def screened(
@@ -141,20 +155,30 @@ def screened(
         solo = base.single.solo(hypothesis.write(profile, trial), base.h)
         d = (windows.residuals(windows.misfit(solo, fit.start)) - about.r)[:, :, None]
         across = about.products(d, about.J)[0]
-        taken = np.linalg.solve(H, np.stack([gradient, across], axis=1)) if len(H) else np.zeros((0, 2))
-        slope = about.products(about.r[:, :, None], d, about.z[:, :, None])[0, 0] - across @ taken[:, 0]
+        taken = (
+            np.linalg.solve(H, np.stack([gradient, across], axis=1)) if len(H) else np.zeros((0, 2))
+        )
+        slope = (
+            about.products(about.r[:, :, None], d, about.z[:, :, None])[0, 0] - across @ taken[:, 0]
+        )
         bend = about.products(d, d)[0, 0] - across @ taken[:, 1]
         amount = -slope / max(bend, 1e-12)
         gains.append(slope**2 / max(bend, 1e-12) if amount > 0 else 0.0)
         first = trial.copy()
-        first[0] = np.clip(trial[0] * np.clip(amount, 0.3, 30.0), hypothesis.unknowns.low[0], hypothesis.unknowns.high[0])
+        first[0] = np.clip(
+            trial[0] * np.clip(amount, 0.3, 30.0),
+            hypothesis.unknowns.low[0],
+            hypothesis.unknowns.high[0],
+        )
         out.append(first)
     order = np.argsort(gains)[::-1]
     chosen: list[int] = []
     for k in order:
         if len(chosen) == BEST:
             break
-        apart = [np.abs(hypothesis.trials[k] - hypothesis.trials[c])[1:].max(initial=0.0) for c in chosen]
+        apart = [
+            np.abs(hypothesis.trials[k] - hypothesis.trials[c])[1:].max(initial=0.0) for c in chosen
+        ]
         if min(apart, default=1.0) > APART:
             chosen.append(int(k))
     return [out[k] for k in chosen]
@@ -167,12 +191,11 @@ def knock_guess(judge: Judge, base: Base, fit: Fit, hypothesis: Hypothesis) -> G
         return None
     own = Judge(judge.windows, knocks)
     profile = base.written(fit.x)
-    none = hypothesis.unknowns.part(0)
 
     def make(x: Array) -> Solo:
         return base.single.solo(hypothesis.write(profile, x) if len(x) else profile, base.h)
 
-    soft = own.fit(make, none, np.zeros(0), fit.start, 6)
+    soft = own.fit(make, NOTHING, np.zeros(0), fit.start, 6)
     fits = [own.fit(make, hypothesis.unknowns, trial, fit.start, 6) for trial in hypothesis.trials]
     best = min(fits, key=lambda f: f.loss)
     least = own.loss(judge.windows.count.astype(float))
@@ -184,7 +207,7 @@ def knock_guess(judge: Judge, base: Base, fit: Fit, hypothesis: Hypothesis) -> G
         np.where(knocks, best.squares, fit.squares),
         fit.loss - soft.loss + best.loss,
     )
-    return Guess(hypothesis, whole)
+    return _guess(judge, hypothesis, whole)
 
 
 def guess(
@@ -194,18 +217,14 @@ def guess(
     if hypothesis.effect == "end_stop_restitution":
         return knock_guess(judge, base, fit, hypothesis)
     make, unknowns = joined(base, hypothesis)
-    usual = float(np.median((fit.squares / np.maximum(judge.windows.count, 1))[judge.counts]))
-    wide = BEND * max(usual, 1.0)
+    wide = BEND * usual(judge, fit)
 
-    def fitted(x: Array, start: Array) -> Fit:
-        near = judge.fit(make, unknowns, x, start, ROUGH, wide)
-        return judge.fit(make, unknowns, near.x, near.start)
-
-    fits = [
-        fitted(np.concatenate([fit.x, trial]), fit.start)
+    rough = [
+        judge.fit(make, unknowns, np.concatenate([fit.x, trial]), fit.start, ROUGH, wide)
         for trial in screened(judge, base, fit, about, hypothesis)
     ]
-    return Guess(hypothesis, min(fits, key=lambda f: f.loss))
+    near = min(rough, key=lambda f: judge.loss(f.squares))
+    return _guess(judge, hypothesis, judge.fit(make, unknowns, near.x, near.start))
 
 
 def joined(base: Base, hypothesis: Hypothesis) -> tuple[Make, Unknowns]:
@@ -219,16 +238,119 @@ def joined(base: Base, hypothesis: Hypothesis) -> tuple[Make, Unknowns]:
 
 
 def moved(judge: Judge, base: Base, found: Guess) -> Guess:
-    """The guess after its interval's ends were tried elsewhere: a fit does not see across an edge
-    that few windows cross."""
+    """The guess after its numbers were tried elsewhere: a fit does not see across an edge that few
+    windows cross, nor past a speed at which the joint begins to stick."""
     make, unknowns = joined(base, found.hypothesis)
     best = found.fit
-    for by in MOVES:
-        for k in range(len(best.x) - found.hypothesis.ends, len(best.x)):
-            for way in (-by, by):
-                x = best.x.copy()
-                x[k] += way
-                trial = judge.fit(make, unknowns, x, best.start, FEW)
-                if trial.loss < best.loss - 1:
-                    best = judge.fit(make, unknowns, trial.x, trial.start)
-    return Guess(found.hypothesis, best)
+    n = len(best.x)
+    first = len(base.places)
+    places = [(k, by) for by in MOVES for k in range(n - found.hypothesis.ends, n)]
+    shapes = [(k, FAR * unknowns.step[k]) for k in range(first, n - found.hypothesis.ends)]
+    for k, by in places + shapes:
+        for way in (-by, by):
+            x = best.x.copy()
+            x[k] += way
+            trial = judge.fit(make, unknowns, x, best.start, FEW)
+            if trial.loss < best.loss - 1:
+                best = judge.fit(make, unknowns, trial.x, trial.start)
+    return _guess(judge, found.hypothesis, best)
+
+
+def _guess(judge: Judge, hypothesis: Hypothesis, fit: Fit) -> Guess:
+    samples = float(judge.windows.count[judge.counts].sum())
+    cost = hypothesis.rarity + len(hypothesis.unknowns.low) * np.log(max(samples, 2.0))
+    return Guess(hypothesis, fit, fit.loss + cost)
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What may be missing from a model.
+
+    Attributes:
+        judge: of the windows.
+        base: the model as it is.
+        fit: of its factors alone.
+        guesses: the best one of each effect, the most likely first.
+    """
+
+    judge: Judge
+    base: Base
+    fit: Fit
+    guesses: tuple[Guess, ...]
+
+
+Told = Callable[[int, int, str], None]
+
+
+def rank(
+    measured: Measured,
+    counts: NDArray[np.bool_] | None = None,
+    exclude: Collection[str] = (),
+    told: Told = lambda done, total, what: None,
+) -> Ranking:
+    """Fits every hypothesis to measured runs.
+
+    Args:
+        measured: the joint and its runs.
+        counts: which windows count, besides those that cannot; None: all.
+        exclude: effects that are not tried.
+        told: how many hypotheses are done, of how many, and the last one's name.
+    """
+    windows = windows_for(measured)
+    judge = Judge(windows, usable(windows) & (True if counts is None else counts))
+    base = base_of(measured.profile, measured.single, windows.h)
+    fit = judge.fit(base.solo, base.unknowns, np.ones(len(base.places)))
+    about = judge.linear(base.solo, base.unknowns, fit.x, fit.start, BEND * usual(judge, fit))
+    units = units_of(windows, measured)
+    tried = [h for h in hypotheses(units, templates(), measured.profile) if h.effect not in exclude]
+    total = len(tried) + POLISHED
+    done = 0
+
+    def heard(found: Iterable[Guess | None]) -> list[Guess]:
+        nonlocal done
+        out = []
+        for one in found:
+            done += 1
+            if one is not None:
+                told(done, total, one.hypothesis.effect)
+                out.append(one)
+        return out
+
+    with ThreadPoolExecutor(cpu_count()) as pool:
+        guesses = heard(pool.map(lambda h: guess(judge, base, fit, about, h), tried))
+        best = _best(guesses)[:POLISHED]
+        guesses += heard(pool.map(lambda g: moved(judge, base, g), best))
+    return Ranking(judge, base, fit, tuple(_best(guesses)))
+
+
+def windows_for(measured: Measured, length: float | None = None) -> Windows:
+    """The runs in windows."""
+    lo, hi = measured.profile.joint.range
+    return windows_of(
+        measured.runs,
+        measured.sigma,
+        hi - lo,
+        lo,
+        measured.single.inertia,
+        measured.timestep,
+        length,
+    )
+
+
+def usable(windows: Windows) -> NDArray[np.bool_]:
+    """Which windows tell of the joint: enough samples, and no knock at an end of the range."""
+    return np.asarray((windows.count >= LEAST) & ~windows.knocks)
+
+
+def usual(judge: Judge, fit: Fit) -> float:
+    """Mean square residual of the windows, in the median; at least 1."""
+    each = (fit.squares / np.maximum(judge.windows.count, 1))[judge.counts]
+    return max(float(np.median(each)), 1.0) if len(each) else 1.0
+
+
+def _best(guesses: Iterable[Guess]) -> list[Guess]:
+    """The best guess of each effect, the lowest score first."""
+    best: dict[str, Guess] = {}
+    for one in sorted(guesses, key=lambda g: g.score):
+        best.setdefault(one.hypothesis.effect, one)
+    return list(best.values())

@@ -73,7 +73,7 @@ def departures(time: Array, position: Array) -> Array:
         position: shape (n,).
 
     Returns:
-        in the position's unit, about the samples from the third to the last but two; shape (n - 4,).
+        about the samples from the third to the last but two, in their unit; shape (n - 4,).
     """
     n = len(time)
     t = np.stack([time[k : n - 4 + k] for k in range(5)], axis=1)

@@ -26,7 +26,7 @@ TRAVEL = 0.15
 """What part of the range a window goes through at the usual speed."""
 FEWEST = 12
 """Samples that a window has at least."""
-STEPS = 200
+STEPS = 300
 """Steps that a window has at least."""
 STOP = 0.004
 """How near an end of the range, in normalised position, counts as touching it."""
@@ -146,7 +146,9 @@ def windows_of(
             spread = _spread(time, position, sigma), _rough(time, run.force[piece], run.forced)
             samples.append((step + index, place - index, position, time, window, *spread))
             step, count = step + steps, count + many
-    force, at, fresh, start, doubts, run_of, enough = (np.concatenate(x) for x in zip(*parts, strict=True))
+    force, at, fresh, start, doubts, run_of, enough = (
+        np.concatenate(x) for x in zip(*parts, strict=True)
+    )
     index, share, position, time, window, sigma, noise = (
         np.concatenate(x) for x in zip(*samples, strict=True)
     )
@@ -166,6 +168,55 @@ def windows_of(
         rows=rows,
         whitener=_whitener(rows, time, sigma, noise / inertia),
         knocks=_knocks(rows, time, position, (position - lo) / span, sigma / span),
+    )
+
+
+def evenly(
+    solo: Solo,
+    force: Array,
+    position: Array,
+    velocity: Array,
+    free: NDArray[np.bool_],
+    h: float,
+    length: float,
+    sigma: float,
+) -> Windows:
+    """Windows of what a joint does under a force, without noise.
+
+    Args:
+        solo: the joint.
+        force: at each step, shape (n,).
+        position, velocity: where a window begins, the joint is put there; shape (n,).
+        free: steps at which it is not: it goes on by itself.
+        h: step, s.
+        length: of the windows, s.
+        sigma: noise to which misfits are compared, rad or m.
+    """
+    n = len(force)
+    each = max(round(length / h), 2)
+    at = np.arange(0, max(n - each // 2, 1), each)
+    own = at[~free[at]]
+    path = solo.replay(force, own, np.stack([position[own], velocity[own]], axis=1), own == 0, h)[0]
+    speed = np.gradient(path, h)
+    start = np.stack([path[at], np.where(free[at], speed[at], velocity[at])], axis=1)
+    window = np.searchsorted(at, np.arange(n), side="right") - 1
+    rows = _rows(window, len(at))
+    most = rows.shape[1]
+    return Windows(
+        h=h,
+        force=force,
+        at=at,
+        fresh=at == 0,
+        start=start,
+        doubt=np.tile([LOOSE * sigma, LOOSE * sigma / length], (len(at), 1)),
+        step=np.arange(n),
+        share=np.zeros(n),
+        position=path,
+        time=h * np.arange(n),
+        run=np.zeros(len(at), int),
+        rows=rows,
+        whitener=np.tile(np.eye(most) / sigma, (len(at), 1, 1)),
+        knocks=np.zeros(len(at), bool),
     )
 
 
