@@ -1,7 +1,7 @@
 """A model against measurements: its errors against the noise, and where it fails."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from json import dumps
 from pathlib import Path
 from typing import Literal
@@ -137,6 +137,26 @@ class Measured:
     curves: tuple[Gauged, ...]
     notes: tuple[str, ...]
 
+    def changed(
+        self, profile: Profile | None = None, runs: Sequence[int] | None = None
+    ) -> "Measured":
+        """The same joint with another profile, or with some of its runs only."""
+        numbers = range(len(self.runs)) if runs is None else runs
+        new = self.profile if profile is None else profile
+        return replace(
+            self,
+            profile=new,
+            replayer=self.replayer
+            if profile is None
+            else Replayer(self.context, new, self.single, self.timestep),
+            runs=tuple(self.runs[k] for k in numbers),
+            sigma=tuple(self.sigma[k] for k in numbers),
+        )
+
+    def with_runs(self, runs: tuple[Run, ...]) -> "Measured":
+        """The same joint with parts of its runs, one of each."""
+        return replace(self, runs=runs)
+
 
 def sentences(comparison: Comparison) -> list[str]:
     """The comparison for a person: how far off, where most."""
@@ -195,12 +215,13 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
             notes += more
     timed = tuple(run for run in read if isinstance(run, Run))
     least = 1e-6 * float(np.ptp(profile.joint.range))
+    own, step = single(found, profile, compiled, number), float(compiled.opt.timestep)
     return Measured(
         context=found,
         profile=profile,
-        single=single(found, profile, compiled, number),
-        timestep=float(compiled.opt.timestep),
-        replayer=Replayer(found, profile, compiled, number),
+        single=own,
+        timestep=step,
+        replayer=Replayer(found, profile, own, step),
         runs=timed,
         sigma=tuple(max(smoothing.noise(run.time, run.position), least) for run in timed),
         curves=tuple(curves),

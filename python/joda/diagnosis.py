@@ -16,6 +16,7 @@ from joda.experiments import Means, Model, next_experiment
 from joda.files import read_text
 from joda.judge import BEND, NOTHING, Judge, Make, Unknowns
 from joda.phrases import explained
+from joda.profile import Profile
 from joda.ranking import Guess, Ranking, Told, joined, rank, usable, windows_for
 from joda.windows import Windows
 
@@ -185,16 +186,19 @@ def diagnosed(
     measured: Measured,
     exclude: Collection[str] = (),
     told: Told = lambda done, total, what: None,
-) -> Diagnosis:
+) -> tuple[Diagnosis, Profile | None]:
     """Finds what a model lacks.
 
     Args:
         measured: the joint and its runs.
         exclude: effects that are not considered.
         told: how much is done, of how much, and what.
+
+    Returns:
+        the diagnosis, and the profile with the likeliest effect; None if there is none.
     """
     if missing := _too_little(measured):
-        return _said(measured, "insufficient_data", missing, (), None)
+        return _said(measured, "insufficient_data", missing, (), None), None
     ranking = rank(measured, exclude=exclude, told=told)
     weighed = weigh(ranking)
     own, left = weighed.excess
@@ -203,7 +207,7 @@ def diagnosed(
             f"The model is adequate: nothing beyond the noise ({_floor(measured):.2g} "
             f"{measured.profile.joint.unit}) that an effect would explain."
         )
-        return _said(measured, "adequate", summary, (), None)
+        return _said(measured, "adequate", summary, (), None), None
     held = Holdout(ranking)
     named = range(min(NAMED, len(ranking.guesses)))
     findings = tuple(
@@ -228,7 +232,10 @@ def diagnosed(
             f"Missing is {phrases.named(first.effect)} (probability "
             f"{100 * first.probability:.0f} %)."
         )
-    return _said(measured, weighed.verdict, summary, findings, _next(measured, ranking, weighed))
+    best, n = ranking.guesses[0], len(ranking.base.places)
+    profile = best.hypothesis.write(ranking.base.written(best.fit.x[:n]), best.x)
+    experiment = _next(measured, ranking, weighed)
+    return _said(measured, weighed.verdict, summary, findings, experiment), profile
 
 
 def _said(

@@ -10,8 +10,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from joda._core import Solo
+from joda.least_squares import Inequalities, bounded_step
 from joda.windows import Windows
 
 Array = NDArray[np.float64]
@@ -36,6 +38,7 @@ class Unknowns:
         low, high: bounds.
         step: for central differences.
         mean, doubt: what is known before the data; infinite doubt for nothing.
+        constraints: what else must hold.
     """
 
     low: Array
@@ -43,6 +46,7 @@ class Unknowns:
     step: Array
     mean: Array
     doubt: Array
+    constraints: Inequalities | None = None
 
     def and_(self, other: "Unknowns") -> "Unknowns":
         """Both, one after the other."""
@@ -211,7 +215,7 @@ class Judge:
             gradient = gradient + (x - unknowns.mean) / unknowns.doubt**2
             before = loss
             for _ in range(TRIALS):
-                move = _bounded(H, gradient, damping, unknowns.low - x, unknowns.high - x)
+                move = _step(H, gradient, damping, unknowns, x)
                 moved = start + windows.doubt * about.follow(move)
                 trial = self.squares(make(x + move), moved)[1]
                 new = self.loss(trial, bend) + unknowns.penalty(x + move)
@@ -223,6 +227,16 @@ class Judge:
             if before - loss < SETTLED:
                 break
         return Fit(x, start, squares, loss)
+
+
+def _step(H: Array, gradient: Array, damping: float, unknowns: Unknowns, x: Array) -> Array:
+    """The damped Newton step from x within the bounds and constraints."""
+    if (must := unknowns.constraints) is None:
+        return _bounded(H, gradient, damping, unknowns.low - x, unknowns.high - x)
+    scale = np.maximum(np.diag(H), 1e-12)
+    R = np.linalg.cholesky(H + np.diag(damping * scale + 1e-12 * scale.max())).T
+    target = solve_triangular(R, -gradient, trans="T")
+    return bounded_step(R, target, must.G, must.h - must.G @ x)
 
 
 def _bounded(H: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:

@@ -13,15 +13,23 @@ from numpy.typing import NDArray
 
 from joda._context import Context
 from joda.component import Component
+from joda.effects import Effect
 from joda.least_squares import Inequalities
 from joda.profile import CHANNELS, Profile, rounded
 
 Array = NDArray[np.float64]
-Kind = Literal["values", "intervals", "strengths", "damping_ratio", "inertia", "gravity"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
+Kind = Literal["values", "intervals", "strengths", "damping_ratio", "inertia", "gravity", "effects"]
+KINDS: tuple[Kind, ...] = tuple(kind for kind in get_args(Kind) if kind != "effects")
+"""What gradients fit; the numbers of effects are fitted by differences (`joda.mending`)."""
 
 NARROWEST = 0.005
 """Least width of an interval, in normalised position."""
+
+SIGNED = ("sin", "cos", "force")
+"""Numbers of effects that may have either sign."""
+LARGEST = {"breakaway": 1.0, "restitution": 0.95}
+LEAST_LEFT = 0.02
+"""Least part of an effect's number that a fit may leave."""
 
 DOUBT: dict[Kind, float] = {
     "values": 0.5,
@@ -30,6 +38,7 @@ DOUBT: dict[Kind, float] = {
     "damping_ratio": 0.7,
     "inertia": 0.2,
     "gravity": 0.2,
+    "effects": 0.5,
 }
 """How far (one standard deviation) a number may be from its first value before any data."""
 
@@ -43,12 +52,14 @@ class Slot:
         channel: of a value, an interval's end or a strength.
         component: number of the component in its channel.
         index: number of the control point; 0 and 1 of an interval's ends; 0 and 1 of gravity.
+        key: of an effect's number: which of its parameters; the effect is `component`.
     """
 
     kind: Kind
     channel: str = ""
     component: int = 0
     index: int = 0
+    key: str = ""
 
 
 class Parameters:
@@ -95,6 +106,9 @@ class Parameters:
                     _values(name, number, component, keep_shape, slots, start, rows)
                 if "intervals" in kinds:
                     _interval(name, number, component, slots, start, rows)
+        if "effects" in kinds:
+            for number, effect in enumerate(profile.effects):
+                _effect(number, effect, slots, start, rows)
         if "damping_ratio" in kinds:
             slots.append(Slot("damping_ratio"))
             start.append(0.0)
@@ -120,6 +134,15 @@ class Parameters:
         """The profile with these numbers, to six digits unless `exact`."""
         content = self.profile.model_dump()
         for slot, value in zip(self.slots, theta * self.scales, strict=True):
+            if slot.kind == "effects":
+                effect, number = content["effects"][slot.component], float(value)
+                number = number if exact else rounded(number)
+                if slot.key == "y":
+                    y = list(effect["y"])
+                    y[slot.index] = max(number, 0.0)
+                    effect["y"] = y
+                else:
+                    effect[slot.key] = number
             if slot.kind not in ("values", "intervals", "strengths"):
                 continue
             components = content["channels"][slot.channel]["components"]
@@ -154,6 +177,8 @@ def gravity_scale(context: Context, profile: Profile) -> float:
 
 
 def _scale(profile: Profile, slot: Slot, gravity: float) -> float:
+    if slot.kind == "effects":
+        return _effect_scale(profile.effects[slot.component], slot.key)
     if slot.kind != "values":
         return gravity if slot.kind == "gravity" else 1.0
     component = getattr(profile.channels, slot.channel).components[slot.component]
@@ -186,6 +211,27 @@ def _values(
         if keep_shape and rise:
             ends = ((index, -np.sign(rise)), (index + 1, np.sign(rise)))
             rows.append(({at[k]: float(sign) for k, sign in ends if k in at}, 0.0))
+
+
+def _effect_scale(effect: Effect, key: str) -> float:
+    value = getattr(effect, key)
+    return max(map(abs, value)) if isinstance(value, tuple) else abs(value)
+
+
+def _effect(number: int, effect: Effect, slots: list[Slot], start: list[float], rows: Rows) -> None:
+    """An effect's numbers that are not zero, each in units of its own size."""
+    for key in (*effect.parameters(), "y"):
+        value = getattr(effect, key, None)
+        if not isinstance(value, float | tuple) or not _effect_scale(effect, key):
+            continue
+        for index, one in enumerate(value if isinstance(value, tuple) else (value,)):
+            if key not in SIGNED:
+                least = 0.0 if key == "y" else LEAST_LEFT
+                rows.append(({len(slots): 1.0}, least))
+            if (most := LARGEST.get(key)) is not None:
+                rows.append(({len(slots): -1.0}, -most / _effect_scale(effect, key)))
+            slots.append(Slot("effects", component=number, index=index, key=key))
+            start.append(one / _effect_scale(effect, key))
 
 
 def _interval(

@@ -15,6 +15,7 @@ from joda._context import Context
 from joda.profile import Profile
 from joda.rig import rig
 from joda.runs import Run
+from joda.single import Single
 
 Array = NDArray[np.float64]
 
@@ -49,19 +50,14 @@ class Window:
 class Replayer:
     """A joint with a profile, ready to replay runs."""
 
-    def __init__(
-        self, context: Context, profile: Profile, model: mujoco.MjModel, joint: int
-    ) -> None:
-        """Args: the joint in its scene; its whole profile (`joda.native`); the scene; its id."""
-        own = context.equivalent_inertia - profile.added_inertia
-        self.model = rig(context.model_copy(update={"equivalent_inertia": own}), profile)
-        self.model.opt.timestep = self.h = float(model.opt.timestep)
-        self.model.jnt_solref[0], self.model.jnt_solimp[0] = (
-            model.jnt_solref[joint],
-            model.jnt_solimp[joint],
-        )
+    def __init__(self, context: Context, profile: Profile, single: Single, timestep: float) -> None:
+        """Args: the joint in its scene; its whole profile (`joda.native`); the rest; step, s."""
+        self.model = rig(context.model_copy(update={"equivalent_inertia": single.inertia}), profile)
+        self.model.opt.timestep = self.h = timestep
+        solref, solimp = single.limits(profile, timestep)
+        self.model.jnt_solref[0], self.model.jnt_solimp[0] = solref, solimp
         self.data = mujoco.MjData(self.model)
-        self.inertia = context.equivalent_inertia
+        self.inertia = single.inertia
 
     def whole(self, run: Run, sigma: float) -> Array:
         """Predicted positions at the run's times, from its start; NaN where force is unknown on."""
@@ -77,7 +73,8 @@ class Replayer:
         time = run.time[known] - run.time[0]
         steps = int(np.ceil(time[-1] / self.h)) + 1
         forces = np.interp(self.h * np.arange(steps), time, run.force[known])
-        path = self._roll(start, forces[None])[0]
+        mujoco.mj_resetData(self.model, self.data)
+        path = self._roll(start, forces[None])[0][0]
         out[known] = np.interp(time, self.h * np.arange(steps + 1), path)
         return out
 
@@ -119,25 +116,34 @@ class Replayer:
     def _nearby(self, starts: Array, doubts: Array, forces: Array, push: float) -> Array:
         """Paths from the starts, from starts one doubt off, and under another constant force.
 
+        What has a memory (friction, play) keeps it from one window to the next.
+
         Returns:
             shape (4, windows, steps + 1).
         """
-        others = [starts + doubts * off for off in ((0, 0), (1, 0), (0, 1), (0, 0))]
-        pushed = [forces, forces, forces, forces + push]
-        paths = self._roll(np.concatenate(others), np.concatenate(pushed))
-        return paths.reshape(4, len(starts), -1)
+        off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
+        pushed = np.array([0.0, 0.0, 0.0, push])
+        out = np.empty((4, len(starts), forces.shape[1] + 1))
+        mujoco.mj_resetData(self.model, self.data)
+        for k, (start, doubt, force) in enumerate(zip(starts, doubts, forces, strict=True)):
+            out[:, k], last = self._roll(start + doubt * off, force + pushed[:, None])
+            mujoco.mj_setState(self.model, self.data, last[0], FULL)
+        return out
 
-    def _roll(self, starts: Array, forces: Array) -> Array:
-        """Positions from starts (k, 2) under forces (k, steps); shape (k, steps + 1)."""
+    def _roll(self, starts: Array, forces: Array) -> tuple[Array, Array]:
+        """Positions from starts (k, 2) under forces (k, steps), with the memory in `data`.
+
+        Returns:
+            positions, shape (k, steps + 1), and the last full states.
+        """
         initial = np.empty((len(starts), mujoco.mj_stateSize(self.model, FULL)))
         for row, (position, velocity) in zip(initial, starts, strict=True):
-            mujoco.mj_resetData(self.model, self.data)
             self.data.qpos[0], self.data.qvel[0] = position, velocity
             mujoco.mj_getState(self.model, self.data, row, FULL)
         states, _ = rollout.rollout(
             self.model, self.data, initial, forces[:, :, None], control_spec=APPLIED
         )
-        return np.hstack([starts[:, :1], states[:, :, 1]])
+        return np.hstack([starts[:, :1], states[:, :, 1]]), states[:, -1]
 
 
 def _fitted(

@@ -41,15 +41,19 @@ class Single:
             channel = getattr(profile.channels, name)
             texts += [channel.text(), channel.combine]
         texts.append("; ".join(effect.text() for effect in profile.effects))
-        solref, solimp = self.solref, self.solimp
-        for effect in profile.effects:
-            if isinstance(effect, EndStopRestitution):
-                words = limit_parameters(round(effect.restitution, 3), h)
-                solref = tuple(map(float, words[0].split()))
-                solimp = (*map(float, words[1].split()), *self.solimp[3:])
+        solref, solimp = self.limits(profile, h)
         lo, hi = profile.joint.range
         fixed = self.inertia, self.row_inertia, self.weight, self.hinge
         return Solo(lo, hi, texts, *fixed, solref, solimp)
+
+    def limits(self, profile: Profile, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Solver parameters of the ends of the range, solref and solimp, for steps of h (s)."""
+        for effect in profile.effects:
+            if isinstance(effect, EndStopRestitution):
+                words = limit_parameters(round(effect.restitution, 3), h)
+                solref, solimp = (tuple(map(float, text.split())) for text in words)
+                return solref, (*solimp, *self.solimp[len(solimp) :])
+        return self.solref, self.solimp
 
 
 def single(context: Context, profile: Profile, model: mujoco.MjModel, joint: int) -> Single:

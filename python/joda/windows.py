@@ -26,6 +26,8 @@ TRAVEL = 0.15
 """What part of the range a window goes through at the usual speed."""
 FEWEST = 12
 """Samples that a window has at least."""
+MOST = 160
+"""Samples of a window that count at most; of more, every second or third does."""
 STEPS = 300
 """Steps that a window has at least."""
 STOP = 0.004
@@ -142,7 +144,7 @@ def windows_of(
             doubts = np.stack([begun.position_error, doubt], axis=1)
             same = np.full(many, number)
             parts.append((force, step + begins, fresh, start, doubts, same, enough))
-            window = np.where(enough[window], window + count, -1)
+            window = np.where(enough[window] & _thinned(window), window + count, -1)
             spread = _spread(time, position, sigma), _rough(time, run.force[piece], run.forced)
             samples.append((step + index, place - index, position, time, window, *spread))
             step, count = step + steps, count + many
@@ -234,6 +236,13 @@ def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
     length = TRAVEL * span / usual if usual else LONGEST
     least = FEWEST * float(np.median(np.concatenate(gaps)))
     return max(min(max(length, SHORTEST), LONGEST), least)
+
+
+def _thinned(window: Integers) -> NDArray[np.bool_]:
+    """Which samples are kept: at most `MOST` of a window, evenly."""
+    place = np.arange(len(window)) - np.searchsorted(window, window)
+    each = -(-np.bincount(window, minlength=1) // MOST)
+    return np.asarray(place % np.maximum(each, 1)[window] == 0)
 
 
 def _known(run: Run) -> list[Integers]:

@@ -1,0 +1,74 @@
+"""Diagnoses and mends a model until the data support nothing more."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from joda.comparison import Measured
+from joda.diagnosis import Diagnosis, diagnosed
+from joda.mending import Error, error, mend, parted
+from joda.profile import Profile
+
+MOST = 5
+"""Effects that are added at most."""
+TRIED = 3
+"""How many effects of a diagnosis are tried, the most likely first."""
+LIKELY = 0.1
+"""Least probability of an effect, besides the first, that is tried."""
+WORTH = 0.98
+"""Part of the error before, on runs held out, to which an effect must bring it."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A stair of the falling error.
+
+    Attributes:
+        effect: that was added; None at the beginning.
+        profile: with all effects so far.
+        error: on runs held out of every fit.
+        diagnosis: of the model with this profile; None if it was not made.
+    """
+
+    effect: str | None
+    profile: Profile
+    error: Error
+    diagnosis: Diagnosis | None
+
+
+def improved(
+    measured: Measured, told: Callable[[str], None] = lambda what: None
+) -> tuple[tuple[Step, ...], str]:
+    """Adds effects while the data support them.
+
+    Args:
+        measured: the joint, its profile as it is, and its runs; some are held out of every fit.
+        told: what is being done.
+
+    Returns:
+        the stairs, the first one the model as it was; and why there are no more, a sentence.
+    """
+    train, held = parted(measured)
+    steps = [Step(None, measured.profile, error(held), None)]
+    why = f"{MOST} effects were added; that is as many as are tried."
+    for _ in range(MOST):
+        told("diagnose")
+        diagnosis, _profile = diagnosed(train)
+        steps[-1] = Step(steps[-1].effect, train.profile, steps[-1].error, diagnosis)
+        if diagnosis.verdict != "missing_effect":
+            why = diagnosis.summary
+            break
+        mended = None
+        for number, finding in enumerate(diagnosis.effects[:TRIED]):
+            if number and finding.probability < LIKELY:
+                break
+            told(f"add {finding.effect}")
+            mended = mend(train, held, finding.effect, finding.direction, told)
+            if mended.effect and mended.after.window < WORTH * mended.before.window:
+                break
+            mended = None
+        if mended is None:
+            why = "No likely effect lowers the error on the runs that were held out."
+            break
+        train, held = (part.changed(mended.profile) for part in (train, held))
+        steps.append(Step(mended.effect, mended.profile, mended.after, None))
+    return tuple(steps), why
