@@ -28,11 +28,13 @@ LAYERS = [
     {"behaviour", "_templates", "replay", "solo", "gauge", "places", "single", "hypotheses"},
     {"curves"},
     {"comparison"},
-    {"_compare", "ranking"},
+    {"maps", "ranking"},
+    {"_compare"},
     {"experiments", "phrases", "mending"},
     {"diagnosis"},
-    {"improving"},
-    {"_diagnose", "_add", "_improve"},
+    {"improving", "outcome"},
+    {"_diagnose", "_improve"},
+    {"_add"},
     {"stretches"},
     {"misfit"},
     {"fitting"},
@@ -44,6 +46,7 @@ LAYERS = [
     {"_generate"},  # the loop
     {"_generate_all", "_revise"},
     {"_demo"},
+    {"_hidden_effect"},
     {"cli"},
 ]
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

@@ -11,14 +11,18 @@ from joda.errors import JodaError
 from joda.plugin import load, plugin_path
 
 if TYPE_CHECKING:
+    from joda._add import add
     from joda._attach import attach
     from joda._bench import bench
     from joda._compare import compare
     from joda._compile import compile
     from joda._context import context
     from joda._demo import demo
+    from joda._diagnose import diagnose
     from joda._generate import generate
     from joda._generate_all import generate_all
+    from joda._hidden_effect import hidden_effect
+    from joda._improve import improve
     from joda._plot import plot
     from joda._refine import refine
     from joda._render import render
@@ -37,14 +41,18 @@ __version__ = "0.1.0"
 __all__ = [
     "JodaError",
     "Profile",
+    "add",
     "attach",
     "bench",
     "compare",
     "compile",
     "context",
     "demo",
+    "diagnose",
     "generate",
     "generate_all",
+    "hidden_effect",
+    "improve",
     "plot",
     "plugin_path",
     "read_profiles",
@@ -57,13 +65,16 @@ __all__ = [
 ]
 
 COMMANDS = (
+    "add",
     "attach",
     "bench",
     "compare",
     "compile",
     "context",
     "demo",
+    "diagnose",
     "generate",
+    "improve",
     "plot",
     "refine",
     "render",
@@ -74,6 +85,7 @@ COMMANDS = (
 _LAZY = {
     "Profile": "joda.profile",
     "generate_all": "joda._generate_all",
+    "hidden_effect": "joda._hidden_effect",
     "read_profiles": "joda.scene",
     "set_profile": "joda.scene",
     **{name: f"joda._{name}" for name in COMMANDS},

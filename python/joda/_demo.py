@@ -80,7 +80,7 @@ def demo(
     Raises:
         JodaError: the folder cannot be written, or holds files already.
     """
-    folder = Path(output) if output is not None else _fresh("joda_demo")
+    folder = Path(output) if output is not None else fresh("joda_demo")
     if occupied(folder) and not force:
         raise JodaError(f"{folder}: exists already; choose another folder with -o or add --force.")
     make_folder(folder)
@@ -125,7 +125,8 @@ def demo(
     )
 
 
-def _fresh(name: str) -> Path:
+def fresh(name: str) -> Path:
+    """The first of NAME, NAME_2, NAME_3, ... that does not exist."""
     candidates = (Path(f"{name}_{k}" if k > 1 else name) for k in count(1))
     return next(path for path in candidates if not path.exists())
 

@@ -30,8 +30,10 @@ LEAST_GAIN = 60.0
 """Least gain in loss of an effect that is more than chance."""
 NOTICEABLE = 0.02
 """The same, per sample."""
-REMAINS = 0.35
-"""Part of the excess misfit that the true effect may leave."""
+LEFT = 0.25
+"""Excess per sample that any true effect may leave: noise is not known better."""
+RIVAL = 0.35
+"""Part of the excess that an effect may leave that counts as an alternative."""
 LITTLE = 0.05
 """Excess per sample that is never worth a word."""
 ALIKE = 0.1
@@ -132,6 +134,7 @@ def weigh(ranking: Ranking) -> Weighed:
     return verdict(
         ranking.fit.loss,
         np.array([g.score for g in ranking.guesses]),
+        ranking.guesses[0].hypothesis.remains,
         _level(judge, ranking.guesses[0].fit.squares),
         samples,
     )
@@ -143,12 +146,13 @@ def _level(judge: Judge, squares: Array) -> float:
     return float(np.clip(np.quantile(each, 0.3), 0.5, 1.3)) if len(each) else 1.0
 
 
-def verdict(base: float, scores: Array, level: float, samples: float) -> Weighed:
+def verdict(base: float, scores: Array, remains: float, level: float, samples: float) -> Weighed:
     """From losses to a verdict.
 
     Args:
         base: loss of the model as it is.
         scores: losses of the guesses and what their numbers cost, the least first.
+        remains: part of the excess that the first may leave.
         level: mean square residual that noise makes.
         samples: how many there are.
     """
@@ -158,12 +162,12 @@ def verdict(base: float, scores: Array, level: float, samples: float) -> Weighed
     gain = base - scores[0]
     if gain < max(LEAST_GAIN, NOTICEABLE * samples):
         said: Verdict = "adequate" if own < LITTLE * 4 else "unexplained"
-    elif left[0] > max(REMAINS * own, LITTLE):
+    elif left[0] > max(remains * own, LEFT):
         said = "unexplained"
     else:
         said = "missing_effect"
     weights = (left + LITTLE) ** -SHARPNESS
-    unknown = (REMAINS * own + LITTLE) ** -SHARPNESS
+    unknown = (remains * own + LITTLE) ** -SHARPNESS
     likely = weights / (weights.sum() + unknown)
     return Weighed(said, tuple(map(float, likely)), (own, tuple(map(float, left))))
 
@@ -355,7 +359,7 @@ def _finding(
         other.hypothesis.effect
         for k, other in enumerate(ranking.guesses)
         if k != number and left[k] - left[number] < ALIKE * left[number] + ALIKE * LITTLE
-        and left[k] < REMAINS * own
+        and left[k] < max(RIVAL * own, LEFT)
     )  # fmt: skip
     magnitude = hypothesis.magnitude(x)
     doubt = _doubt(ranking, guess)

@@ -43,6 +43,8 @@ TRIAL = 0.1
 """Strength with which an effect is tried, in usual forces."""
 RARE = 3.0
 """Rarity of a constant force all over a slide's range: a tilt is the same, and more usual."""
+KNOWN_LAW, KNOWN_SHAPE = 0.08, 0.25
+"""Part of the excess misfit that a true effect may leave, by what is known of it."""
 TINY = 1e-12
 """As good as no force."""
 Direction = Literal["both", "positive", "negative"]
@@ -90,6 +92,8 @@ class Hypothesis:
         unit: of the magnitude.
         ends: how many of the last numbers are ends of its interval.
         rarity: twice the logarithm of how much rarer it is than others.
+        remains: part of the excess misfit that it may leave where it is the true one: more where
+            only the rough shape of its curve is known.
     """
 
     effect: str
@@ -102,6 +106,7 @@ class Hypothesis:
     unit: str
     ends: int = 0
     rarity: float = 0.0
+    remains: float = KNOWN_LAW
 
 
 def with_component(profile: Profile, channel: str, component: Component) -> Profile:
@@ -252,6 +257,7 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
         lambda x: units.force * float(x[0]),
         _unit(units),
         len(bounds),
+        remains=KNOWN_SHAPE,
     )
 
 
@@ -292,6 +298,7 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         interval,
         lambda x: units.force * float(x[0]),
         _unit(units),
+        remains=KNOWN_SHAPE,
     )
 
 
@@ -352,6 +359,7 @@ def _snap(units: Units, name: str) -> Hypothesis:
         lambda x: units.force * float(x[:2].max()),
         _unit(units),
         len(bounds),
+        remains=KNOWN_SHAPE,
     )
 
 
@@ -374,6 +382,7 @@ def _bistable(units: Units, name: str) -> Hypothesis:
         everywhere,
         lambda x: units.force * float(x[0]),
         _unit(units),
+        remains=KNOWN_SHAPE,
     )
 
 
@@ -459,6 +468,7 @@ def _effect(
     magnitude: Callable[[Array], float],
     unit: str,
     direction: Direction = "both",
+    remains: float = KNOWN_LAW,
 ) -> Hypothesis:
     """One of the effects beyond the channels."""
     return Hypothesis(
@@ -470,6 +480,7 @@ def _effect(
         everywhere,
         magnitude,
         unit,
+        remains=remains,
     )
 
 
@@ -514,6 +525,7 @@ def _resistances(units: Units) -> Iterator[Hypothesis]:
         lambda x: StribeckFriction(y=flat(F * x[0]), velocity=V * float(np.exp(x[1]))),
         lambda x: F * float(x[0]),
         _unit(units),
+        remains=KNOWN_SHAPE,
     )
     if units.forced or units.weight:
         yield _effect(
@@ -577,7 +589,7 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
     if units.forced:
         yield _effect(
             "backlash",
-            [(1e-3, 0.2, 0.002), (np.log(3e-3), np.log(1.0), 0.05)],
+            [(3e-3, 0.2, 0.002), (np.log(3e-3), np.log(1.0), 0.05)],
             list(product((0.01, 0.03), np.log((0.03, 0.15)))),
             lambda x: Backlash(play=span * float(x[0]), inertia=M * float(np.exp(x[1]))),
             lambda x: span * float(x[0]),

@@ -1,6 +1,6 @@
 """One joint of a model by itself in C++: its profile is given each time, all else is fixed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 
@@ -45,6 +45,10 @@ class Single:
         lo, hi = profile.joint.range
         fixed = self.inertia, self.row_inertia, self.weight, self.hinge
         return Solo(lo, hi, texts, *fixed, solref, solimp)
+
+    def without_weight(self) -> "Single":
+        """The same joint where there is no gravity."""
+        return replace(self, weight=(0.0, 0.0))
 
     def limits(self, profile: Profile, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Solver parameters of the ends of the range, solref and solimp, for steps of h (s)."""

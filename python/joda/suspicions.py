@@ -35,7 +35,7 @@ Kind = Literal[
     "force_sign",
 ]
 
-FATAL = {"short", "degrees", "millimetres", "sign", "zero", "force_sign"}
+FATAL = {"short", "degrees", "millimetres", "sign", "zero"}
 
 LEAST_RUN, LEAST_CURVE = 20, 5
 """Fewest samples of which anything can be told."""

@@ -6,6 +6,7 @@ import typer
 
 from joda.cli.make import attach, compile, demo, generate, revise
 from joda.cli.measure import bench, compare, refine
+from joda.cli.mend import add, diagnose, improve
 from joda.cli.observe import context, plot, render
 from joda.cli.reference import schema, templates
 from joda.errors import JodaError
@@ -22,8 +23,8 @@ app = typer.Typer(
 )
 
 for command in (
-    demo, attach, compile, context, generate, revise, plot, compare, refine, render, bench,
-    schema, templates,
+    demo, attach, compile, context, generate, revise, plot, compare, diagnose, add, improve,
+    refine, render, bench, schema, templates,
 ):  # fmt: skip
     app.command()(command)
 

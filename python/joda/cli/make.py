@@ -1,5 +1,6 @@
 """Commands that give a joint its profile: the demo, the loop, and its steps by themselves."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -19,21 +20,49 @@ from joda.cli.tell import (
     tell_viewer,
     with_text_paths,
 )
+from joda.errors import JodaError
 
 
 def demo(
+    what: Annotated[
+        Literal["oven", "hidden-effect"],
+        typer.Argument(
+            help="An oven door gets its behaviour; or a joint's hidden effect is found and added."
+        ),
+    ] = "oven",
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder to fill [default: joda_demo].")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Folder to fill [default: joda_demo, or joda_hidden_effect]."
+        ),
     ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="hidden-effect: draws the same joint again.")
+    ] = None,
+    reveal: Annotated[
+        bool, typer.Option("--reveal", help="hidden-effect: say at once what is hidden.")
+    ] = False,
+    position_only: Annotated[
+        bool, typer.Option("--position-only", help="hidden-effect: no force is recorded.")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Give an oven door its behaviour, and compare it with the same door without.
 
-    Needs no key and no network. Example:
+    Or simulate a joint with an effect that its model lacks, find it from measured runs, add it,
+    and open the seal. Needs no key and no network. Example:
 
         joda demo -o joda_demo
+        joda demo hidden-effect --seed 7
     """
+    if what == "hidden-effect":
+        _hidden_effect(
+            output, as_json, seed=seed, reveal=reveal, position_only=position_only, force=force
+        )
+        return
+    if seed is not None or reveal or position_only:
+        raise JodaError("--seed, --reveal and --position-only go with joda demo hidden-effect.")
     from joda import demo as run
 
     with spinner("demo") as progress:
@@ -48,6 +77,18 @@ def demo(
     names = "demo.png", "profile.png", "scene.xml", "composed.json", "history.json", "oven.xml"
     tell_files(result.folder, names)
     tell_viewer(result.scene)
+
+
+def _hidden_effect(output: Path | None, as_json: bool, **options: Any) -> None:
+    from joda import hidden_effect
+
+    if as_json:
+        result = hidden_effect(output, **options)
+        print_json({**with_text_paths(asdict(result))})
+        return
+    result = hidden_effect(output, say=lambda sentence: print(sentence, flush=True), **options)
+    names = "compare.html", "diagnosis.html", "new.xml", "new.png", "unseen.html", "sealed.json"
+    tell_files(result.folder, [name for name in names if (result.folder / name).exists()])
 
 
 def generate(

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from joda.cli.options import Force, Joint, Json, Model, Scene
+from joda.cli.options import Force, Joint, Json, Model, Runs, Scene
 from joda.cli.progress import loss_bar, spinner
 from joda.cli.tell import (
     print_json,
@@ -22,7 +22,7 @@ def refine(
     model: Annotated[
         Path, typer.Argument(help="Scene whose joint carries a profile.", show_default=False)
     ],
-    runs: Annotated[list[Path], typer.Argument(help="Measured runs (CSV: time, position, force).")],
+    runs: Runs,
     joint: Joint,
     output: Scene,
     check: Annotated[
@@ -76,7 +76,7 @@ def refine(
 
 def compare(
     model: Model,
-    runs: Annotated[list[Path], typer.Argument(help="Measured runs (CSV: time, position, force).")],
+    runs: Runs,
     joint: Joint,
     as_json: Annotated[
         Path | None, typer.Option("--json", help="Write all numbers to this file.")

@@ -1,0 +1,151 @@
+"""Adds a diagnosed effect to a joint's profile, if that lowers the error on runs held out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from joda._diagnose import check_effect
+from joda.changes import changes
+from joda.comparison import rms
+from joda.diagnosis import read_diagnosis
+from joda.draw import write_png
+from joda.errors import JodaError
+from joda.mending import Error, mend, parted
+from joda.outcome import (
+    beside,
+    held_out,
+    mended_picture,
+    read_timed,
+    told_errors,
+    write_scene,
+)
+from joda.phrases import named
+
+
+@dataclass(frozen=True)
+class Added:
+    """What came of adding an effect.
+
+    Attributes:
+        scene, composed, picture: the files that were written.
+        effect: its name.
+        added: whether the scene has it; it has not where no variant lowers the error.
+        before, after: errors on what was held out of the fit, rad or m.
+        noise_floor: of the positions there, rad or m.
+        unit: of positions.
+        held_out: what was held out, in words.
+        changes: a line per changed component.
+        notes: what the user should be told, a sentence each.
+    """
+
+    scene: Path
+    composed: Path
+    picture: Path
+    effect: str
+    added: bool
+    before: Error
+    after: Error
+    noise_floor: float
+    unit: str
+    held_out: str
+    changes: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """The same for JSON, which has no paths."""
+        content = asdict(self)
+        return content | {key: str(content[key]) for key in ("scene", "composed", "picture")}
+
+
+def add(
+    model: str | Path,
+    joint: str,
+    diagnosis: str | Path,
+    runs: Sequence[str | Path],
+    output: str | Path,
+    *,
+    effect: str | None = None,
+    force: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> Added:
+    """Adds an effect to a joint's profile and fits everything together.
+
+    Of four or more runs every fourth is held out of the fit, of fewer the last quarter of each.
+    The effect is added only if that lowers the error there.
+
+    Args:
+        model: MJCF or URDF, with or without a profile on the joint.
+        joint: its name or address, see `joda.model.find_joint`.
+        diagnosis: what `joda.diagnose` wrote as JSON.
+        runs: CSV files with time, position and perhaps force.
+        output: scene to write; beside it, with its name, go .composed.json and .png.
+        effect: which one; None: the diagnosis' first.
+        force: overwrite what exists.
+        progress: told what is being done.
+
+    Returns:
+        what was written, and the errors before and after.
+
+    Raises:
+        JodaError: a file cannot be read or written, is no diagnosis of this joint or names no
+            effect.
+    """
+    target = Path(output)
+    composed, picture = beside(target, force)
+    told = read_diagnosis(Path(diagnosis))
+    name, direction = _chosen(told, Path(diagnosis), effect)
+    measured = read_timed(model, joint, runs)
+    own = measured.profile.joint
+    if told.get("joint", own.name) != own.name:
+        raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
+    train, held = parted(measured)
+    mended = mend(train, held, name, direction, progress)
+    progress("drawing")
+    notes = write_scene(Path(model), mended.profile, target, composed)
+    write_png(mended_picture(held, mended.profile), picture, force=True)
+    return Added(
+        scene=target,
+        composed=composed,
+        picture=picture,
+        effect=name,
+        added=mended.effect is not None,
+        before=mended.before,
+        after=mended.after,
+        noise_floor=rms(np.array(held.sigma)),
+        unit=own.unit,
+        held_out=held_out(measured, held),
+        changes=tuple(changes(measured.profile, mended.profile)),
+        notes=(*measured.notes, *notes),
+    )
+
+
+def sentences(added: Added) -> list[str]:
+    """What came of it, for a person."""
+    what = named(added.effect)
+    errors = told_errors(added.before, added.after, added.noise_floor, added.unit)
+    if added.added:
+        out = [f"Added {what}. On what was held out of the fit ({added.held_out}): {errors}."]
+    else:
+        out = [
+            f"Not added: {what}, as it does not lower the error on what was held out of the fit "
+            f"({added.held_out}): {added.before.window:.3g} {added.unit} in windows of 0.4 s, "
+            f"noise {added.noise_floor:.2g} {added.unit}. The scene behaves as before."
+        ]
+    return out + [*added.changes, *added.notes]
+
+
+def _chosen(told: dict[str, Any], path: Path, effect: str | None) -> tuple[str, str | None]:
+    """Name and direction of the effect to add."""
+    found = {one["effect"]: one for one in reversed(told["effects"])}
+    if effect is None:
+        if told.get("verdict") == "adequate" or not found:
+            verdict = told.get("verdict", "no effect")
+            raise JodaError(
+                f"{path}: names no effect to add (verdict: {verdict}); choose one with --effect."
+            )
+        effect = told["effects"][0]["effect"]
+    check_effect(effect)
+    return effect, found.get(effect, {}).get("direction")

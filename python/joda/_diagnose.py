@@ -1,0 +1,139 @@
+"""Diagnoses what a model lacks: the verdict as sentences, a picture, a page."""
+
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from joda.comparison import Measured
+from joda.diagnosis import Diagnosis, Finding, diagnosed
+from joda.draw import house_style, png
+from joda.errors import JodaError
+from joda.files import check_target, write_bytes, write_text
+from joda.maps import draw_curves, draw_maps, draw_runs, replayed
+from joda.outcome import read_runs
+from joda.page import page, paragraph, table
+from joda.page import picture as embedded
+from joda.phrases import NAMES, named
+from joda.profile import Profile
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def diagnose(
+    model: str | Path,
+    joint: str,
+    runs: Sequence[str | Path],
+    *,
+    exclude: Collection[str] = (),
+    json: str | Path | None = None,
+    report: str | Path | None = None,
+    picture: str | Path | None = None,
+    force: bool = False,
+    progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+) -> Diagnosis:
+    """Tells which physical effect a model lacks, where, and how much of it.
+
+    Args:
+        model: MJCF or URDF, with or without a profile on the joint.
+        joint: its name or address, see `joda.model.find_joint`.
+        runs: CSV files with time, position and perhaps force.
+        exclude: effects that are not considered.
+        json, report, picture: files to write: all numbers, an HTML page that needs nothing else,
+            a PNG.
+        force: overwrite them.
+        progress: told how much is done, of how much, and what.
+
+    Returns:
+        a verdict, and the effects that may be missing, the likeliest first.
+
+    Raises:
+        JodaError: a file cannot be read, what it holds cannot be of this joint as it stands, or
+            there is no such effect.
+    """
+    for path in (json, report, picture):
+        if path:
+            check_target(Path(path), force)
+    for name in exclude:
+        check_effect(name)
+    measured = read_runs(model, joint, runs)
+    diagnosis, profile = diagnosed(measured, exclude, progress)
+    if json:
+        write_text(Path(json), diagnosis.to_json())
+    if report or picture:
+        drawn = png(_picture(measured, profile, diagnosis))
+        if picture:
+            write_bytes(Path(picture), drawn)
+        if report:
+            write_text(Path(report), _page(diagnosis, drawn))
+    return diagnosis
+
+
+def check_effect(name: str) -> None:
+    """Raises JodaError if there is no effect of that name."""
+    if name not in NAMES:
+        raise JodaError(f"no effect '{name}'; there are {', '.join(NAMES)}.")
+
+
+def sentences(diagnosis: Diagnosis) -> list[str]:
+    """The diagnosis for a person: the verdict, the candidates, what to do next, notes."""
+    out = [diagnosis.summary, *map(_candidate, diagnosis.effects)]
+    return out + _after(diagnosis)
+
+
+def _candidate(found: Finding) -> str:
+    alike = " or ".join(map(named, found.indistinguishable_from))
+    told = f" These data cannot tell it from {alike}." if alike else ""
+    return f"{100 * found.probability:.0f} % {found.effect}: {found.explanation}{told}"
+
+
+def _after(diagnosis: Diagnosis) -> list[str]:
+    """The next experiment, and notes."""
+    told = diagnosis.next_experiment
+    return [f"Next experiment: {told}"] * bool(told) + list(diagnosis.notes)
+
+
+def _page(diagnosis: Diagnosis, drawn: bytes) -> str:
+    head = ("effect", "where", "how large", "probability", "error held out, before → after")
+    parts = [paragraph(diagnosis.summary)]
+    what = "measured and replayed runs, and the force the model has too much"
+    parts.append(embedded(drawn, what))
+    if diagnosis.effects:
+        parts.append(table(head, [_row(one, diagnosis.unit) for one in diagnosis.effects]))
+    parts += map(paragraph, (*map(_candidate, diagnosis.effects), *_after(diagnosis)))
+    return page(f"{diagnosis.joint}: what the model lacks", *parts)
+
+
+def _row(found: Finding, unit: str) -> tuple[str, ...]:
+    a, b = found.interval
+    of = "" if found.unit == "1" else f" {found.unit}"
+    return (
+        named(found.effect),
+        f"s = {a:.2f} to {b:.2f}",
+        f"{found.magnitude:.3g} \u00b1 {found.magnitude_error:.2g}{of}",
+        f"{100 * found.probability:.0f} %",
+        f"{found.held_out_error_before:.2g} → {found.held_out_error_after:.2g} {unit}",
+    )
+
+
+def _picture(measured: Measured, profile: Profile | None, diagnosis: Diagnosis) -> "Figure":
+    """Runs and their replays, and the force too much, without and with the likeliest effect."""
+    from matplotlib.figure import Figure
+
+    with house_style():
+        figure = Figure(figsize=(12, 7), dpi=110, layout="constrained")
+        if not measured.runs:
+            draw_curves(figure, measured, measured.curves)
+            return figure
+        models = [replayed("model", measured)]
+        if profile is not None:
+            models.append(replayed("with the effect", measured.changed(profile)))
+        left, right = figure.subfigures(1, 2, squeeze=False)[0]
+        joint = measured.profile.joint
+        draw_runs(left, measured.runs, {one.label: one.paths for one in models}, joint.unit)
+        draw_maps(right, models, joint)
+        left.suptitle("measured runs and replays", x=0.02, ha="left", fontsize=10)
+        what = "force too much: windows of 0.1 s, \u00b1 2 standard deviations"
+        right.suptitle(what, x=0.02, ha="left", fontsize=10)
+        figure.suptitle(diagnosis.summary, x=0.01, ha="left", fontsize=11, wrap=True)
+    return figure

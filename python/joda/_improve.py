@@ -1,0 +1,216 @@
+"""Diagnoses and mends a model until the data support no more, and tells the story."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from joda.changes import changes
+from joda.comparison import Measured, rms
+from joda.draw import COLOURS, house_style, png
+from joda.files import check_target, write_bytes, write_text
+from joda.improving import Step, improved
+from joda.maps import draw_maps, replayed
+from joda.mending import parted
+from joda.outcome import beside, draw_mended, held_out, read_timed, write_scene
+from joda.page import page, paragraph, table
+from joda.page import picture as embedded
+from joda.phrases import named
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+
+@dataclass(frozen=True)
+class Improved:
+    """What an improvement did.
+
+    Attributes:
+        scene, composed, picture: the files that were written.
+        joint: its name.
+        steps: the model as it was, then with one effect more each.
+        why: it ended, a sentence.
+        noise_floor: of the positions held out, rad or m.
+        unit: of positions.
+        held_out: what was held out of all fits, in words.
+        changes: a line per changed component, of the last profile against the first.
+        notes: what the user should be told, a sentence each.
+    """
+
+    scene: Path
+    composed: Path
+    picture: Path
+    joint: str
+    steps: tuple[Step, ...]
+    why: str
+    noise_floor: float
+    unit: str
+    held_out: str
+    changes: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def improve(
+    model: str | Path,
+    joint: str,
+    runs: Sequence[str | Path],
+    output: str | Path,
+    *,
+    report: str | Path | None = None,
+    force: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> Improved:
+    """Diagnoses what a model lacks and adds it, again and again, while the data support it.
+
+    Args:
+        model: MJCF or URDF, with or without a profile on the joint.
+        joint: its name or address, see `joda.model.find_joint`.
+        runs: CSV files with time, position and perhaps force. Of four or more every fourth is
+            held out of all fits, of fewer the last quarter of each.
+        output: scene to write; beside it, with its name, go .composed.json and .png.
+        report: an HTML page to write that needs nothing else.
+        force: overwrite what exists.
+        progress: told what is being done.
+
+    Returns:
+        what was written, and each step's error on what was held out.
+
+    Raises:
+        JodaError: a file cannot be read or written, or cannot be of this joint as it stands.
+    """
+    target = Path(output)
+    composed, picture = beside(target, force)
+    if report:
+        check_target(Path(report), force)
+    measured = read_timed(model, joint, runs)
+    steps, why = improved(measured, progress)
+    progress("drawing")
+    last, (_, held) = steps[-1].profile, parted(measured)
+    notes = write_scene(Path(model), last, target, composed)
+    result = Improved(
+        scene=target,
+        composed=composed,
+        picture=picture,
+        joint=last.joint.name,
+        steps=steps,
+        why=why,
+        noise_floor=rms(np.array(held.sigma)),
+        unit=last.joint.unit,
+        held_out=held_out(measured, held),
+        changes=tuple(changes(measured.profile, last)),
+        notes=(*measured.notes, *notes),
+    )
+    drawn = png(_picture(result, measured, held))
+    write_bytes(picture, drawn)
+    if report:
+        write_text(Path(report), _page(result, drawn))
+    return result
+
+
+def sentences(result: Improved) -> list[str]:
+    """The stairs, and why there are no more, for a person."""
+    rows = _rows(result)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    stairs = [
+        "  "
+        + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    head = (
+        f"Error on what was held out of all fits ({result.held_out}); noise "
+        f"{result.noise_floor:.2g} {result.unit}:"
+    )
+    return [head, *stairs, *_explanations(result), result.why, *result.changes, *result.notes]
+
+
+def _rows(result: Improved) -> list[tuple[str, str, str]]:
+    """Effect, error in windows, error of whole runs; the head first."""
+    told = [
+        (
+            f"+ {step.effect}" if step.effect else "as it was",
+            *(f"{x:.3g} {result.unit}" for x in (step.error.window, step.error.whole)),
+        )
+        for step in result.steps
+    ]
+    return [("model", "windows of 0.4 s", "whole runs"), *told]
+
+
+def _explanations(result: Improved) -> list[str]:
+    """Why each effect was added."""
+    out = []
+    for before, step in zip(result.steps, result.steps[1:], strict=False):
+        found = before.diagnosis.effects if before.diagnosis else ()
+        out += [one.explanation for one in found if one.effect == step.effect]
+    return out
+
+
+def _page(result: Improved, drawn: bytes) -> str:
+    head, *rows = _rows(result)
+    count = len(rows) - 1
+    first, last = result.steps[0].error.window, result.steps[-1].error.window
+    added = ", ".join(named(step.effect) for step in result.steps if step.effect)
+    story = (
+        f"{count} effect{'s' * (count > 1)} added: {added}. Windows of 0.4 s of what was held out "
+        f"of all fits ({result.held_out}) are missed by {last:.3g} instead of {first:.3g} "
+        f"{result.unit}; the measurement's noise is {result.noise_floor:.2g} {result.unit}."
+        if count
+        else f"No effect was added. Windows of 0.4 s are missed by {first:.3g} {result.unit}; the "
+        f"measurement's noise is {result.noise_floor:.2g} {result.unit}."
+    )
+    return page(
+        f"{result.joint}: what the model lacked",
+        paragraph(story),
+        embedded(drawn, "the falling error, the force too much, the profile, the runs held out"),
+        table(head, rows),
+        *map(paragraph, (*_explanations(result), result.why, *result.changes, *result.notes)),
+    )
+
+
+def _picture(result: Improved, measured: Measured, held: Measured) -> "Figure":
+    """The stairs and the maps above, the profile and the runs held out below."""
+    from matplotlib.figure import Figure
+
+    last = result.steps[-1].profile
+    with house_style():
+        figure = Figure(figsize=(12, 13), dpi=110, layout="constrained")
+        above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=[6, 7])[:, 0]
+        left, right = above.subfigures(1, 2, squeeze=False)[0]
+        _stairs(left, result)
+        models = [replayed("before", measured)]
+        if len(result.steps) > 1:
+            models.append(replayed("after", measured.changed(last)))
+        draw_maps(right, models, last.joint)
+        what = "force too much: windows of 0.1 s, \u00b1 2 standard deviations"
+        right.suptitle(what, x=0.02, ha="left", fontsize=10)
+        draw_mended(below, held, last)
+    return figure
+
+
+def _stairs(part: "Figure | SubFigure", result: Improved) -> None:
+    """The held-out error falling towards the noise."""
+    axes = part.subplots()
+    count = len(result.steps)
+    series = {
+        "windows of 0.4 s": ([step.error.window for step in result.steps], "conservative"),
+        "whole runs": ([step.error.whole for step in result.steps], "friction"),
+    }
+    for label, (values, colour) in series.items():
+        axes.stairs(values, np.arange(count + 1) - 0.5, baseline=None, lw=2, color=COLOURS[colour])
+        axes.plot(range(count), values, "o", color=COLOURS[colour], label=label)
+        for k, value in enumerate(values):
+            axes.annotate(
+                f"{value:.2g}", (k, value), (0, 6), textcoords="offset points", ha="center",
+                fontsize=8, color=COLOURS[colour],
+            )  # fmt: skip
+    axes.axhline(result.noise_floor, ls="--", color="#888888", lw=1.2, label="noise")
+    axes.set_yscale("log")
+    names = [f"+ {step.effect}" if step.effect else "as it was" for step in result.steps]
+    axes.set_xticks(range(count), names, fontsize=8)
+    if count > 2:
+        axes.tick_params(axis="x", rotation=20)
+    axes.set_ylabel(f"RMS error held out ({result.unit})")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False, fontsize=8)
+    part.suptitle("what each effect brought", x=0.02, ha="left", fontsize=10)

@@ -1,0 +1,109 @@
+"""Commands that find what a model lacks, and add it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from joda.cli.options import Force, Joint, Json, Model, Runs, Scene
+from joda.cli.progress import progress_bar, spinner
+from joda.cli.tell import print_json
+
+Report = Annotated[Path | None, typer.Option(help="Write an HTML page with pictures to this file.")]
+
+
+def diagnose(
+    model: Model,
+    runs: Runs,
+    joint: Joint,
+    as_json: Annotated[
+        Path | None, typer.Option("--json", help="Write the diagnosis to this file, for joda add.")
+    ] = None,
+    report: Report = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
+    ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="An effect that is not considered.")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Tell which physical effect a model lacks, where, and how much of it.
+
+    Example:
+
+        joda diagnose scene.xml run1.csv run2.csv --joint door --json diagnosis.json
+    """
+    from joda import diagnose as run
+    from joda._diagnose import sentences
+
+    with progress_bar() as bar:
+        found = run(
+            model, joint, runs, exclude=exclude or (), json=as_json, report=report,
+            picture=output, force=force, progress=bar,
+        )  # fmt: skip
+    for sentence in sentences(found):
+        print(sentence)
+    for path in filter(None, (as_json, report, output)):
+        print(path)
+
+
+def add(
+    model: Model,
+    runs: Runs,
+    joint: Joint,
+    diagnosis: Annotated[
+        Path, typer.Option(help="What joda diagnose --json wrote.", show_default=False)
+    ],
+    output: Scene,
+    effect: Annotated[
+        str | None, typer.Option(help="Which effect [default: the diagnosis' first].")
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Add the effect that a diagnosis names, if that lowers the error on runs held out.
+
+    Leaves, beside the scene, its .composed.json and .png. Example:
+
+        joda add scene.xml run1.csv run2.csv --joint door --diagnosis diagnosis.json -o new.xml
+    """
+    from joda import add as run
+    from joda._add import sentences
+
+    with spinner("add") as progress:
+        added = run(
+            model, joint, diagnosis, runs, output, effect=effect, force=force, progress=progress
+        )
+    if as_json:
+        print_json(added.as_json())
+        return
+    for sentence in sentences(added):
+        print(sentence)
+    for path in (added.scene, added.composed, added.picture):
+        print(path)
+
+
+def improve(
+    model: Model,
+    runs: Runs,
+    joint: Joint,
+    output: Scene,
+    report: Report = None,
+    force: Force = False,
+) -> None:
+    """Diagnose and add, again and again, until the data support nothing more.
+
+    Leaves, beside the scene, its .composed.json and .png. Example:
+
+        joda improve scene.xml run1.csv run2.csv --joint door -o new.xml --report story.html
+    """
+    from joda import improve as run
+    from joda._improve import sentences
+
+    with spinner("improve") as progress:
+        result = run(model, joint, runs, output, report=report, force=force, progress=progress)
+    for sentence in sentences(result):
+        print(sentence)
+    for path in filter(None, (result.scene, result.composed, result.picture, report)):
+        print(path)

@@ -1,0 +1,49 @@
+"""A small sample of tests/hidden_bench.py: what is named on joints that nobody has seen."""
+
+import secrets
+from dataclasses import replace
+
+import pytest
+from hidden_bench import case_of, dice, examined, fine, job_of, told, true_error
+
+from joda.hidden import draw
+
+RELIABLE = (
+    "constant_friction_hinge",
+    "constant_damping_hinge",
+    "quadratic_damping",
+    "direction_dependent_damping",
+    "spring_return_to_high_end",
+    "detent_internal",
+    "load_dependent_friction",
+)
+
+
+def test_of_a_null_and_three_effects_at_most_one_is_wrong():
+    master = secrets.randbits(32)
+    print("master seed", master)
+    effects = dice(master, "reliable").choice(RELIABLE, 3, replace=False)
+    hidden = [replace(job_of(master, "forced", k), effect=str(e)) for k, e in enumerate(effects)]
+    rows = []
+    for job in [job_of(master, "none", 0), *hidden]:
+        rows.append(examined(job))
+        print(told(rows[-1]))
+    assert not [row["failed"] for row in rows if "failed" in row]
+    assert sum(map(fine, rows)) >= 3
+
+
+def test_the_true_model_misses_a_null_by_hardly_more_than_the_noise():
+    case = draw(2, None)
+    assert true_error(case) == pytest.approx(case.noise, rel=0.15)
+
+
+def test_the_true_memory_makes_the_error_small():
+    case = case_of(replace(job_of(0, "hard", 0), seed=1, effect="backlash"))
+    assert true_error(case) < 1.5 * case.noise
+
+
+def test_a_master_seed_gives_the_same_jobs_and_every_effect_in_turn():
+    jobs = [job_of(5, "hard", k) for k in range(9)]
+    assert jobs == [job_of(5, "hard", k) for k in range(9)]
+    assert len({job.effect for job in jobs[:3]}) == 3
+    assert job_of(6, "hard", 0).seed != jobs[0].seed
