@@ -14,6 +14,7 @@ import json
 import multiprocessing
 import os
 import secrets
+import signal
 import sys
 import tempfile
 import time
@@ -150,7 +151,8 @@ def true_error(case: Case) -> float:
     """RMS error (rad or m) of the true joint on the held-out runs in windows of 0.4 s.
 
     As `Replayer.windows` does it: from starts that are fitted within their measurement's error,
-    under the measured force, linear between samples. What has a memory starts each window as along
+    under the measured force, linear between samples; of the tries the best counts, not the last, as
+    a step of a force may throw a try off. What has a memory starts each window as along
     the clean run. For a case that hides nothing, or EFFECTS: a delay's memory and a disturbance's
     clock are left out.
     """
@@ -163,18 +165,20 @@ def true_error(case: Case) -> float:
         memory = {name: x[at, np.repeat([p.run for p in pieces], 3)] for name, x in _kept(case)}
     off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
     moved = np.zeros_like(starts)
+    best = [(np.inf, np.zeros(0))] * len(pieces)
     for _ in range(TRIES):
         q, v = np.reshape((starts + doubts * moved)[:, None] + doubts[:, None] * off, (-1, 2)).T
         path = _replayed(case.truth, forces, q, v, memory).reshape(len(forces), -1, 3)
-        misfits = []
         for k, p in enumerate(pieces):
             near = np.stack([np.interp(p.time, H * np.arange(len(path)), x) for x in path[:, k].T])
             misfit = near[0] - p.position
             rows = np.vstack([(near[1:] - near[0]).T / p.sigma, np.eye(2)])
             wanted = np.concatenate([misfit / p.sigma, moved[k]])
-            moved[k] = np.clip(moved[k] - np.linalg.lstsq(rows, wanted)[0], -START, START)
-            misfits.append(misfit)
-    return float(np.sqrt(np.mean(np.concatenate(misfits) ** 2)))
+            best[k] = min(best[k], (float(wanted @ wanted), misfit), key=lambda pair: pair[0])
+            moved[k] = np.clip(
+                moved[k] - np.linalg.lstsq(rows, wanted, rcond=None)[0], -START, START
+            )
+    return float(np.sqrt(np.mean(np.concatenate([misfit for _, misfit in best]) ** 2)))
 
 
 @dataclass(frozen=True)
@@ -352,6 +356,10 @@ def unexplained(row: dict) -> bool:
     return row.get("verdict") == "unexplained"
 
 
+def silent(row: dict) -> bool:
+    return row.get("verdict") in ("adequate", "insufficient_data")
+
+
 def found(row: dict) -> bool:
     return {row["effect"], row["second"]} <= set(row.get("added", []))
 
@@ -405,6 +413,11 @@ def figures(rows: list[dict]) -> Iterator[Figure]:
 
     forced, well = of("forced", "add"), [row for row in rows if "failed" not in row]
     yield from share("none: adequate", "≥ 95 %", of("none"), fine)
+    for way, push in (("forced", True), ("free", False)):
+        yield from share(
+            f"none: adequate, {way}", "", [r for r in of("none") if r["forced"] == push], fine
+        )
+    yield from share("none: adequate, or too few data", "", of("none"), silent)
     yield from share("forced: right effect first", "≥ 90 %", forced, right)
     yield from share("forced: among the first two", "≥ 97 %", forced, second)
     yield from share("forced: first, or named with the first", "", forced, alike)
@@ -465,7 +478,7 @@ def figures(rows: list[dict]) -> Iterator[Figure]:
 def told(row: dict) -> str:
     """One case as a line."""
     hidden = " + ".join(filter(None, (row["effect"], row["second"]))) or "nothing"
-    hidden += " (its entry removed)" * bool(row["exclude"]) + "" if row["forced"] else ", free"
+    hidden += " (its entry removed)" * bool(row["exclude"]) + ", free" * (not row["forced"])
     begin = f"{row['group']} {row['number']}, seed {row['seed']}, {hidden}: "
     if "failed" in row:
         return begin + row["failed"].strip().splitlines()[-1]
@@ -487,11 +500,12 @@ def table(rows: list[dict]) -> None:
 
 # --- running
 def begin(numbers) -> None:
-    """A worker: on a core of its own; what MuJoCo logs is not left in the repository."""
+    """A worker: on a core of its own, stopped by the bench; MuJoCo logs outside the repository."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.chdir(tempfile.gettempdir())
     if hasattr(os, "sched_setaffinity"):
         cores = sorted(os.sched_getaffinity(0))
-        os.sched_setaffinity(0, {cores[numbers.get() % len(cores)]})
+        os.sched_setaffinity(0, {cores[(numbers.get() + os.getppid()) % len(cores)]})
 
 
 def rows_of(path: Path, jobs: list[Job]) -> list[dict]:

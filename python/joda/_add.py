@@ -134,7 +134,7 @@ def sentences(added: Added) -> list[str]:
             f"({added.held_out}): {added.before.window:.3g} {added.unit} in windows of 0.4 s, "
             f"noise {added.noise_floor:.2g} {added.unit}. The scene behaves as before."
         ]
-    return out + [*added.changes, *added.notes]
+    return [*out, *added.changes, *added.notes]
 
 
 def _chosen(told: dict[str, Any], path: Path, effect: str | None) -> tuple[str, str | None]:

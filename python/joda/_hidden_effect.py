@@ -98,8 +98,7 @@ def hidden_effect(
 
     say(f"\n1. Is the model good? (compare, {folder / 'compare.html'})")
     found = compare(model, joint, runs, report=folder / "compare.html", force=True)
-    for sentence in of_comparison(found)[:2]:
-        say(sentence)
+    say(of_comparison(found)[0])
     say(f"\n2. What does it lack? (diagnose, {folder / 'diagnosis.html'})")
     written = folder / "diagnosis.json"
     diagnosis = diagnose(

@@ -122,19 +122,33 @@ def sentences(result: Improved) -> list[str]:
         f"Error on what was held out of all fits ({result.held_out}); noise "
         f"{result.noise_floor:.2g} {result.unit}:"
     )
-    return [head, *stairs, *_explanations(result), result.why, *result.changes, *result.notes]
+    return [head, *stairs, *_ending(result)]
+
+
+def _ending(result: Improved) -> list[str]:
+    """Why each effect was added, why no more, what to do next, what changed, notes."""
+    last = result.steps[-1].diagnosis
+    told = last and last.next_experiment
+    return [
+        *_explanations(result),
+        result.why,
+        *[f"Next experiment: {told}"] * bool(told),
+        *result.changes,
+        *result.notes,
+    ]
 
 
 def _rows(result: Improved) -> list[tuple[str, str, str]]:
     """Effect, error in windows, error of whole runs; the head first."""
-    told = [
-        (
-            f"+ {step.effect}" if step.effect else "as it was",
-            *(f"{x:.3g} {result.unit}" for x in (step.error.window, step.error.whole)),
-        )
-        for step in result.steps
-    ]
-    return [("model", "windows of 0.4 s", "whole runs"), *told]
+    rows = [("model", "windows of 0.4 s", "whole runs")]
+    for step in result.steps:
+        window, whole = (f"{x:.3g} {result.unit}" for x in (step.error.window, step.error.whole))
+        rows.append((_step(step), window, whole))
+    return rows
+
+
+def _step(step: Step) -> str:
+    return f"+ {step.effect}" if step.effect else "as it was"
 
 
 def _explanations(result: Improved) -> list[str]:
@@ -164,7 +178,7 @@ def _page(result: Improved, drawn: bytes) -> str:
         paragraph(story),
         embedded(drawn, "the falling error, the force too much, the profile, the runs held out"),
         table(head, rows),
-        *map(paragraph, (*_explanations(result), result.why, *result.changes, *result.notes)),
+        *map(paragraph, _ending(result)),
     )
 
 
@@ -206,8 +220,7 @@ def _stairs(part: "Figure | SubFigure", result: Improved) -> None:
             )  # fmt: skip
     axes.axhline(result.noise_floor, ls="--", color="#888888", lw=1.2, label="noise")
     axes.set_yscale("log")
-    names = [f"+ {step.effect}" if step.effect else "as it was" for step in result.steps]
-    axes.set_xticks(range(count), names, fontsize=8)
+    axes.set_xticks(range(count), map(_step, result.steps), fontsize=8)
     if count > 2:
         axes.tick_params(axis="x", rotation=20)
     axes.set_ylabel(f"RMS error held out ({result.unit})")

@@ -17,7 +17,7 @@ from joda.files import read_text
 from joda.judge import BEND, NOTHING, Judge, Make, Unknowns
 from joda.phrases import explained
 from joda.profile import Profile
-from joda.ranking import Guess, Ranking, Told, joined, rank, usable, windows_for
+from joda.ranking import CALM, Guess, Ranking, Told, joined, rank, usable, windows_for
 from joda.windows import Windows
 
 Array = NDArray[np.float64]
@@ -36,6 +36,12 @@ RIVAL = 0.35
 """Part of the excess that an effect may leave that counts as an alternative."""
 LITTLE = 0.05
 """Excess per sample that is never worth a word."""
+LONGER = 3.0
+"""How much longer the windows of a second look are."""
+MUCH = 0.5
+"""Excess per sample that is, even if no effect lowers it."""
+WORST = 1.3
+"""Mean square residual that noise may make."""
 ALIKE = 0.1
 """By how much of the misfit two effects may differ that the data cannot tell apart."""
 SURE = 0.9
@@ -126,42 +132,62 @@ class Weighed:
 
 def weigh(ranking: Ranking) -> Weighed:
     """The verdict on a ranking, and how likely each effect is the missing one."""
-    judge = ranking.judge
+    judge, guesses = ranking.judge, ranking.guesses
     counts = judge.windows.count[judge.counts].astype(float)
-    samples = float(counts.sum())
-    if not ranking.guesses:
+    if not guesses or not len(counts):
         return Weighed("adequate", (), (0.0, ()))
-    return verdict(
-        ranking.fit.loss,
-        np.array([g.score for g in ranking.guesses]),
-        ranking.guesses[0].hypothesis.remains,
-        _level(judge, ranking.guesses[0].fit.squares),
-        samples,
-    )
+    own = _per_sample(ranking.fit.squares, ranking)
+    each = np.stack([_per_sample(g.fit.squares, ranking) for g in guesses])
+    saved = np.array([ranking.fit.loss - g.fit.loss for g in guesses])
+    cost = np.array([g.cost for g in guesses])
+    knocking = np.array([g.hypothesis.effect == "end_stop_restitution" for g in guesses])
+    return verdict(own, each, counts, saved, cost, guesses[0].hypothesis.remains, bool(knocking[0]))
 
 
-def _level(judge: Judge, squares: Array) -> float:
-    """Mean square residual of the better half of the windows: what the noise makes."""
-    each = (squares / np.maximum(judge.windows.count, 1))[judge.counts]
-    return float(np.clip(np.quantile(each, 0.3), 0.5, 1.3)) if len(each) else 1.0
+def _per_sample(squares: Array, ranking: Ranking) -> Array:
+    """Mean square residual of each window that counts."""
+    judge = ranking.judge
+    return np.asarray((squares / np.maximum(judge.windows.count, 1))[judge.counts])
 
 
-def verdict(base: float, scores: Array, remains: float, level: float, samples: float) -> Weighed:
-    """From losses to a verdict.
+def verdict(
+    base: Array,
+    each: Array,
+    counts: Array,
+    saved: Array,
+    cost: Array,
+    remains: float,
+    knocks: bool = False,
+) -> Weighed:
+    """From misfits to a verdict.
+
+    What counts as noise is at least what the best guess leaves in its better windows: recorded
+    noise is often less than all that a simulation cannot follow.
 
     Args:
-        base: loss of the model as it is.
-        scores: losses of the guesses and what their numbers cost, the least first.
+        base: mean square residual of each window, of the model as it is, shape (m,).
+        each: the same of the guesses, the best first, shape (guesses, m).
+        counts: samples of each window, shape (m,).
+        saved: what each guess lowers the loss by, shape (guesses,).
+        cost: what its numbers cost, shape (guesses,).
         remains: part of the excess that the first may leave.
-        level: mean square residual that noise makes.
-        samples: how many there are.
+        knocks: whether the first is told by knocks at the ends, which these windows have none of.
     """
-    floor = samples * BEND * np.log1p(level / BEND)
-    own = max((base - floor) / samples, 0.0)
-    left = np.maximum((scores - floor) / samples, 0.0)
-    gain = base - scores[0]
+    samples = float(counts.sum())
+    level = max(float(np.quantile(each[0], CALM)), 0.5)
+
+    def excess(squares: Array, level: float = level) -> Array:
+        """Robust mean square residual beyond the noise, in units of the noise."""
+        robust = BEND * (np.log1p(squares / level / BEND) - np.log1p(1 / BEND))
+        return np.asarray((robust * counts).sum(axis=-1) / samples)
+
+    own = max(float(excess(base)), 0.0)
+    left = np.maximum(excess(each) + cost / (samples * level), 0.0)
+    if knocks:
+        left[0] = 0.0
+    gain = saved[0] - cost[0]
     if gain < max(LEAST_GAIN, NOTICEABLE * samples):
-        said: Verdict = "adequate" if own < LITTLE * 4 else "unexplained"
+        said: Verdict = "adequate" if excess(base, min(level, WORST)) < MUCH else "unexplained"
     elif left[0] > max(remains * own, LEFT):
         said = "unexplained"
     else:
@@ -205,6 +231,11 @@ def diagnosed(
         return _said(measured, "insufficient_data", missing, (), None), None
     ranking = rank(measured, exclude=exclude, told=told)
     weighed = weigh(ranking)
+    if weighed.verdict == "unexplained":  # what is weak shows in longer windows
+        length = LONGER * ranking.judge.windows.length
+        longer = rank(measured, length, exclude, told)
+        if (again := weigh(longer)).verdict == "missing_effect":
+            ranking, weighed = longer, again
     own, left = weighed.excess
     if weighed.verdict == "adequate":
         summary = (
@@ -358,7 +389,7 @@ def _finding(
     alike = tuple(
         other.hypothesis.effect
         for k, other in enumerate(ranking.guesses)
-        if k != number and left[k] - left[number] < ALIKE * left[number] + ALIKE * LITTLE
+        if k != number and abs(left[k] - left[number]) < ALIKE * (left[number] + LITTLE)
         and left[k] < max(RIVAL * own, LEFT)
     )  # fmt: skip
     magnitude = hypothesis.magnitude(x)

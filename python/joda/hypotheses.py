@@ -43,7 +43,7 @@ TRIAL = 0.1
 """Strength with which an effect is tried, in usual forces."""
 RARE = 3.0
 """Rarity of a constant force all over a slide's range: a tilt is the same, and more usual."""
-KNOWN_LAW, KNOWN_SHAPE = 0.08, 0.25
+KNOWN_LAW, KNOWN_SHAPE = 0.12, 0.3
 """Part of the excess misfit that a true effect may leave, by what is known of it."""
 TINY = 1e-12
 """As good as no force."""

@@ -154,10 +154,10 @@ class Judge:
         z = (start - windows.start) / windows.doubt
         return r, (r**2).sum(axis=1) + (z**2).sum(axis=1)
 
-    def loss(self, squares: Array, bend: float = BEND) -> float:
-        """Robust sum over the windows that count."""
+    def loss(self, squares: Array, bend: float = BEND, level: float = 1.0) -> float:
+        """Robust sum over the windows that count, where noise makes squares of `level`."""
         room = bend * np.maximum(self.windows.count, 1)
-        return float(np.sum((room * np.log1p(squares / room))[self.counts]))
+        return float(np.sum((room * np.log1p(squares / level / room))[self.counts]))
 
     def linear(
         self, make: Make, unknowns: Unknowns, x: Array, start: Array, bend: float = BEND

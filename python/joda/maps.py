@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,7 +104,12 @@ def _map(axes: "Axes", rows: Array, x: int) -> None:
     clear = rows[doubt < UNCLEAR * np.median(doubt)] if len(rows) else rows
     for sign, name, way in WAYS:
         some = clear[np.sign(clear[:, 1]) == sign]
-        style = {"fmt": ".", "color": COLOURS[name], "lw": 0.7, "label": f"towards {way}"}
+        style: dict[str, Any] = {
+            "fmt": ".",
+            "color": COLOURS[name],
+            "lw": 0.7,
+            "label": f"towards {way}",
+        }
         axes.errorbar(some[:, x], some[:, FORCE], 2 * some[:, FORCE + 1], **style)
     axes.axhline(0, color="#bbbbbb", lw=0.8, zorder=0)
     axes.spines[["top", "right"]].set_visible(False)

@@ -146,10 +146,9 @@ def _candidates(
     n = len(base.places)
     profile = first.hypothesis.write(base.written(first.fit.x[:n]), first.x)
     yield checked(profile)
-    length = float(np.median(np.diff(windows.at))) * windows.h if len(windows.at) > 1 else 0.4
     for factor in LONGER:
-        told(f"everything together, windows of {factor * length:.2g} s")
-        profile = refitted(train, profile, factor * length)
+        told(f"everything together, windows of {factor * windows.length:.2g} s")
+        profile = refitted(train, profile, factor * windows.length)
         yield checked(profile)
 
 

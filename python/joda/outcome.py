@@ -90,6 +90,9 @@ def draw_mended(part: "Figure | SubFigure", held: Measured, after: Profile) -> N
     panels = left.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
     gravity = np.array(found.positions), -np.array(found.gravity_force)
     draw_channels(panels, held.profile, after, gravity if np.any(gravity[1]) else None)
+    for axes in panels:
+        if not axes.dataLim.height:
+            axes.set(ylim=(-1, 1), yticks=[0])
     panels[0].legend(frameon=False, fontsize=8, ncols=3)
     panels[-1].set_xlabel(f"joint position ({joint.unit})")
     effects = "".join(f"\n+ {effect.described()}" for effect in after.effects)

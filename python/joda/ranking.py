@@ -1,8 +1,8 @@
 """What may be missing, ranked: each hypothesis is fitted together with the model's own numbers."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import cpu_count
 
 import numpy as np
@@ -39,6 +39,8 @@ APART = 0.06
 """How much these must differ in one of their numbers."""
 POLISHED = 4
 """Of how many effects the numbers are tried elsewhere."""
+CALM = 0.3
+"""Part of the windows, the better ones, that tell the noise."""
 BOUNCY = 0.3
 """Least speed after a knock, per speed before, of ends that throw the joint back."""
 CLEARLY = 0.15
@@ -134,11 +136,13 @@ class Guess:
         hypothesis: what is missing.
         fit: of the model's factors and the hypothesis' numbers.
         score: its loss, and what its numbers cost.
+        cost: of its numbers.
     """
 
     hypothesis: Hypothesis
     fit: Fit
     score: float
+    cost: float
 
     @property
     def x(self) -> Array:
@@ -300,7 +304,30 @@ def moved(judge: Judge, base: Base, found: Guess) -> Guess:
 def _guess(judge: Judge, hypothesis: Hypothesis, fit: Fit) -> Guess:
     samples = float(judge.windows.count[judge.counts].sum())
     cost = hypothesis.rarity + len(hypothesis.unknowns.low) * np.log(max(samples, 2.0))
-    return Guess(hypothesis, fit, fit.loss + cost)
+    return Guess(hypothesis, fit, fit.loss + cost, cost)
+
+
+def level_of(judge: Judge, squares: Array) -> float:
+    """Mean square residual in the better windows: what a simulation cannot follow.
+
+    Recorded noise is often less than that: clocks, forces, all else that is a little wrong. At
+    least 1.
+    """
+    each = (squares / np.maximum(judge.windows.count, 1))[judge.counts]
+    return max(float(np.quantile(each, CALM)), 1.0) if len(each) else 1.0
+
+
+def _levelled(judge: Judge, guesses: Sequence[Guess]) -> list[Guess]:
+    """The guesses, scored by what the best of them leaves as noise."""
+    if not guesses:
+        return []
+    level = level_of(judge, min(guesses, key=lambda g: g.score).fit.squares)
+
+    def scored(one: Guess) -> Guess:
+        lower = judge.loss(one.fit.squares) - judge.loss(one.fit.squares, level=level)
+        return replace(one, score=one.score - lower)
+
+    return [scored(one) for one in guesses]
 
 
 @dataclass(frozen=True)
@@ -325,7 +352,7 @@ Told = Callable[[int, int, str], None]
 
 def rank(
     measured: Measured,
-    counts: NDArray[np.bool_] | None = None,
+    length: float | None = None,
     exclude: Collection[str] = (),
     told: Told = lambda done, total, what: None,
 ) -> Ranking:
@@ -333,12 +360,12 @@ def rank(
 
     Args:
         measured: the joint and its runs.
-        counts: which windows count, besides those that cannot; None: all.
+        length: of the windows, s; None: by the joint's pace.
         exclude: effects that are not tried.
         told: how many hypotheses are done, of how many, and the last one's name.
     """
-    windows = windows_for(measured)
-    judge = Judge(windows, usable(windows) & (True if counts is None else counts))
+    windows = windows_for(measured, length)
+    judge = Judge(windows, usable(windows))
     base = base_of(measured.profile, measured.single, windows.h)
     fit = judge.fit(base.solo, base.unknowns, np.ones(len(base.places)))
     about = judge.linear(base.solo, base.unknowns, fit.x, fit.start, BEND * usual(judge, fit))
@@ -361,7 +388,7 @@ def rank(
         guesses = heard(pool.map(lambda h: guess(judge, base, fit, about, h), tried))
         best = _best(guesses)[:POLISHED]
         guesses += heard(pool.map(lambda g: moved(judge, base, g), best))
-    return Ranking(judge, base, fit, tuple(_best(guesses)))
+    return Ranking(judge, base, fit, tuple(_best(_levelled(judge, guesses))))
 
 
 def windows_for(measured: Measured, length: float | None = None) -> Windows:

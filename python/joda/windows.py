@@ -72,6 +72,12 @@ class Windows:
     knocks: NDArray[np.bool_]
 
     @property
+    def length(self) -> float:
+        """Of a usual window, s."""
+        ends = np.append(self.at, len(self.force))
+        return self.h * float(np.median(np.diff(ends)))
+
+    @property
     def count(self) -> Integers:
         """Samples of each window, shape (m,)."""
         return np.asarray((self.rows >= 0).sum(axis=1))
