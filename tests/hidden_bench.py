@@ -150,11 +150,10 @@ def read(case: Case) -> tuple[Measured, Measured]:
 def true_error(case: Case) -> float:
     """RMS error (rad or m) of the true joint on the held-out runs in windows of 0.4 s.
 
-    As `Replayer.windows` does it: from starts that are fitted within their measurement's error,
-    under the measured force, linear between samples; of the tries the best counts, not the last, as
-    a step of a force may throw a try off. What has a memory starts each window as along
-    the clean run. For a case that hides nothing, or EFFECTS: a delay's memory and a disturbance's
-    clock are left out.
+    As `Replayer.windows` does it, and as easily misled by a knock: from starts that are fitted
+    within their measurement's error, under the measured force, linear between samples. What has a
+    memory starts each window as along the clean run. For a case that hides nothing, or EFFECTS: a
+    delay's memory and a disturbance's clock are left out.
     """
     pieces = [piece for k, run in enumerate(case.held_out) for piece in _pieces(k, run)]
     starts, doubts = (np.array([getattr(p, key) for p in pieces]) for key in ("start", "doubt"))
@@ -165,20 +164,19 @@ def true_error(case: Case) -> float:
         memory = {name: x[at, np.repeat([p.run for p in pieces], 3)] for name, x in _kept(case)}
     off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
     moved = np.zeros_like(starts)
-    best = [(np.inf, np.zeros(0))] * len(pieces)
     for _ in range(TRIES):
         q, v = np.reshape((starts + doubts * moved)[:, None] + doubts[:, None] * off, (-1, 2)).T
         path = _replayed(case.truth, forces, q, v, memory).reshape(len(forces), -1, 3)
+        misfits = []
         for k, p in enumerate(pieces):
             near = np.stack([np.interp(p.time, H * np.arange(len(path)), x) for x in path[:, k].T])
             misfit = near[0] - p.position
             rows = np.vstack([(near[1:] - near[0]).T / p.sigma, np.eye(2)])
             wanted = np.concatenate([misfit / p.sigma, moved[k]])
-            best[k] = min(best[k], (float(wanted @ wanted), misfit), key=lambda pair: pair[0])
-            moved[k] = np.clip(
-                moved[k] - np.linalg.lstsq(rows, wanted, rcond=None)[0], -START, START
-            )
-    return float(np.sqrt(np.mean(np.concatenate([misfit for _, misfit in best]) ** 2)))
+            step = np.linalg.lstsq(rows, wanted, rcond=None)[0]
+            moved[k] = np.clip(moved[k] - step, -START, START)
+            misfits.append(misfit)
+    return float(np.sqrt(np.mean(np.concatenate(misfits) ** 2)))
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ LAYERS = [
     {"comparison"},
     {"maps", "ranking"},
     {"_compare"},
-    {"experiments", "phrases", "mending"},
+    {"experiments", "phrases", "mending", "weighing", "holdout"},
     {"diagnosis"},
     {"improving", "outcome"},
     {"_diagnose", "_improve"},

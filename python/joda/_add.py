@@ -18,6 +18,7 @@ from joda.outcome import (
     beside,
     held_out,
     mended_picture,
+    parting,
     read_timed,
     told_errors,
     write_scene,
@@ -134,7 +135,8 @@ def sentences(added: Added) -> list[str]:
             f"({added.held_out}): {added.before.window:.3g} {added.unit} in windows of 0.4 s, "
             f"noise {added.noise_floor:.2g} {added.unit}. The scene behaves as before."
         ]
-    return [*out, *added.changes, *added.notes]
+    told = parting(added.after, added.noise_floor) if added.added else []
+    return [*out, *told, *added.changes, *added.notes]
 
 
 def _chosen(told: dict[str, Any], path: Path, effect: str | None) -> tuple[str, str | None]:

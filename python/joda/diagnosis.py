@@ -1,7 +1,7 @@
 """What a model lacks: the verdict on a ranking, with probabilities, sizes and sentences."""
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -10,44 +10,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda import phrases
-from joda.comparison import Measured, rms
+from joda.comparison import Measured
 from joda.errors import JodaError
-from joda.experiments import Means, Model, next_experiment
+from joda.experiments import Means, Model, next_experiment, there_and_back
 from joda.files import read_text
-from joda.judge import BEND, NOTHING, Judge, Make, Unknowns
+from joda.holdout import Holdout
 from joda.phrases import explained
 from joda.profile import Profile
-from joda.ranking import CALM, Guess, Ranking, Told, joined, rank, usable, windows_for
-from joda.windows import Windows
+from joda.ranking import Guess, Ranking, Told, joined, rank, usable, windows_for
+from joda.weighing import LEFT, LITTLE, Verdict, Weighed, weigh
 
-Array = NDArray[np.float64]
-Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
-
-SHARPNESS = 3.0
-"""How fast an effect's probability falls with the misfit that it leaves; calibrated on simulated
-joints with a hidden effect (docs/diagnose.md)."""
-LEAST_GAIN = 60.0
-"""Least gain in loss of an effect that is more than chance."""
-NOTICEABLE = 0.02
-"""The same, per sample."""
-LEFT = 0.25
-"""Excess per sample that any true effect may leave: noise is not known better."""
 RIVAL = 0.35
 """Part of the excess that an effect may leave that counts as an alternative."""
-LITTLE = 0.05
-"""Excess per sample that is never worth a word."""
-LONGER = 3.0
-"""How much longer the windows of a second look are."""
-MUCH = 0.5
-"""Excess per sample that is, even if no effect lowers it."""
-WORST = 1.3
-"""Mean square residual that noise may make."""
+LONGER, LONGEST = 9.0, 1.5
+"""How much longer the windows of a second look are, and at most how long, s."""
+ONE_WAY = 0.97
+"""Part of the way, in one direction, from which the joint counts as moved in that one only."""
+RESISTING = (
+    *("position_dependent_friction", "position_dependent_damping", "constant_friction_hinge"),
+    *("constant_damping_hinge", "asymmetric_friction", "direction_dependent_damping"),
+)
+DRIVING = (
+    *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
+    *("spring_return_to_low_end", "spring_return_to_high_end", "bistable_mechanism"),
+    *("magnetic_return_to_low_end", "magnetic_return_to_high_end", "gravity_offset"),
+    *("spring_loaded_snap_detent_to_low_end", "spring_loaded_snap_detent_to_high_end"),
+    *("detent_internal", "bistable_mechanism_internal"),
+)
+"""What resists motion, and what is a force over position: the same where it goes one way only."""
 ALIKE = 0.1
 """By how much of the misfit two effects may differ that the data cannot tell apart."""
 SURE = 0.9
 """Probability from which no further experiment is proposed."""
-NAMED = 5
-"""How many effects are named."""
+NAMED, WORTH_NAMING = 5, 0.01
+"""How many effects are named, besides the first those of at least some probability."""
 WINDOWS = 8
 """Fewest windows with motion that tell anything."""
 VISITED = 0.02
@@ -115,89 +111,6 @@ class Diagnosis:
         return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
 
 
-@dataclass(frozen=True)
-class Weighed:
-    """A ranking with its probabilities.
-
-    Attributes:
-        verdict: on the model.
-        probabilities: of the guesses, in their order.
-        excess: per sample, of the model as it is and of each guess.
-    """
-
-    verdict: Verdict
-    probabilities: tuple[float, ...]
-    excess: tuple[float, tuple[float, ...]]
-
-
-def weigh(ranking: Ranking) -> Weighed:
-    """The verdict on a ranking, and how likely each effect is the missing one."""
-    judge, guesses = ranking.judge, ranking.guesses
-    counts = judge.windows.count[judge.counts].astype(float)
-    if not guesses or not len(counts):
-        return Weighed("adequate", (), (0.0, ()))
-    own = _per_sample(ranking.fit.squares, ranking)
-    each = np.stack([_per_sample(g.fit.squares, ranking) for g in guesses])
-    saved = np.array([ranking.fit.loss - g.fit.loss for g in guesses])
-    cost = np.array([g.cost for g in guesses])
-    knocking = np.array([g.hypothesis.effect == "end_stop_restitution" for g in guesses])
-    return verdict(own, each, counts, saved, cost, guesses[0].hypothesis.remains, bool(knocking[0]))
-
-
-def _per_sample(squares: Array, ranking: Ranking) -> Array:
-    """Mean square residual of each window that counts."""
-    judge = ranking.judge
-    return np.asarray((squares / np.maximum(judge.windows.count, 1))[judge.counts])
-
-
-def verdict(
-    base: Array,
-    each: Array,
-    counts: Array,
-    saved: Array,
-    cost: Array,
-    remains: float,
-    knocks: bool = False,
-) -> Weighed:
-    """From misfits to a verdict.
-
-    What counts as noise is at least what the best guess leaves in its better windows: recorded
-    noise is often less than all that a simulation cannot follow.
-
-    Args:
-        base: mean square residual of each window, of the model as it is, shape (m,).
-        each: the same of the guesses, the best first, shape (guesses, m).
-        counts: samples of each window, shape (m,).
-        saved: what each guess lowers the loss by, shape (guesses,).
-        cost: what its numbers cost, shape (guesses,).
-        remains: part of the excess that the first may leave.
-        knocks: whether the first is told by knocks at the ends, which these windows have none of.
-    """
-    samples = float(counts.sum())
-    level = max(float(np.quantile(each[0], CALM)), 0.5)
-
-    def excess(squares: Array, level: float = level) -> Array:
-        """Robust mean square residual beyond the noise, in units of the noise."""
-        robust = BEND * (np.log1p(squares / level / BEND) - np.log1p(1 / BEND))
-        return np.asarray((robust * counts).sum(axis=-1) / samples)
-
-    own = max(float(excess(base)), 0.0)
-    left = np.maximum(excess(each) + cost / (samples * level), 0.0)
-    if knocks:
-        left[0] = 0.0
-    gain = saved[0] - cost[0]
-    if gain < max(LEAST_GAIN, NOTICEABLE * samples):
-        said: Verdict = "adequate" if excess(base, min(level, WORST)) < MUCH else "unexplained"
-    elif left[0] > max(remains * own, LEFT):
-        said = "unexplained"
-    else:
-        said = "missing_effect"
-    weights = (left + LITTLE) ** -SHARPNESS
-    unknown = (remains * own + LITTLE) ** -SHARPNESS
-    likely = weights / (weights.sum() + unknown)
-    return Weighed(said, tuple(map(float, likely)), (own, tuple(map(float, left))))
-
-
 def read_diagnosis(path: Path) -> dict[str, Any]:
     """A diagnosis that was written before; raises JodaError if it is none."""
     try:
@@ -229,14 +142,13 @@ def diagnosed(
     """
     if missing := _too_little(measured):
         return _said(measured, "insufficient_data", missing, (), None), None
-    ranking = rank(measured, exclude=exclude, told=told)
+    ranking = rank(measured, exclude=exclude, heed=told)
     weighed = weigh(ranking)
     if weighed.verdict == "unexplained":  # what is weak shows in longer windows
-        length = LONGER * ranking.judge.windows.length
+        length = min(LONGER * ranking.judge.windows.length, LONGEST)
         longer = rank(measured, length, exclude, told)
         if (again := weigh(longer)).verdict == "missing_effect":
             ranking, weighed = longer, again
-    own, left = weighed.excess
     if weighed.verdict == "adequate":
         summary = (
             f"The model is adequate: nothing beyond the noise ({_floor(measured):.2g} "
@@ -244,33 +156,76 @@ def diagnosed(
         )
         return _said(measured, "adequate", summary, (), None), None
     held = Holdout(ranking)
+    one_way = _one_way(measured)
     named = range(min(NAMED, len(ranking.guesses)))
     findings = tuple(
-        _finding(measured, ranking, held, k, weighed, left, own)
+        _finding(measured, ranking, held, k, weighed, _alike(ranking, weighed, k, one_way))
         for k in named
-        if k == 0 or weighed.probabilities[k] > 0.01
+        if k == 0 or weighed.probabilities[k] > WORTH_NAMING
     )
-    first = findings[0]
-    if weighed.verdict == "unexplained":
-        summary = (
-            "Something is missing that no known effect explains: the best of them, "
-            f"{phrases.named(first.effect)}, leaves {100 * left[0] / max(own, 1e-9):.0f} % of the "
-            "misfit."
-        )
-    elif first.indistinguishable_from:
-        others = " or ".join(phrases.named(name) for name in first.indistinguishable_from)
-        summary = (
-            f"Missing is {phrases.named(first.effect)} or {others}: these data cannot tell which."
-        )
-    else:
-        summary = (
-            f"Missing is {phrases.named(first.effect)} (probability "
-            f"{100 * first.probability:.0f} %)."
-        )
     best, n = ranking.guesses[0], len(ranking.base.places)
     profile = best.hypothesis.write(ranking.base.written(best.fit.x[:n]), best.x)
-    experiment = _next(measured, ranking, weighed)
+    experiment = _next(measured, ranking, weighed, one_way)
+    summary = _summary(findings[0], weighed, one_way)
     return _said(measured, weighed.verdict, summary, findings, experiment), profile
+
+
+def _summary(first: Finding, weighed: Weighed, one_way: bool) -> str:
+    """The verdict in a sentence, where something is missing."""
+    name = phrases.named(first.effect)
+    own, left = weighed.excess
+    if weighed.verdict == "unexplained":
+        share = 100 * min(left[0] / max(own, LITTLE), 1.0)
+        return (
+            f"Something is missing that no known effect explains: the best of them, {name}, leaves "
+            f"{share:.0f} % of the misfit."
+        )
+    others = " or ".join(map(phrases.named, first.indistinguishable_from))
+    if one_way and others:
+        return (
+            f"Missing is {name} or {others}: the joint was moved in one direction only, where a "
+            "resistance and a force over position are the same."
+        )
+    if others:
+        return f"Missing is {name} or {others}: these data cannot tell which."
+    return f"Missing is {name} (probability {100 * first.probability:.0f} %)."
+
+
+def _one_way(measured: Measured) -> bool:
+    """Whether the joint was moved in one direction only."""
+    forth = back = 0.0
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        turns = directed(run.position, 6 * sigma)
+        forth, back = forth + turns[0], back + turns[1]
+    return max(forth, back) > ONE_WAY * (forth + back)
+
+
+def directed(position: NDArray[np.float64], noise: float) -> tuple[float, float]:
+    """Ways in positive and in negative direction; what is within the noise is no way."""
+    forth = back = 0.0
+    at = position[0]
+    for q in position[1:]:
+        if abs(q - at) > noise:
+            forth, back = forth + max(q - at, 0.0), back + max(at - q, 0.0)
+            at = q
+    return forth, back
+
+
+def _alike(ranking: Ranking, weighed: Weighed, number: int, one_way: bool) -> tuple[str, ...]:
+    """Effects that the data cannot tell from a guess."""
+    own, left = weighed.excess
+    names = [guess.hypothesis.effect for guess in ranking.guesses]
+    alike = {
+        name
+        for k, name in enumerate(names)
+        if abs(left[k] - left[number]) < ALIKE * (left[number] + LITTLE)
+        and left[k] < max(RIVAL * own, LEFT)
+    }
+    if one_way:
+        for mine, other in ((RESISTING, DRIVING), (DRIVING, RESISTING)):
+            if names[number] in mine:
+                alike |= set([name for name in names if name in other][:1])
+    return tuple(name for name in names if name in alike and name != names[number])
 
 
 def _said(
@@ -326,72 +281,17 @@ def _too_little(measured: Measured) -> str:
     return ""
 
 
-class Holdout:
-    """Fits on a part of the runs, judged on the rest."""
-
-    def __init__(self, ranking: Ranking) -> None:
-        """Holds out a quarter of the runs; of fewer than four, a quarter of the windows."""
-        self.ranking = ranking
-        windows = ranking.judge.windows
-        runs = np.unique(windows.run)
-        if len(runs) >= 4:
-            self.held = windows.of_runs(list(runs[3::4]))
-        else:
-            self.held = np.arange(len(windows.at)) % 4 == 3
-        counts = ranking.judge.counts
-        if not (counts & self.held).any():
-            self.held = counts
-        self.train = Judge(windows, counts & ~self.held)
-        self.before = self._error(ranking.base.solo, ranking.base.unknowns, ranking.fit.x)
-
-    def error(self, found: Guess) -> float:
-        """RMS misfit of the windows held out, rad or m, with the effect."""
-        if found.hypothesis.effect == "end_stop_restitution":
-            return self._knocking(found)
-        make, unknowns = joined(self.ranking.base, found.hypothesis)
-        return self._error(make, unknowns, found.fit.x)
-
-    def _error(self, make: Make, unknowns: Unknowns, x: Array) -> float:
-        judge = self.ranking.judge
-        near = self.train.fit(make, unknowns, x, self.ranking.fit.start, 6)
-        return _misfit(judge.windows, make, near.x, judge.counts & self.held)
-
-    def _knocking(self, found: Guess) -> float:
-        make, _ = joined(self.ranking.base, found.hypothesis)
-        windows = self.ranking.judge.windows
-        knocks = windows.knocks & (windows.count > 0)
-        base = self.ranking.base
-        self.before = _misfit(windows, base.solo, self.ranking.fit.x, knocks)
-        return _misfit(windows, make, found.fit.x, knocks)
-
-
-def _misfit(windows: Windows, make: Make, x: Array, counts: NDArray[np.bool_]) -> float:
-    """RMS misfit of some windows from their best starts, rad or m."""
-    own = Judge(windows, counts)
-    fit = own.fit(lambda _: make(x), NOTHING, np.zeros(0), windows.start, 5)
-    misfit = windows.misfit(make(x), fit.start)
-    rows = windows.rows[counts]
-    return rms(misfit[rows[rows >= 0]])
-
-
 def _finding(
     measured: Measured,
     ranking: Ranking,
     held: Holdout,
     number: int,
     weighed: Weighed,
-    left: Sequence[float],
-    own: float,
+    alike: tuple[str, ...],
 ) -> Finding:
     guess = ranking.guesses[number]
     hypothesis, x = guess.hypothesis, guess.x
     after = held.error(guess)
-    alike = tuple(
-        other.hypothesis.effect
-        for k, other in enumerate(ranking.guesses)
-        if k != number and abs(left[k] - left[number]) < ALIKE * (left[number] + LITTLE)
-        and left[k] < max(RIVAL * own, LEFT)
-    )  # fmt: skip
     magnitude = hypothesis.magnitude(x)
     doubt = _doubt(ranking, guess)
     interval = hypothesis.interval(x)
@@ -437,8 +337,19 @@ def _doubt(ranking: Ranking, found: Guess) -> float:
     return float(np.sqrt(max(slope @ covariance @ slope, 0.0) * worse))
 
 
-def _next(measured: Measured, ranking: Ranking, weighed: Weighed) -> str | None:
+def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool) -> str | None:
     """The experiment that tells the likeliest two apart; None if the first is sure."""
+    velocity = ranking.judge.windows.start[:, 1]
+    means = Means(
+        joint=measured.profile.joint,
+        inertia=measured.single.inertia,
+        speed=float(np.sqrt(np.mean(velocity**2))),
+        h=ranking.base.h,
+        sigma=_floor(measured),
+        forced=any(run.forced for run in measured.runs),
+    )
+    if one_way:
+        return there_and_back(means).sentence
     if weighed.verdict == "unexplained":
         return (
             "Repeat one slow motion three times, to and fro, then the same fast: what differs "
@@ -449,14 +360,5 @@ def _next(measured: Measured, ranking: Ranking, weighed: Weighed) -> str | None:
         return None
     first, second = (
         Model(*joined(ranking.base, g.hypothesis), g.fit.x) for g in ranking.guesses[:2]
-    )
-    velocity = ranking.judge.windows.start[:, 1]
-    means = Means(
-        joint=measured.profile.joint,
-        inertia=measured.single.inertia,
-        speed=float(np.sqrt(np.mean(velocity**2))),
-        h=ranking.base.h,
-        sigma=_floor(measured),
-        forced=any(run.forced for run in measured.runs),
     )
     return next_experiment(first, second, means)

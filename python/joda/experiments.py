@@ -77,6 +77,26 @@ def next_experiment(first: Model, second: Model, means: Means) -> str | None:
     return None if best is None else best.sentence
 
 
+def _stroke(s0: float, s1: float, speed: float, h: float) -> Array:
+    """From one normalised position to another at a speed (1/s), in steps of h."""
+    n = max(round(abs(s1 - s0) / (speed * h)), 2)
+    return np.linspace(s0, s1, min(n, round(LONGEST / 2 / h)))
+
+
+def there_and_back(means: Means) -> Motion:
+    """Slowly through the range and back: tells a resistance from a force over position."""
+    lo, hi = means.joint.range
+    slow = 0.1 * means.speed / (hi - lo)
+    rest = np.full(round(0.5 / means.h), 0.9)
+    return Motion(
+        f"Push slowly (about {slow * (hi - lo):.2g} {means.joint.unit}/s) from one end of the "
+        "range to the other, wait half a second there, and push slowly back; record the force all "
+        "the way.",
+        np.concatenate([_stroke(0.1, 0.9, slow, means.h), rest, _stroke(0.9, 0.1, slow, means.h)]),
+        True,
+    )
+
+
 def _menu(means: Means) -> Iterator[Motion]:
     """Motions that people can make, slow and fast ones, long enough to be told apart."""
     lo, hi = means.joint.range
@@ -84,24 +104,16 @@ def _menu(means: Means) -> Iterator[Motion]:
     unit = means.joint.unit
     pace = means.speed / span
 
-    def stroke(s0: float, s1: float, speed: float) -> Array:
-        n = max(round(abs(s1 - s0) / (speed * h)), 2)
-        return np.linspace(s0, s1, min(n, round(LONGEST / 2 / h)))
-
     if means.forced:
-        slow, rest = 0.1 * pace, np.full(round(0.5 / h), 0.9)
-        yield Motion(
-            f"Push slowly (about {slow * span:.2g} {unit}/s) from one end of the range to the "
-            "other, wait half a second there, and push slowly back; record the force all the way.",
-            np.concatenate([stroke(0.1, 0.9, slow), rest, stroke(0.9, 0.1, slow)]),
-            True,
-        )
+        yield there_and_back(means)
         speeds = (0.3 * pace, pace, 2 * pace)
         named = ", ".join(f"{v * span:.2g}" for v in speeds)
         yield Motion(
             f"Push through the range in both directions at constant speeds of {named} {unit}/s, "
             "once each, and record the force.",
-            np.concatenate([stroke(*ends, v) for v in speeds for ends in ((0.1, 0.9), (0.9, 0.1))]),
+            np.concatenate(
+                [_stroke(*ends, v, h) for v in speeds for ends in ((0.1, 0.9), (0.9, 0.1))]
+            ),
             True,
         )
         t = np.arange(0, 6.0, h)

@@ -530,7 +530,7 @@ def _resistances(units: Units) -> Iterator[Hypothesis]:
     if units.forced or units.weight:
         yield _effect(
             "load_dependent_friction",
-            [(0.0, 3.0, 0.002)],
+            [(0.0, 0.7, 0.002)],
             [[0.05]],
             lambda x: LoadDependentFriction(coefficient=float(x[0])),
             lambda x: float(x[0]),

@@ -14,8 +14,9 @@ TRIED = 3
 """How many effects of a diagnosis are tried, the most likely first."""
 LIKELY = 0.1
 """Least probability of an effect, besides the first, that is tried."""
-WORTH = 0.98
-"""Part of the error before, on runs held out, to which an effect must bring it."""
+WORTH, MUCH = 0.98, 0.8
+"""Part of the error before, on runs held out, to which an effect must bring it: one that explains
+what is missing; one that explains only a part, where perhaps several are missing."""
 
 
 @dataclass(frozen=True)
@@ -54,20 +55,21 @@ def improved(
         told("diagnose")
         diagnosis, _profile = diagnosed(train)
         steps[-1] = Step(steps[-1].effect, train.profile, steps[-1].error, diagnosis)
-        if diagnosis.verdict != "missing_effect":
-            why = diagnosis.summary
-            break
+        known = diagnosis.verdict == "missing_effect"
         mended = None
         for number, finding in enumerate(diagnosis.effects[:TRIED]):
-            if number and finding.probability < LIKELY:
+            if known and number and finding.probability < LIKELY:
                 break
             told(f"add {finding.effect}")
             mended = mend(train, held, finding.effect, finding.direction, told)
-            if mended.effect and mended.after.window < WORTH * mended.before.window:
+            worth = WORTH if known else MUCH
+            if mended.effect and mended.after.window < worth * mended.before.window:
                 break
             mended = None
         if mended is None:
-            why = "No likely effect lowers the error on the runs that were held out."
+            why = diagnosis.summary
+            if known:
+                why = "No likely effect lowers the error on the runs that were held out."
             break
         train, held = (part.changed(mended.profile) for part in (train, held))
         steps.append(Step(mended.effect, mended.profile, mended.after, None))

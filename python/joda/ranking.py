@@ -41,6 +41,10 @@ POLISHED = 4
 """Of how many effects the numbers are tried elsewhere."""
 CALM = 0.3
 """Part of the windows, the better ones, that tell the noise."""
+WORST = 1.5
+"""Mean square residual that noise may make."""
+QUIET = 0.5
+"""The least: noise is not estimated better."""
 BOUNCY = 0.3
 """Least speed after a knock, per speed before, of ends that throw the joint back."""
 CLEARLY = 0.15
@@ -307,27 +311,31 @@ def _guess(judge: Judge, hypothesis: Hypothesis, fit: Fit) -> Guess:
     return Guess(hypothesis, fit, fit.loss + cost, cost)
 
 
-def level_of(judge: Judge, squares: Array) -> float:
-    """Mean square residual in the better windows: what a simulation cannot follow.
+def _levelled(judge: Judge, guesses: Sequence[Guess]) -> tuple[list[Guess], float, float]:
+    """The guesses, scored by what the best of them leaves in its better windows.
 
-    Recorded noise is often less than that: clocks, forces, all else that is a little wrong. At
-    least 1.
+    Recorded noise is often less than all that a simulation cannot follow: clocks, forces, whatever
+    else is a little wrong. Such a misfit is all of one piece within a window, which then counts as
+    one sample.
+
+    Returns:
+        the guesses; the mean square residual that is noise; how many samples count.
     """
-    each = (squares / np.maximum(judge.windows.count, 1))[judge.counts]
-    return max(float(np.quantile(each, CALM)), 1.0) if len(each) else 1.0
-
-
-def _levelled(judge: Judge, guesses: Sequence[Guess]) -> list[Guess]:
-    """The guesses, scored by what the best of them leaves as noise."""
-    if not guesses:
-        return []
-    level = level_of(judge, min(guesses, key=lambda g: g.score).fit.squares)
+    samples = float(judge.windows.count[judge.counts].sum())
+    if not guesses or not samples:
+        return [], 1.0, samples
+    best = min(guesses, key=lambda g: g.score).fit.squares
+    each = (best / np.maximum(judge.windows.count, 1))[judge.counts]
+    level = max(float(np.quantile(each, CALM)), QUIET)
+    told = float(judge.counts.sum()) if level > WORST else samples
 
     def scored(one: Guess) -> Guess:
-        lower = judge.loss(one.fit.squares) - judge.loss(one.fit.squares, level=level)
-        return replace(one, score=one.score - lower)
+        penalty = one.fit.loss - judge.loss(one.fit.squares)
+        loss = judge.loss(one.fit.squares, level=level) * told / samples
+        cost = one.hypothesis.rarity + len(one.x) * np.log(max(told, 2.0))
+        return replace(one, score=loss + penalty + cost)
 
-    return [scored(one) for one in guesses]
+    return [scored(one) for one in guesses], level, told
 
 
 @dataclass(frozen=True)
@@ -339,12 +347,16 @@ class Ranking:
         base: the model as it is.
         fit: of its factors alone.
         guesses: the best one of each effect, the most likely first.
+        level: mean square residual that counts as noise.
+        told: how many samples count.
     """
 
     judge: Judge
     base: Base
     fit: Fit
     guesses: tuple[Guess, ...]
+    level: float
+    told: float
 
 
 Told = Callable[[int, int, str], None]
@@ -354,7 +366,7 @@ def rank(
     measured: Measured,
     length: float | None = None,
     exclude: Collection[str] = (),
-    told: Told = lambda done, total, what: None,
+    heed: Told = lambda done, total, what: None,
 ) -> Ranking:
     """Fits every hypothesis to measured runs.
 
@@ -362,7 +374,7 @@ def rank(
         measured: the joint and its runs.
         length: of the windows, s; None: by the joint's pace.
         exclude: effects that are not tried.
-        told: how many hypotheses are done, of how many, and the last one's name.
+        heed: told how many hypotheses are done, of how many, and the last one's name.
     """
     windows = windows_for(measured, length)
     judge = Judge(windows, usable(windows))
@@ -380,7 +392,7 @@ def rank(
         for one in found:
             done += 1
             if one is not None:
-                told(done, total, one.hypothesis.effect)
+                heed(done, total, one.hypothesis.effect)
                 out.append(one)
         return out
 
@@ -388,7 +400,8 @@ def rank(
         guesses = heard(pool.map(lambda h: guess(judge, base, fit, about, h), tried))
         best = _best(guesses)[:POLISHED]
         guesses += heard(pool.map(lambda g: moved(judge, base, g), best))
-    return Ranking(judge, base, fit, tuple(_best(_levelled(judge, guesses))))
+    scored, level, told = _levelled(judge, guesses)
+    return Ranking(judge, base, fit, tuple(_best(scored)), level, told)
 
 
 def windows_for(measured: Measured, length: float | None = None) -> Windows:

@@ -1,0 +1,74 @@
+"""From a ranking to a verdict: is anything missing, how likely is each effect, does one explain it?"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from joda.judge import BEND
+from joda.ranking import WORST, Ranking
+
+Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
+
+SHARPNESS = 3.0
+"""How fast an effect's probability falls with the misfit that it leaves; calibrated on simulated
+joints with a hidden effect (docs/diagnose.md)."""
+LEAST_GAIN = 60.0
+"""Least gain in loss of an effect that is more than chance."""
+NOTICEABLE = 0.02
+"""The same, per sample."""
+LEFT = 0.25
+"""Excess per sample that any true effect may leave: noise is not known better."""
+LITTLE = 0.05
+"""Excess per sample that is never worth a word."""
+ROUGHLY = 0.35
+"""Part of the excess that a true effect may leave where even the best guess leaves more than noise
+in most windows."""
+HARDLY = 0.1
+"""Probability below which an effect is not named as the missing one."""
+MUCH = 0.5
+"""Excess per sample that is, even if no effect lowers it."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A ranking with its probabilities.
+
+    Attributes:
+        verdict: on the model.
+        probabilities: of the guesses, in their order.
+        excess: per sample, of the model as it is and of each guess.
+    """
+
+    verdict: Verdict
+    probabilities: tuple[float, ...]
+    excess: tuple[float, tuple[float, ...]]
+
+
+def weigh(ranking: Ranking) -> Weighed:
+    """The verdict on a ranking, and how likely each effect is the missing one."""
+    judge, guesses = ranking.judge, ranking.guesses
+    samples = float(judge.windows.count[judge.counts].sum())
+    if not guesses or not samples:
+        return Weighed("adequate", (), (0.0, ()))
+    first = guesses[0]
+
+    def excess(loss: float, count: float) -> float:
+        """Per sample, beyond what noise makes."""
+        return max(loss / count - BEND * float(np.log1p(1 / BEND)), 0.0)
+
+    own = excess(judge.loss(ranking.fit.squares, level=ranking.level), samples)
+    left = np.array([excess(guess.score, ranking.told) for guess in guesses])
+    remains = first.hypothesis.remains
+    if ranking.level > WORST:  # a simulation cannot follow these data to their noise anyway
+        remains = max(remains, ROUGHLY)
+    weights = (left + LITTLE) ** -SHARPNESS
+    likely = weights / (weights.sum() + (remains * own + LITTLE) ** -SHARPNESS)
+    gain = ranking.fit.loss - first.fit.loss - first.cost
+    if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and likely[0] < HARDLY):
+        noise = judge.loss(ranking.fit.squares, level=min(ranking.level, WORST))
+        said: Verdict = "adequate" if excess(noise, samples) < MUCH else "unexplained"
+    elif left[0] > max(remains * own, LEFT) or likely[0] < HARDLY:
+        said = "unexplained"
+    else:
+        said = "missing_effect"
+    return Weighed(said, tuple(map(float, likely)), (own, tuple(map(float, left))))
