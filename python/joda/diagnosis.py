@@ -300,7 +300,7 @@ def _finding(
         effect=hypothesis.effect,
         interval=interval,
         probability=weighed.probabilities[number],
-        direction=hypothesis.direction,  # type: ignore[arg-type]
+        direction=hypothesis.direction,
         magnitude=magnitude,
         magnitude_error=doubt,
         unit=hypothesis.unit,
@@ -328,13 +328,12 @@ def _doubt(ranking: Ranking, found: Guess) -> float:
     n = len(ranking.base.places)
     slope = np.zeros(len(x))
     for k in range(n, len(x)):
-        for sign in (1, -1):
-            moved = x.copy()
-            moved[k] += sign * 1e-4
-            slope[k] += sign * found.hypothesis.magnitude(moved[n:]) / 2e-4
+        step = 1e-4 * (np.arange(len(x)) == k)
+        ends = (found.hypothesis.magnitude((x + way)[n:]) for way in (step, -step))
+        slope[k] = (next(ends) - next(ends)) / 2e-4
     samples = max(float(ranking.judge.windows.count[ranking.judge.counts].sum()), 1.0)
     worse = max(float(found.fit.squares[ranking.judge.counts].sum()) / samples, 1.0)
-    return float(np.sqrt(max(slope @ covariance @ slope, 0.0) * worse))
+    return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0) * worse))
 
 
 def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool) -> str | None:

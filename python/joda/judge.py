@@ -6,7 +6,8 @@ far off, so that one bad window, or a slightly wrong law, decides nothing.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,16 +51,17 @@ class Unknowns:
 
     def and_(self, other: "Unknowns") -> "Unknowns":
         """Both, one after the other."""
-        return Unknowns(
-            *(np.concatenate(pair) for pair in zip(*map(_parts, (self, other)), strict=True))
-        )
+        pairs = zip(_parts(self), _parts(other), strict=True)
+        low, high, step, mean, doubt = (np.concatenate(pair) for pair in pairs)
+        return Unknowns(low, high, step, mean, doubt)
 
     def penalty(self, x: Array) -> float:
         """What the numbers lose by being off what was known."""
         return float(np.sum(((x - self.mean) / self.doubt) ** 2))
 
 
-NOTHING = Unknowns(*(np.zeros(0) for _ in range(5)))
+EMPTY = np.zeros(0)
+NOTHING = Unknowns(EMPTY, EMPTY, EMPTY, EMPTY, EMPTY)
 """No numbers: only starts are fitted."""
 
 
@@ -101,11 +103,12 @@ class Linear:
     S: Array
     z: Array
     weight: Array
-    inverse: Array = field(init=False)
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def inverse(self) -> Array:
+        """Of the starts' own normal matrices, shape (m, 2, 2)."""
         A = np.einsum("mni,mnj->mij", self.S, self.S) + np.eye(2)
-        object.__setattr__(self, "inverse", np.linalg.inv(A))
+        return np.asarray(np.linalg.inv(A))
 
     def products(self, a: Array, b: Array, za: Array | None = None) -> Array:
         """Weighted inner products of what of a and b no start can take up.
@@ -234,7 +237,7 @@ def _step(H: Array, gradient: Array, damping: float, unknowns: Unknowns, x: Arra
     if (must := unknowns.constraints) is None:
         return _bounded(H, gradient, damping, unknowns.low - x, unknowns.high - x)
     scale = np.maximum(np.diag(H), 1e-12)
-    R = np.linalg.cholesky(H + np.diag(damping * scale + 1e-12 * scale.max())).T
+    R = np.asarray(np.linalg.cholesky(H + np.diag(damping * scale + 1e-12 * scale.max())).T)
     target = solve_triangular(R, -gradient, trans="T")
     return bounded_step(R, target, must.G, must.h - must.G @ x)
 

@@ -215,7 +215,7 @@ def _values(
 
 def _effect_scale(effect: Effect, key: str) -> float:
     value = getattr(effect, key)
-    return max(map(abs, value)) if isinstance(value, tuple) else abs(value)
+    return float(max(map(abs, value)) if isinstance(value, tuple) else abs(value))
 
 
 def _effect(number: int, effect: Effect, slots: list[Slot], start: list[float], rows: Rows) -> None:

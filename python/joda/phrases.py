@@ -44,8 +44,8 @@ SHOWS = {
     "spring_return_to_high_end": "a force missing that grows in proportion to position",
     "spring_loaded_snap_detent_to_low_end": "a barrier before the end, and a hold behind it",
     "spring_loaded_snap_detent_to_high_end": "a barrier before the end, and a hold behind it",
-    "position_dependent_friction": "a resistance missing that does not depend on speed, and differs "
-    "with position",
+    "position_dependent_friction": "a resistance missing that does not depend on speed, and "
+    "differs with position",
     "position_dependent_damping": "a resistance missing that grows with speed, and differs with "
     "position",
 }
@@ -94,8 +94,9 @@ def explained(
     before, after, noise = errors
     name = named(effect)
     return (
-        f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} \N{PLUS-MINUS SIGN} "
-        f"{doubt:.2g}{of}: {shows}. With it, windows held out of the fit are missed by {after:.2g} "
+        f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} "
+        f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}: {shows}. "
+        f"With it, windows held out of the fit are missed by {after:.2g} "
         f"instead of {before:.2g} {joint.unit} (noise {noise:.2g} {joint.unit})."
     )
 

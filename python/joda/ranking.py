@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from joda._core import Solo
 from joda._templates import templates
 from joda.comparison import Measured
+from joda.cutting import windows_of
 from joda.hypotheses import Hypothesis, Units, hypotheses
 from joda.judge import BEND, NOTHING, Fit, Judge, Linear, Make, Unknowns
 from joda.profile import CHANNELS, Channels, Profile
 from joda.single import Single
-from joda.windows import Windows, windows_of
+from joda.windows import Windows
 
 Array = NDArray[np.float64]
 

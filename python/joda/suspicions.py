@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from joda import smoothing
 from joda._context import Context
-from joda.smoothing import resolution
 from joda.runs import QuasiStatic, Run
+from joda.smoothing import resolution
 
 Array = NDArray[np.float64]
 

@@ -1,9 +1,10 @@
-"""From a ranking to a verdict: is anything missing, how likely is each effect, does one explain it?"""
+"""From a ranking to a verdict: is anything missing, how likely is each effect, is one enough."""
 
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+
 from joda.judge import BEND
 from joda.ranking import WORST, Ranking
 
