@@ -343,7 +343,7 @@ MISTAKES = {
 }
 
 
-FATAL = {"degrees", "millimetres", "sign", "zero", "force_sign", "short"}
+FATAL = {"degrees", "millimetres", "sign", "zero", "short"}
 
 
 @pytest.mark.parametrize("kind", MISTAKES)

@@ -129,8 +129,10 @@ def _ending(result: Improved) -> list[str]:
     """Why each effect was added, why no more, what to do next, what changed, notes."""
     last = result.steps[-1].diagnosis
     told = last and last.next_experiment
+    unchanged = len(result.steps) == 1
     return [
         *_explanations(result),
+        *["No effect was added; the scene behaves as before."] * unchanged,
         result.why,
         *[f"Next experiment: {told}"] * bool(told),
         *result.changes,
@@ -170,7 +172,7 @@ def _page(result: Improved, drawn: bytes) -> str:
         f"of all fits ({result.held_out}) are missed by {last:.3g} instead of {first:.3g} "
         f"{result.unit}; the measurement's noise is {result.noise_floor:.2g} {result.unit}."
         if count
-        else f"No effect was added. Windows of 0.4 s are missed by {first:.3g} {result.unit}; the "
+        else f"Windows of 0.4 s are missed by {first:.3g} {result.unit}; the "
         f"measurement's noise is {result.noise_floor:.2g} {result.unit}."
     )
     return page(

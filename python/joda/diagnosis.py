@@ -10,14 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda import phrases
+from joda.baseline import joined, usable, windows_for
 from joda.comparison import Measured
 from joda.errors import JodaError
 from joda.experiments import Means, Model, next_experiment, there_and_back
 from joda.files import read_text
+from joda.guessing import Guess
 from joda.holdout import Holdout
 from joda.phrases import explained
 from joda.profile import Profile
-from joda.ranking import Guess, Ranking, Told, joined, rank, usable, windows_for
+from joda.ranking import Ranking, Told, rank
 from joda.weighing import LEFT, LITTLE, Verdict, Weighed, weigh
 
 RIVAL = 0.35

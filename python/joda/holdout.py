@@ -3,9 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.baseline import joined
 from joda.comparison import rms
+from joda.guessing import Guess
 from joda.judge import NOTHING, Judge, Make, Unknowns
-from joda.ranking import Guess, Ranking, joined
+from joda.ranking import Ranking
 from joda.windows import Windows
 
 Array = NDArray[np.float64]

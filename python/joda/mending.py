@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda._templates import templates
+from joda.baseline import base_of, units_of, usable, windows_for
 from joda.comparison import Measured, joined, rms
+from joda.guessing import moved, usual
 from joda.hypotheses import hypotheses
 from joda.judge import BEND, Judge, Unknowns
 from joda.parameters import Parameters
 from joda.profile import Profile
-from joda.ranking import base_of, guess, moved, units_of, usable, usual, windows_for
+from joda.ranking import tell
 from joda.runs import Run
 
 Array = NDArray[np.float64]
@@ -139,7 +141,7 @@ def _candidates(
     units = units_of(windows, train)
     every = [h for h in hypotheses(units, templates(), train.profile) if h.effect == effect]
     tried = [h for h in every if direction in (None, h.direction)] or every
-    guesses = [g for h in tried if (g := guess(judge, base, fit, about, h))]
+    guesses = [g for h in tried if (g := tell(judge, base, fit, about, h))]
     if not guesses:
         return
     first = moved(judge, base, min(guesses, key=lambda g: g.score))
