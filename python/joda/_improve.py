@@ -224,7 +224,8 @@ def _stairs(part: "Figure | SubFigure", result: Improved) -> None:
     axes.set_yscale("log")
     axes.set_xticks(range(count), map(_step, result.steps), fontsize=8)
     if count > 2:
-        axes.tick_params(axis="x", rotation=20)
+        for tick in axes.get_xticklabels():
+            tick.set(rotation=20, ha="right")
     axes.set_ylabel(f"RMS error held out ({result.unit})")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=8)

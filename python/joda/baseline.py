@@ -12,6 +12,7 @@ from joda.hypotheses import Hypothesis, Units
 from joda.judge import Make, Unknowns
 from joda.profile import CHANNELS, Profile
 from joda.single import Single
+from joda.static import Still, curve_windows
 from joda.windows import Windows
 
 Array = NDArray[np.float64]
@@ -103,24 +104,24 @@ def units_of(windows: Windows, measured: Measured) -> Units:
         inertia=inertia,
         span=float(np.ptp(profile.joint.range)),
         friction=friction,
-        forced=any(run.forced for run in measured.runs),
+        forced=not measured.runs or any(run.forced for run in measured.runs),
         weight=max(map(abs, measured.context.gravity_force)),
         hinge=measured.single.hinge,
     )
 
 
 def windows_for(measured: Measured, length: float | None = None) -> Windows:
-    """The runs in windows."""
+    """The runs in windows of some length (s); curves in pieces where there are no runs."""
+    if not measured.runs:
+        return curve_windows(measured)
     lo, hi = measured.profile.joint.range
-    return windows_of(
-        measured.runs,
-        measured.sigma,
-        hi - lo,
-        lo,
-        measured.single.inertia,
-        measured.timestep,
-        length,
-    )
+    fixed = lo, measured.single.inertia, measured.timestep
+    return windows_of(measured.runs, measured.sigma, hi - lo, *fixed, length)
+
+
+def single_for(measured: Measured) -> Single:
+    """The joint, to be simulated where there are runs."""
+    return measured.single if measured.runs else Still(**vars(measured.single))
 
 
 def usable(windows: Windows) -> NDArray[np.bool_]:

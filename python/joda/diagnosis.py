@@ -44,10 +44,13 @@ ALIKE = 0.1
 """By how much of the misfit two effects may differ that the data cannot tell apart."""
 SURE = 0.9
 """Probability from which no further experiment is proposed."""
+GAUGE_BACK = "Measure the way back too, as slowly."
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, besides the first those of at least some probability."""
-WINDOWS = 8
-"""Fewest windows with motion that tell anything."""
+WINDOWS, MOVES = 4, 8.0
+"""Fewest windows with motion that tell anything; and what is motion, in noises."""
+SAMPLES = 15
+"""Fewest samples of curves that do."""
 VISITED = 0.02
 """Least part of the range that must be visited."""
 
@@ -93,8 +96,8 @@ class Diagnosis:
             effect explains; the data tell nothing.
         summary: the verdict in a sentence.
         effects: the most likely first.
-        noise_floor: of the measured positions, rad or m.
-        unit: of positions.
+        noise_floor: of the measured positions, or of the forces of curves.
+        unit: of that noise and of the errors held out.
         next_experiment: that would decide what is open; None if nothing is.
         notes: what is suspicious about the data.
     """
@@ -146,7 +149,7 @@ def diagnosed(
         return _said(measured, "insufficient_data", missing, (), None), None
     ranking = rank(measured, exclude=exclude, heed=told)
     weighed = weigh(ranking)
-    if weighed.verdict == "unexplained":  # what is weak shows in longer windows
+    if weighed.verdict == "unexplained" and measured.runs:  # what is weak shows in longer windows
         length = min(LONGER * ranking.judge.windows.length, LONGEST)
         longer = rank(measured, length, exclude, told)
         if (again := weigh(longer)).verdict == "missing_effect":
@@ -154,7 +157,7 @@ def diagnosed(
     if weighed.verdict == "adequate":
         summary = (
             f"The model is adequate: nothing beyond the noise ({_floor(measured):.2g} "
-            f"{measured.profile.joint.unit}) that an effect would explain."
+            f"{_unit(measured)}) that an effect would explain."
         )
         return _said(measured, "adequate", summary, (), None), None
     held = Holdout(ranking)
@@ -196,6 +199,9 @@ def _summary(first: Finding, weighed: Weighed, one_way: bool) -> str:
 def _one_way(measured: Measured) -> bool:
     """Whether the joint was moved in one direction only."""
     forth = back = 0.0
+    for gauged in () if measured.runs else measured.curves:
+        forth += float(np.sum(gauged.direction > 0))
+        back += float(np.sum(gauged.direction < 0))
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         turns = directed(run.position, 6 * sigma)
         forth, back = forth + turns[0], back + turns[1]
@@ -249,36 +255,41 @@ def _said(
         summary=summary,
         effects=effects,
         noise_floor=_floor(measured),
-        unit=joint.unit,
+        unit=_unit(measured),
         next_experiment=experiment,
         notes=measured.notes,
     )
 
 
 def _floor(measured: Measured) -> float:
-    return float(np.sqrt(np.mean(np.square(measured.sigma)))) if measured.sigma else 0.0
+    """Noise of the runs' positions, or of the curves' forces where there are no runs."""
+    noises = measured.sigma or tuple(gauged.sigma for gauged in measured.curves)
+    return float(np.sqrt(np.mean(np.square(noises))))
+
+
+def _unit(measured: Measured) -> str:
+    """Of what is missed: position, or force where there are only curves."""
+    joint = measured.profile.joint
+    if measured.runs:
+        return joint.unit
+    return "N·m" if joint.type == "hinge" else "N"
 
 
 def _too_little(measured: Measured) -> str:
-    """Why the runs cannot tell anything, as a sentence; nothing if they can."""
-    if not measured.runs:
-        return "There is no timed run; a diagnosis needs at least one CSV file with time."
+    """Why the measurements cannot tell anything, as a sentence; nothing if they can."""
     windows = windows_for(measured)
+    if not measured.runs:
+        told = len(windows.position)
+        return f"{told} samples are too few; record {SAMPLES}." if told < SAMPLES else ""
     span = float(np.ptp(measured.profile.joint.range))
-    moving = 0
-    for row in windows.rows[usable(windows)]:
-        own = windows.position[row[row >= 0]]
-        noise = max(measured.sigma)
-        moving += bool(np.ptp(own) > 8 * noise)
     visited = float(np.ptp(windows.position)) / span
     if visited < VISITED:
         return f"The runs visit only {100 * visited:.1g} % of the joint's range."
+    own = [windows.position[row[row >= 0]] for row in windows.rows[usable(windows)]]
+    moving = sum(bool(np.ptp(position) > MOVES * max(measured.sigma)) for position in own)
     if moving < WINDOWS:
         return (
-            f"The joint moves in only {moving} windows of "
-            f"{windows.h * float(np.median(np.diff(windows.at))):.2g} s; {WINDOWS} are needed."
-            if len(windows.at) > 1
-            else "The runs are too short to tell anything."
+            f"The joint moves in {moving} windows of {windows.length:.2g} s; {WINDOWS} are needed."
         )
     return ""
 
@@ -312,6 +323,7 @@ def _finding(
             interval,
             (magnitude, doubt, hypothesis.unit),
             (held.before, after, _floor(measured)),
+            _unit(measured),
             joint,
         ),
         held_out_error_before=held.before,
@@ -340,6 +352,8 @@ def _doubt(ranking: Ranking, found: Guess) -> float:
 
 def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool) -> str | None:
     """The experiment that tells the likeliest two apart; None if the first is sure."""
+    if not measured.runs:
+        return GAUGE_BACK if one_way else None
     velocity = ranking.judge.windows.start[:, 1]
     means = Means(
         joint=measured.profile.joint,

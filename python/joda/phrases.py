@@ -75,6 +75,7 @@ def explained(
     interval: tuple[float, float],
     size: tuple[float, float, str],
     errors: tuple[float, float, float],
+    error_unit: str,
     joint: Joint,
 ) -> str:
     """An effect as a sentence for a person.
@@ -84,7 +85,8 @@ def explained(
         direction: both, positive or negative.
         interval: where it acts, in normalised position.
         size: magnitude, its standard deviation and unit.
-        errors: of held-out windows before and after, and the noise, rad or m.
+        errors: of held-out windows before and after, and the noise.
+        error_unit: of these.
         joint: of which it is.
     """
     value, doubt, unit = size
@@ -97,7 +99,7 @@ def explained(
         f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} "
         f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}: {shows}. "
         f"With it, windows held out of the fit are missed by {after:.2g} "
-        f"instead of {before:.2g} {joint.unit} (noise {noise:.2g} {joint.unit})."
+        f"instead of {before:.2g} {error_unit} (noise {noise:.2g} {error_unit})."
     )
 
 

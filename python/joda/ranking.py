@@ -8,7 +8,7 @@ from os import cpu_count
 import numpy as np
 
 from joda._templates import templates
-from joda.baseline import Base, base_of, units_of, usable, windows_for
+from joda.baseline import Base, base_of, single_for, units_of, usable, windows_for
 from joda.comparison import Measured
 from joda.guessing import Guess, guess, moved, usual
 from joda.hypotheses import Hypothesis, hypotheses
@@ -92,7 +92,7 @@ def rank(
     """
     windows = windows_for(measured, length)
     judge = Judge(windows, usable(windows))
-    base = base_of(measured.profile, measured.single, windows.h)
+    base = base_of(measured.profile, single_for(measured), windows.h)
     fit = judge.fit(base.solo, base.unknowns, np.ones(len(base.places)))
     about = judge.linear(base.solo, base.unknowns, fit.x, fit.start, BEND * usual(judge, fit))
     units = units_of(windows, measured)

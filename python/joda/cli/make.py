@@ -54,6 +54,7 @@ def demo(
     and open the seal. Needs no key and no network. Example:
 
         joda demo -o joda_demo
+
         joda demo hidden-effect --seed 4
     """
     if what == "hidden-effect":
