@@ -110,13 +110,13 @@ def units_of(windows: Windows, measured: Measured) -> Units:
     )
 
 
-def windows_for(measured: Measured, length: float | None = None) -> Windows:
-    """The runs in windows of some length (s); curves in pieces where there are no runs."""
+def windows_for(measured: Measured, length: float | None = None, fine: bool = True) -> Windows:
+    """The runs in windows of some length (s), see `windows_of`; curves where there are no runs."""
     if not measured.runs:
         return curve_windows(measured)
     lo, hi = measured.profile.joint.range
     fixed = lo, measured.single.inertia, measured.timestep
-    return windows_of(measured.runs, measured.sigma, hi - lo, *fixed, length)
+    return windows_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine)
 
 
 def single_for(measured: Measured) -> Single:

@@ -35,6 +35,7 @@ def windows_of(
     inertia: float,
     timestep: float,
     length: float | None = None,
+    fine: bool = True,
 ) -> Windows:
     """Cuts runs into windows; parts where the force is not known are left out.
 
@@ -45,9 +46,10 @@ def windows_of(
         inertia: kg·m² or kg: how far the force's noise moves the joint.
         timestep: the scene's, s.
         length: of the windows, s; None: by the joint's pace.
+        fine: whether steps are shortened, so that the laws act and not their steps.
     """
     length = length or _length(runs, sigmas, span)
-    h = float(timestep / np.ceil(timestep * STEPS / length))
+    h = float(timestep / np.ceil(timestep * STEPS / length)) if fine else timestep
     parts: list[tuple[NDArray[Any], ...]] = []
     samples: list[tuple[NDArray[Any], ...]] = []
     step, count = 0, 0

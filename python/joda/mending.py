@@ -161,7 +161,7 @@ def checked(profile: Profile) -> Profile:
 
 def refitted(train: Measured, profile: Profile, length: float) -> Profile:
     """All numbers of a profile fitted in windows of some length (s), near where they were."""
-    windows = windows_for(train, length)
+    windows = windows_for(train, length, fine=False)  # at the scene's own step
     judge = Judge(windows, usable(windows))
     if not judge.counts.any():
         return profile

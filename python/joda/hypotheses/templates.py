@@ -22,7 +22,7 @@ from joda.hypotheses.base import (
 from joda.profile import Profile
 from joda.template import Template
 
-WIDTHS = (0.08, 0.15, 0.28, 0.5)
+WIDTHS = (0.08, 0.13, 0.2, 0.3, 0.42, 0.6)
 """Of the intervals that are tried, in normalised position."""
 NARROWEST = 0.02
 WIDEST = 0.5
@@ -33,6 +33,8 @@ EDGE = (0.002, 0.3, 0.01)
 """Of a constant on a part of the range, in units of that part."""
 CATCH = (0.0, 0.6, 0.01)
 """Dry friction of a catch, in units of its force."""
+BARRIER = (0.2, 3.0, 0.02)
+"""Of a latch, in units of its hold."""
 RARE = 3.0
 """Rarity of a constant force all over a slide's range: a tilt is the same, and more usual."""
 NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
@@ -90,7 +92,9 @@ def _caught(profile: Profile, name: str, interval: tuple[float, float], most: fl
     """With the dry friction of a catch."""
     if most <= 0:
         return profile
-    part = Component(label=name, interval=interval, x=(0, 0.15, 0.85, 1), y=(0, most, most, 0))
+    first, last = (most if end in (0.0, 1.0) else 0.0 for end in interval)
+    y = (first, most, most, last)
+    part = Component(label=name, interval=interval, x=(0, 0.15, 0.85, 1), y=y)
     return with_component(profile, "friction", part)
 
 
@@ -149,9 +153,10 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         at, y = (at, -y) if low else (1 - at[::-1], y[::-1])
         part = Component(label=name, interval=interval, x=tuple(at), y=tuple(y))
         most = units.force * x[0] * x[1]
-        return _caught(with_component(profile, "conservative", part), name, interval, most)
+        pulled = with_component(profile, "conservative", part)
+        return _caught(pulled, name, felt(x), most)
 
-    def interval(x: Array) -> tuple[float, float]:
+    def felt(x: Array) -> tuple[float, float]:
         reach = min(SEEN * float(x[2]), 1.0)
         return (0.0, reach) if low else (1 - reach, 1.0)
 
@@ -161,7 +166,7 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         unknowns_of(STRENGTH, CATCH, (0.004, 0.4, 0.002)),
         np.array([(2 * TRIAL, 0.0, gap) for gap in (0.02, 0.04, 0.08, 0.16)]),
         write,
-        interval,
+        felt,
         lambda x: units.force * float(x[0]),
         unit_of(units),
         remains=KNOWN_SHAPE,
@@ -205,8 +210,8 @@ def _snap(units: Units, name: str) -> Hypothesis:
     place = "low" if low else "high"
 
     def write(profile: Profile, x: Array) -> Profile:
-        hold, barrier, end, tip, most = (float(value) for value in x[:5])
-        rest = 1 - tip
+        hold, share, end, tip, most = (float(value) for value in x[:5])
+        barrier, rest = share * hold, 1 - tip
         at = np.array((0.0, most * tip, tip, tip + 0.4 * rest, tip + 0.75 * rest, 1.0))
         y = units.force * np.array((-end * hold, -hold, 0.0, barrier, 0.35 * barrier, 0.0))
         if not low:
@@ -217,15 +222,15 @@ def _snap(units: Units, name: str) -> Hypothesis:
         return _caught(with_component(profile, "conservative", part), name, interval, rubs)
 
     bounds, tries = _places(place, WIDEST)
-    own = [STRENGTH, STRENGTH, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), (0.15, 0.7, 0.02), CATCH]
+    own = [STRENGTH, BARRIER, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), (0.15, 0.7, 0.02), CATCH]
     return Hypothesis(
         name,
         "both",
         unknowns_of(*own, *bounds),
-        np.array([(TRIAL, TRIAL, 0.5, tip, 0.45, 0.0, *t) for t in tries for tip in (0.4, 0.6)]),
+        np.array([(TRIAL, 0.8, 0.5, tip, 0.45, 0.0, *t) for t in tries for tip in (0.4, 0.6)]),
         write,
         lambda x: _ends(place, x),
-        lambda x: units.force * float(x[:2].max()),
+        lambda x: units.force * float(x[0]) * max(1.0, float(x[1])),
         unit_of(units),
         len(bounds),
         remains=KNOWN_SHAPE,
