@@ -212,9 +212,10 @@ def ours(train: Measured, held_out: Measured, before: float) -> tuple[float, str
 
 
 # --- the table
-HEAD = """\
-| hidden effect | noise | true | before | mujoco.sysid | joda | s | s | report | joda says (probability) |
-|---|---|---|---|---|---|---|---|---|---|"""
+COLUMNS = (
+    *("hidden effect", "noise", "true", "before", "mujoco.sysid", "joda", "s", "s"),
+    *("report", "joda says (probability)"),
+)
 
 
 def row(case: Case, effect: str | None) -> str:
@@ -227,7 +228,7 @@ def row(case: Case, effect: str | None) -> str:
         between = time.process_time()
     mended, told = ours(train, held_out, before)
     spent = between - begun, time.process_time() - between
-    hidden = f"{named(effect) if effect else 'none'}"
+    hidden = named(effect) if effect else "none"
     noise = f"{case.noise:.1e} {train.profile.joint.unit}"
     errors = [f"{one / case.noise:.2f}" for one in (true_error(case), before, fitted, mended)]
     cells = [hidden, noise, *errors, *(f"{one:.0f}" for one in spent), report, told]
@@ -237,7 +238,7 @@ def row(case: Case, effect: str | None) -> str:
 def table(seed: int) -> None:
     """All cases of one seed."""
     print(f"seed {seed}; errors in units of the noise\n")
-    print(HEAD)
+    print(f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|")
     for k, effect in enumerate(HIDDEN):
         print(row(case_of(seed + AGAIN * k, effect), effect), flush=True)
 

@@ -14,6 +14,7 @@ from joda import JodaError, add, compare, diagnose, hidden_effect, improve, impr
 from joda._add import sentences as of_added
 from joda._diagnose import sentences
 from joda.hidden import draw
+from joda.outcome import read_runs
 from joda.phrases import NAMES
 from joda.runs import write_run
 
@@ -193,17 +194,18 @@ def test_a_true_model_is_adequate_and_nothing_is_added(tmp_path):
     assert not (tmp_path / "new.xml").exists()
 
 
-def test_curves_are_noted_and_ignored(tmp_path):
+def test_curves_alone_are_diagnosed_and_beside_runs_ignored(tmp_path):
     case = draw(1, None)
-    write(case, tmp_path, count=1)
+    runs = write(case, tmp_path, count=1)
     q = np.linspace(case.truth.joint.lo, case.truth.joint.hi, 30)
     rows = "\n".join(f"{x:.6g},{1 + 0.01 * k}" for k, x in enumerate(q))
     (tmp_path / "gauge.csv").write_text(f"position,force\n{rows}\n")
     found = diagnose(tmp_path / "model.xml", "joint", [tmp_path / "gauge.csv"],
                      picture=tmp_path / "d.png")  # fmt: skip
-    assert found.verdict == "insufficient_data"
-    assert found.next_experiment
-    assert any("gauge.csv: a quasi-static curve" in note for note in sentences(found))
+    assert sentences(found)[0] == found.summary
+    assert (tmp_path / "d.png").exists()
+    both = read_runs(tmp_path / "model.xml", "joint", [*runs, tmp_path / "gauge.csv"])
+    assert any("gauge.csv: a quasi-static curve, not used" in note for note in both.notes)
     with pytest.raises(JodaError, match=r"gauge\.csv: no column 'time'"):
         improve(tmp_path / "model.xml", "joint", [tmp_path / "gauge.csv"], tmp_path / "new.xml")
 

@@ -9,7 +9,7 @@ from joda.diagnosis import Diagnosis, Finding, diagnosed
 from joda.draw import house_style, png
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes, write_text
-from joda.maps import draw_curves, draw_maps, draw_runs, replayed
+from joda.maps import SHOWN, draw_curves, draw_maps, draw_runs, replayed
 from joda.outcome import read_runs
 from joda.page import page, paragraph, table
 from joda.page import picture as embedded
@@ -123,7 +123,11 @@ def _picture(measured: Measured, profile: Profile | None, diagnosis: Diagnosis) 
     with house_style():
         figure = Figure(figsize=(12, 7), dpi=110, layout="constrained")
         if not measured.runs:
-            draw_curves(figure, measured, measured.curves)
+            shown = {"model": measured.profile} | ({"with the effect": profile} if profile else {})
+            parts = figure.subfigures(len(shown), 1, squeeze=False)[:, 0]
+            for part, (label, own) in zip(parts, shown.items(), strict=True):
+                draw_curves(part, measured.changed(own), measured.curves[:SHOWN])
+                part.suptitle(label, x=0.01, ha="left", fontsize=10)
             return figure
         models = [replayed("model", measured)]
         if profile is not None:

@@ -44,6 +44,7 @@ ALIKE = 0.1
 """By how much of the misfit two effects may differ that the data cannot tell apart."""
 SURE = 0.9
 """Probability from which no further experiment is proposed."""
+TOO_SHORT = "The measurements are too short to tell anything."
 GAUGE_BACK = "Measure the way back too, as slowly."
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, besides the first those of at least some probability."""
@@ -145,8 +146,8 @@ def diagnosed(
     Returns:
         the diagnosis, and the profile with the likeliest effect; None if there is none.
     """
-    if missing := _too_little(measured):
-        return _said(measured, "insufficient_data", missing, (), None), None
+    if not usable(windows_for(measured)).any():
+        return _said(measured, "insufficient_data", TOO_SHORT, (), None), None
     ranking = rank(measured, exclude=exclude, heed=told)
     weighed = weigh(ranking)
     if weighed.verdict == "unexplained" and measured.runs:  # what is weak shows in longer windows
@@ -154,6 +155,8 @@ def diagnosed(
         longer = rank(measured, length, exclude, told)
         if (again := weigh(longer)).verdict == "missing_effect":
             ranking, weighed = longer, again
+    if weighed.verdict == "adequate" and (why := _too_little(measured)):
+        return _said(measured, "insufficient_data", why, (), None), None
     if weighed.verdict == "adequate":
         summary = (
             f"The model is adequate: nothing beyond the noise ({_floor(measured):.2g} "
@@ -276,7 +279,7 @@ def _unit(measured: Measured) -> str:
 
 
 def _too_little(measured: Measured) -> str:
-    """Why the measurements cannot tell anything, as a sentence; nothing if they can."""
+    """Why a model that misses nothing may lack much, as a sentence; nothing if that is not so."""
     windows = windows_for(measured)
     if not measured.runs:
         told = len(windows.position)

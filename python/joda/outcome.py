@@ -25,15 +25,16 @@ PARTED = 5.0
 
 
 def read_runs(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
-    """As `joda.comparison.read_measured`; of quasi-static curves it is noted that they say nothing.
+    """As `joda.comparison.read_measured`; of curves beside runs it is noted that they say nothing.
 
     Raises:
         JodaError: a file cannot be read, or what it holds cannot be of this joint.
     """
     measured = read_measured(model, joint, runs)
     ignored = tuple(
-        f"{one.curve.name}: a quasi-static curve, which only joda compare uses."
+        f"{one.curve.name}: a quasi-static curve, not used as there are timed runs."
         for one in measured.curves
+        if measured.runs
     )
     return replace(measured, notes=measured.notes + ignored)
 

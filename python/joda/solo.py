@@ -211,7 +211,7 @@ def step(prepared: Prepared, state: State, force: Array, h: float) -> State:
     drive = drive - drag * v
     # friction(a) = clamp(offset - stiff a, -bound, bound)
     offset = held - stiff * v / h
-    sign, D, reference = _limit(joint, q, v, s)
+    sign, D, reference = _limit(joint, q, v, s, h)
 
     def solved(extra_mass: Array, extra_drive: Array) -> tuple[Array, Array]:
         """Acceleration and friction force, with or without the limit's row."""
@@ -244,7 +244,7 @@ def _weight(joint: Solo, q: Array) -> Array:
     return joint.gravity[0]
 
 
-def _limit(joint: Solo, q: Array, v: Array, s: Array) -> tuple[Array, Array, Array]:
+def _limit(joint: Solo, q: Array, v: Array, s: Array, h: float) -> tuple[Array, Array, Array]:
     """The row of the end that is overstepped: sign, D (0: none), reference acceleration.
 
     MuJoCo's solver parameters, as in "Solver parameters" of its documentation.
@@ -261,7 +261,8 @@ def _limit(joint: Solo, q: Array, v: Array, s: Array) -> tuple[Array, Array, Arr
     above = (1 - jnp.where(x < mid, mid, x)) / (1 - mid)
     rise = jnp.where(x < mid, mid * below**power, 1 - (1 - mid) * above**power)
     impedance = dmin + rise * (dmax - dmin)
-    constant, ratio = (jnp.where(first > 0, x, 1.0) for x in (first, second))
+    # a time constant is at least two steps: the engine's "refsafe"
+    constant, ratio = (jnp.where(first > 0, x, 1.0) for x in (jnp.maximum(first, 2 * h), second))
     stiffness = jnp.where(first > 0, 1 / (constant * ratio) ** 2, -first) / dmax**2
     damping = jnp.where(first > 0, 2 / constant, -second) / dmax
     D = jnp.where(distance < 0, impedance / (1 - impedance) * _inertia(joint)[1], 0.0)

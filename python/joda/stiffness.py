@@ -1,4 +1,4 @@
-"""What of a field must act implicitly for stability, in JAX: as in cpp/joint_dynamics.cc."""
+"""What of a field must act implicitly for stability, in JAX: as in cpp/stiffness.h."""
 
 import jax
 import jax.numpy as jnp
@@ -6,7 +6,7 @@ import jax.numpy as jnp
 Array = jax.Array
 
 EXPLICIT_STIFFNESS = 1.0
-"""As kExplicitStiffness in cpp/joint_dynamics.cc, and so on."""
+"""As kExplicitStiffness in cpp/stiffness.h, and so on."""
 STRIDE = 0.25
 STIFF_ROW = 1e4
 IDLE_ROW = 1e-12
