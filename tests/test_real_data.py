@@ -48,10 +48,9 @@ OFFSETS = (
     *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
 )
 """A constant force, or what these data cannot tell from it."""
-PUBLISHED = 3.1117
-"""Relative force error of their asymmetric model on the whole run, %."""
 ALLOWED = 3.2
-"""What ours may be on a quarter that was held out, %."""
+"""Relative force error on a quarter that was held out, %; published of their asymmetric model, on
+the run that it was fitted to: 3.1117 %."""
 
 # --- a pendulum on an encoder, with viscous damping only
 PENDULUM = {
@@ -66,7 +65,7 @@ DOOR = {
     "inertial": 'pos="0.15 0 0" mass="2" diaginertia="0.02 0.02 0.02"',
 }
 DOORS = {"ikea": ("ikea_cabinet_log", "ikea_cabinet_2"), "lab": ("lab_cabinet_log",)}
-BY_PLACE = ("position_dependent_friction", "position_dependent_damping", *DRIVING)
+BY_PLACE = {"position_dependent_friction", "position_dependent_damping", *DRIVING} - set(OFFSETS)
 """What differs along the way: a resistance, a spring, a magnet, a latch."""
 
 

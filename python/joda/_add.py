@@ -97,13 +97,13 @@ def add(
     target = Path(output)
     composed, picture = beside(target, force)
     told = read_diagnosis(Path(diagnosis))
-    name, direction = _chosen(told, Path(diagnosis), effect)
+    name, direction, near = _chosen(told, Path(diagnosis), effect)
     measured = read_timed(model, joint, runs)
     own = measured.profile.joint
     if told.get("joint", own.name) != own.name:
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
     train, held = parted(measured)
-    mended = mend(train, held, name, direction, progress)
+    mended = mend(train, held, name, direction, near, progress)
     progress("drawing")
     notes = write_scene(Path(model), mended.profile, target, composed)
     write_png(mended_picture(held, mended.profile), picture, force=True)
@@ -139,8 +139,10 @@ def sentences(added: Added) -> list[str]:
     return [*out, *told, *added.changes, *added.notes]
 
 
-def _chosen(told: dict[str, Any], path: Path, effect: str | None) -> tuple[str, str | None]:
-    """Name and direction of the effect to add."""
+def _chosen(
+    told: dict[str, Any], path: Path, effect: str | None
+) -> tuple[str, str | None, tuple[float, float] | None]:
+    """Name, direction and place of the effect to add; None for what the diagnosis does not say."""
     found = {one["effect"]: one for one in reversed(told["effects"])}
     if effect is None:
         if told.get("verdict") == "adequate" or not found:
@@ -150,4 +152,14 @@ def _chosen(told: dict[str, Any], path: Path, effect: str | None) -> tuple[str, 
             )
         effect = told["effects"][0]["effect"]
     check_effect(effect)
-    return effect, found.get(effect, {}).get("direction")
+    said = found.get(effect, {})
+    return effect, said.get("direction"), _interval(said.get("interval"), path)
+
+
+def _interval(said: Any, path: Path) -> tuple[float, float] | None:
+    if said is None:
+        return None
+    numbers = isinstance(said, list) and all(isinstance(end, int | float) for end in said)
+    if not numbers or len(said) != 2 or not 0 <= said[0] < said[1] <= 1:
+        raise JodaError(f"{path}: interval must be two increasing numbers from 0 to 1, not {said}.")
+    return said[0], said[1]

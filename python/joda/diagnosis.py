@@ -26,6 +26,8 @@ RIVAL = 0.35
 """Part of the excess that an effect may leave that counts as an alternative."""
 LONGER, LONGEST = 9.0, 1.5
 """How much longer the windows of a second look are, and at most how long, s."""
+STRICTLY = 0.7
+"""Strictness of that second look."""
 ONE_WAY = 0.97
 """Part of the way, in one direction, from which the joint counts as moved in that one only."""
 RESISTING = (
@@ -153,7 +155,8 @@ def diagnosed(
     if weighed.verdict == "unexplained" and measured.runs:  # what is weak shows in longer windows
         length = min(LONGER * ranking.judge.windows.length, LONGEST)
         longer = rank(measured, length, exclude, told)
-        if (again := weigh(longer)).verdict == "missing_effect":
+        again = weigh(longer, STRICTLY)
+        if again.verdict == "missing_effect" or again.share < weighed.share:
             ranking, weighed = longer, again
     if weighed.verdict == "adequate" and (why := _too_little(measured)):
         return _said(measured, "insufficient_data", why, (), None), None
@@ -181,9 +184,8 @@ def diagnosed(
 def _summary(first: Finding, weighed: Weighed, one_way: bool) -> str:
     """The verdict in a sentence, where something is missing."""
     name = phrases.named(first.effect)
-    own, left = weighed.excess
     if weighed.verdict == "unexplained":
-        share = 100 * min(left[0] / max(own, LITTLE), 1.0)
+        share = 100 * min(weighed.share, 1.0)
         return (
             f"Something is missing that no known effect explains: the best of them, {name}, leaves "
             f"{share:.0f} % of the misfit."

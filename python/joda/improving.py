@@ -1,11 +1,11 @@
 """Diagnoses and mends a model until the data support nothing more."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from joda.comparison import Measured
 from joda.diagnosis import Diagnosis, diagnosed
-from joda.mending import Error, error, mend, parted
+from joda.mending import Error, Mended, error, mend, parted
 from joda.profile import Profile
 
 MOST = 5
@@ -14,7 +14,8 @@ TRIED = 3
 """How many effects of a diagnosis are tried, the most likely first."""
 LIKELY = 0.1
 """Least probability of an effect, besides the first, that is tried."""
-WORTH, MUCH = 0.98, 0.8
+NOTHING_HELPS = "No likely effect lowers the error on the runs that were held out."
+WORTH, MUCH = 0.95, 0.8
 """Part of the error before, on runs held out, to which an effect must bring it: one that explains
 what is missing; one that explains only a part, where perhaps several are missing."""
 
@@ -51,26 +52,41 @@ def improved(
     train, held = parted(measured)
     steps = [Step(None, measured.profile, error(held), None)]
     why = f"{MOST} effects were added; that is as many as are tried."
-    for _ in range(MOST):
-        told("diagnose")
-        diagnosis, _profile = diagnosed(train)
-        steps[-1] = Step(steps[-1].effect, train.profile, steps[-1].error, diagnosis)
-        known = diagnosis.verdict == "missing_effect"
-        mended = None
-        for number, finding in enumerate(diagnosis.effects[:TRIED]):
-            if known and number and finding.probability < LIKELY:
+    try:
+        for _ in range(MOST):
+            told("diagnose")
+            diagnosis, _ = diagnosed(train)
+            steps[-1] = replace(steps[-1], diagnosis=diagnosis)
+            mended = _added(train, held, diagnosis, told)
+            if mended is None:
+                known = diagnosis.verdict == "missing_effect"
+                why = NOTHING_HELPS if known else diagnosis.summary
                 break
-            told(f"add {finding.effect}")
-            mended = mend(train, held, finding.effect, finding.direction, told)
-            worth = WORTH if known else MUCH
-            if mended.effect and mended.after.window < worth * mended.before.window:
-                break
-            mended = None
-        if mended is None:
-            why = diagnosis.summary
-            if known:
-                why = "No likely effect lowers the error on the runs that were held out."
-            break
-        train, held = (part.changed(mended.profile) for part in (train, held))
-        steps.append(Step(mended.effect, mended.profile, mended.after, None))
+            train, held = (part.changed(mended.profile) for part in (train, held))
+            steps.append(Step(mended.effect, mended.profile, mended.after, None))
+    except KeyboardInterrupt:
+        why = "Interrupted; what was found until then is kept."
     return tuple(steps), why
+
+
+def _added(
+    train: Measured, held: Measured, diagnosis: Diagnosis, told: Callable[[str], None]
+) -> Mended | None:
+    """The first effect of the diagnosis that clearly lowers the error held out; None if none does.
+
+    Where no effect explains what is missing, perhaps several are: then one that explains a good
+    part is taken.
+    """
+    known = diagnosis.verdict == "missing_effect"
+    for number, finding in enumerate(diagnosis.effects[:TRIED]):
+        if known and number and finding.probability < LIKELY:
+            return None
+        told(f"add {finding.effect}")
+        found = finding.effect, finding.direction, finding.interval
+        mended = mend(train, held, *found, told)
+        if (
+            mended.effect
+            and mended.after.window < (WORTH if known else MUCH) * mended.before.window
+        ):
+            return mended
+    return None

@@ -6,7 +6,7 @@ good start for longer ones. What is written is what does best on runs that no fi
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from joda._templates import templates
 from joda.baseline import base_of, units_of, usable, windows_for
 from joda.comparison import Measured, joined, rms
-from joda.guessing import moved, usual
-from joda.hypotheses import hypotheses
+from joda.guessing import guess, moved, usual
+from joda.hypotheses import Hypothesis, hypotheses
 from joda.judge import BEND, Judge, Unknowns
 from joda.parameters import Parameters
 from joda.profile import Profile
@@ -30,6 +30,8 @@ NEARLY = 0.95
 """Part of another error from which one is clearly less."""
 ROUNDS = 6
 """Iterations with each length."""
+STRENGTHS = (1.0, 3.0, 10.0)
+"""Of an effect whose place is known: the trials, in units of the usual one."""
 NUDGE = 0.004
 """Step of a number for differences, in its own unit."""
 FEWEST = 4
@@ -99,6 +101,7 @@ def mend(
     held: Measured,
     effect: str,
     direction: str | None = None,
+    near: tuple[float, float] | None = None,
     told: Callable[[str], None] = lambda what: None,
 ) -> Mended:
     """Adds an effect, if that lowers the error on runs held out.
@@ -108,11 +111,12 @@ def mend(
         held: the same with runs held out.
         effect: its name.
         direction: of the effect, if it is known.
+        near: where it is, in normalised position, if that is known.
         told: what is being done.
     """
     before = error(held)
     best: tuple[Profile, Error] | None = None
-    for profile in _candidates(train, effect, direction, told):
+    for profile in _candidates(train, effect, direction, near, told):
         after = error(held, profile)
         if after.window < before.window and (best is None or _better(after, best[1])):
             best = profile, after
@@ -129,7 +133,11 @@ def _better(one: Error, other: Error) -> bool:
 
 
 def _candidates(
-    train: Measured, effect: str, direction: str | None, told: Callable[[str], None]
+    train: Measured,
+    effect: str,
+    direction: str | None,
+    near: tuple[float, float] | None,
+    told: Callable[[str], None],
 ) -> Iterator[Profile]:
     """Profiles with the effect, fitted further and further."""
     told("the effect's own numbers")
@@ -142,6 +150,7 @@ def _candidates(
     every = [h for h in hypotheses(units, templates(), train.profile) if h.effect == effect]
     tried = [h for h in every if direction in (None, h.direction)] or every
     guesses = [g for h in tried if (g := tell(judge, base, fit, about, h))]
+    guesses += [guess(judge, base, fit, about, there) for h in tried if (there := _placed(h, near))]
     if not guesses:
         return
     first = moved(judge, base, min(guesses, key=lambda g: g.score))
@@ -152,6 +161,18 @@ def _candidates(
         told(f"everything together, windows of {factor * windows.length:.2g} s")
         profile = refitted(train, profile, factor * windows.length)
         yield checked(profile)
+
+
+def _placed(hypothesis: Hypothesis, near: tuple[float, float] | None) -> Hypothesis | None:
+    """A hypothesis that begins at an interval, with several strengths; None if it has none."""
+    ends = hypothesis.ends
+    if near is None or not ends:
+        return None
+    own = near if ends == 2 else near[1:] if near[0] <= 0 else near[:1]
+    trials = np.repeat(hypothesis.trials[:1], len(STRENGTHS), axis=0)
+    trials[:, 0] *= STRENGTHS
+    trials[:, -ends:] = own
+    return replace(hypothesis, trials=trials)
 
 
 def checked(profile: Profile) -> Profile:

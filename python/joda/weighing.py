@@ -21,9 +21,6 @@ LEFT = 0.25
 """Excess per sample that any true effect may leave: noise is not known better."""
 LITTLE = 0.05
 """Excess per sample that is never worth a word."""
-ROUGHLY = 0.35
-"""Part of the excess that a true effect may leave where even the best guess leaves more than noise
-in most windows."""
 HARDLY = 0.1
 """Probability below which an effect is not named as the missing one."""
 MUCH = 0.5
@@ -44,9 +41,20 @@ class Weighed:
     probabilities: tuple[float, ...]
     excess: tuple[float, tuple[float, ...]]
 
+    @property
+    def share(self) -> float:
+        """Part of the model's excess that the first guess leaves."""
+        own, left = self.excess
+        return left[0] / max(own, LITTLE) if left else 1.0
 
-def weigh(ranking: Ranking) -> Weighed:
-    """The verdict on a ranking, and how likely each effect is the missing one."""
+
+def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
+    """The verdict on a ranking, and how likely each effect is the missing one.
+
+    Args:
+        ranking: of what may be missing.
+        strictness: factor of what the true effect may leave.
+    """
     judge, guesses = ranking.judge, ranking.guesses
     samples = float(judge.windows.count[judge.counts].sum())
     if not guesses or not samples:
@@ -59,9 +67,7 @@ def weigh(ranking: Ranking) -> Weighed:
 
     own = excess(judge.loss(ranking.fit.squares, level=ranking.level), samples)
     left = np.array([excess(guess.score, ranking.told) for guess in guesses])
-    remains = first.hypothesis.remains
-    if ranking.level > WORST:  # a simulation cannot follow these data to their noise anyway
-        remains = max(remains, ROUGHLY)
+    remains = strictness * first.hypothesis.remains
     weights = (left + LITTLE) ** -SHARPNESS
     likely = weights / (weights.sum() + (remains * own + LITTLE) ** -SHARPNESS)
     gain = ranking.fit.loss - first.fit.loss - first.cost

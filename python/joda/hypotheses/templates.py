@@ -31,7 +31,7 @@ END = (0.0, 1.0, 0.004)
 """Bounds and step of an end of an interval."""
 EDGE = (0.002, 0.3, 0.01)
 """Of a constant on a part of the range, in units of that part."""
-CATCH = (0.0, 0.6, 0.01)
+CATCH = (0.0, 0.3, 0.01)
 """Dry friction of a catch, in units of its force."""
 BARRIER = (0.2, 3.0, 0.02)
 """Of a latch, in units of its hold."""
