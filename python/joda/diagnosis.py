@@ -47,6 +47,10 @@ ALIKE = 0.1
 SURE = 0.9
 """Probability from which no further experiment is proposed."""
 TOO_SHORT = "The measurements are too short to tell anything."
+MOST = 50.0
+"""What of the misfit, %, an effect may leave that is said to be missing with something else."""
+OFF = 0.05
+"""By how much a strength must be off to be worth a word."""
 GAUGE_BACK = "Measure the way back too, as slowly."
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, besides the first those of at least some probability."""
@@ -163,7 +167,7 @@ def diagnosed(
     if weighed.verdict == "adequate":
         summary = (
             f"The model is adequate: nothing beyond the noise ({_floor(measured):.2g} "
-            f"{_unit(measured)}) that an effect would explain."
+            f"{_unit(measured)}) that an effect would explain.{_off(ranking)}"
         )
         return _said(measured, "adequate", summary, (), None), None
     held = Holdout(ranking)
@@ -181,11 +185,26 @@ def diagnosed(
     return _said(measured, weighed.verdict, summary, findings, experiment), profile
 
 
+def _off(ranking: Ranking) -> str:
+    """Which of the model's own strengths are off, as a further sentence."""
+    factors = [
+        f"{name} \N{MULTIPLICATION SIGN} {factor:.2f}"
+        for (name, _), factor in zip(ranking.base.places, ranking.fit.x, strict=True)
+        if abs(factor - 1) > OFF
+    ]
+    return f" Its own numbers are somewhat off: {', '.join(factors)}." if factors else ""
+
+
 def _summary(first: Finding, weighed: Weighed, one_way: bool) -> str:
     """The verdict in a sentence, where something is missing."""
     name = phrases.named(first.effect)
     if weighed.verdict == "unexplained":
         share = 100 * min(weighed.share, 1.0)
+        if share < MOST:
+            return (
+                f"Missing is {name}, but not only that: it leaves {share:.0f} % of the misfit, "
+                "which no known effect explains."
+            )
         return (
             f"Something is missing that no known effect explains: the best of them, {name}, leaves "
             f"{share:.0f} % of the misfit."
