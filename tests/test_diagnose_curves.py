@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from joda.comparison import read_measured
-from joda.diagnosis import Diagnosis, diagnosed
+from joda.diagnosis import diagnosed
+from joda.findings import Diagnosis
 
 SPAN, FRICTION = 1.5, 0.2
 MODEL = f"""<mujoco><compiler angle="radian"/><worldbody><body>

@@ -35,6 +35,7 @@ LAYERS = [
     {"ranking"},
     {"_compare"},
     {"experiments", "phrases", "mending", "weighing", "holdout"},
+    {"findings"},
     {"diagnosis"},
     {"improving", "outcome"},
     {"_diagnose", "_improve"},

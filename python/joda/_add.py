@@ -10,9 +10,9 @@ import numpy as np
 from joda._diagnose import check_effect
 from joda.changes import changes
 from joda.comparison import rms
-from joda.diagnosis import read_diagnosis
 from joda.draw import write_png
 from joda.errors import JodaError
+from joda.findings import read_diagnosis
 from joda.mending import Error, mend, parted
 from joda.outcome import (
     beside,

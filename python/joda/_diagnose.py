@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from joda.comparison import Measured
-from joda.diagnosis import Diagnosis, Finding, diagnosed
+from joda.diagnosis import diagnosed
 from joda.draw import house_style, png
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes, write_text
+from joda.findings import Diagnosis, Finding
 from joda.maps import SHOWN, draw_curves, draw_maps, draw_runs, replayed
 from joda.outcome import read_runs
 from joda.page import page, paragraph, table

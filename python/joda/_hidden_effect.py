@@ -15,9 +15,9 @@ from joda._diagnose import diagnose
 from joda._diagnose import sentences as of_diagnosis
 from joda.comparison import Comparison
 from joda.comparison import sentences as of_comparison
-from joda.diagnosis import Diagnosis
 from joda.errors import JodaError
 from joda.files import make_folder, occupied
+from joda.findings import Diagnosis
 from joda.hidden import EFFECTS, draw, write
 from joda.hidden.cases import PUSHED, VISIBLE
 from joda.phrases import named

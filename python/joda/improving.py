@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from joda.comparison import Measured
-from joda.diagnosis import Diagnosis, diagnosed
+from joda.diagnosis import diagnosed
+from joda.findings import Diagnosis
 from joda.mending import Error, Mended, error, mend, parted
 from joda.profile import Profile
 
