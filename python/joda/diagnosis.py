@@ -21,8 +21,8 @@ RIVAL = 0.35
 """Part of the excess that an effect may leave that counts as an alternative."""
 LONGER, LONGEST = 9.0, 1.5
 """How much longer the windows of a second look are, and at most how long, s."""
-STRICTLY = 0.7
-"""Strictness of that second look."""
+STRICTLY, LOOSELY = 0.7, 3.0
+"""Strictness of that second look; and where the joint went one way only, which tells little."""
 ONE_WAY = 0.97
 """Part of the way, in one direction, from which the joint counts as moved in that one only."""
 RESISTING = (
@@ -75,7 +75,8 @@ def diagnosed(
     if not usable(windows_for(measured)).any():
         return _said(measured, "insufficient_data", TOO_SHORT, (), None), None
     ranking = rank(measured, exclude=exclude, heed=told)
-    weighed = weigh(ranking)
+    one_way = _one_way(measured)
+    weighed = weigh(ranking, LOOSELY if one_way else 1.0)
     if weighed.verdict == "unexplained" and measured.runs:  # what is weak shows in longer windows
         length = min(LONGER * ranking.judge.windows.length, LONGEST)
         longer = rank(measured, length, exclude, told)
@@ -91,7 +92,6 @@ def diagnosed(
         )
         return _said(measured, "adequate", summary, (), None), None
     held = Holdout(ranking)
-    one_way = _one_way(measured)
     named = range(min(NAMED, len(ranking.guesses)))
     findings = tuple(
         _finding(measured, ranking, held, k, weighed, _alike(ranking, weighed, k, one_way))
