@@ -1,25 +1,34 @@
-"""The paper's ablation: proposals with the template library beside raw control points.
+"""The paper's ablations: without templates, without feedback rounds, the largest for the sum.
 
-    python tests/ablation.py
+    python tests/ablation.py           with the template library beside raw control points
+    python tests/ablation.py rounds    what feedback rounds and the sum of components bring
 
-Both were asked of the same Claude model in one round, twice each, with the same pictures and
-context of the ten objects in models/; tests/recorded/README.md tells how. Every answer is compiled,
-simulated, and held against what the object does, which neither was told.
+For the first, both were asked of the same Claude model in one round, twice each, with the same
+pictures and context of the ten objects in models/; tests/recorded/README.md tells how. Every answer
+is compiled, simulated, and held against what the object does, which neither was told. For the
+second, the rules propose for each object with ten compile keys.
 """
 
 import json
+import sys
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from joda import compile, context
-from joda.behaviour import behaviour
+from joda._generate import run as propose
 from joda.errors import JodaError
 from joda.field import evaluate
+from joda.interaction.behaviour import behaviour
 from joda.propose import Task
-from joda.propose.prompt import parse, parse_ablation
+from joda.propose.offline import Offline
+from joda.propose.recognise import gravity_role
+from joda.propose.replies import parse, parse_ablation
+from joda.propose.session import Session
+from joda.propose.wishes import Wanted, unmet
 from joda.template import read_templates
-from joda.wishes import Wanted, unmet
 
 TESTS = Path(__file__).parent
 MODELS = TESTS.parent / "models"
@@ -42,6 +51,10 @@ OBJECTS: dict[str, tuple[str, tuple[Wanted, ...]]] = {
 """What each object does; each can besides be opened and closed by hand."""
 
 RUNS = (1, 2)
+KEYS = tuple(map(str, range(10)))
+MOST = 5
+"""Rounds at most."""
+WAYS = ("with feedback", "first proposal", "largest, not sum")
 GRID = np.linspace(0, 1, 401)
 
 
@@ -80,6 +93,72 @@ def spread(curves) -> float:
     return float(np.sqrt(np.mean((curves[0] - curves[1]) ** 2)) / peak) if peak else 0.0
 
 
+# --- without feedback rounds, without the sum
+@dataclass(frozen=True)
+class Loop:
+    """What the rules came to for an object with one compile key.
+
+    Attributes:
+        gravity: whether gravity moves the joint.
+        rounds: proposals until all that was proposed came true; infinite if it never did.
+        met: of each of WAYS, how many of the object's behaviours came true.
+        of: how many it has, being opened and closed by hand included.
+    """
+
+    gravity: bool
+    rounds: float
+    met: tuple[int, ...]
+    of: int
+
+
+def loop(name: str, key: str) -> Loop:
+    """Proposes, simulates and revises, as `joda generate --proposer offline --key KEY` does."""
+    joint, wanted = OBJECTS[name]
+    with TemporaryDirectory() as folder:
+        model = MODELS / f"{name}.xml"
+        session = Session.start(Path(folder), model, joint, "", key=key, pictured=False)
+        propose(session, Offline(key), MOST)
+    found, turns = session.context, session.turns
+    first, last = turns[0], turns[-1]
+    largest = compile(last.proposal, found, key=key, combine="max")
+    behaved = (last.behaviour, first.behaviour, behaviour(found, largest))
+    of = len(wanted) + 1
+    return Loop(
+        gravity=gravity_role(found) != "level",
+        rounds=next((k for k, turn in enumerate(turns, 1) if not turn.unmet), np.inf),
+        met=tuple(of - len(unmet(wanted, one, found)) for one in behaved),
+        of=of,
+    )
+
+
+def main_rounds() -> None:
+    print(
+        f"{'object':14}{'gravity':>8}{'rounds, mean':>14}{'most':>6}", *map("{:>18}".format, WAYS)
+    )
+    every = []
+    for name in OBJECTS:
+        mine = [loop(name, key) for key in KEYS]
+        every += mine
+        _tell(name, mine)
+    heavy = [one for one in every if one.gravity]
+    _tell("all", every)
+    _tell("under gravity", heavy)
+    for k, way in enumerate(WAYS):
+        whole = (sum(one.met[k] == one.of for one in some) for some in (every, heavy))
+        pairs = zip(("all", "under gravity"), whole, (every, heavy), strict=True)
+        told = ", ".join(f"{what} {count} of {len(some)}" for what, count, some in pairs)
+        print(f"{way}: all behaviours of the object come true: {told}")
+
+
+def _tell(name: str, loops: list[Loop]) -> None:
+    rounds = [one.rounds for one in loops]
+    of = sum(one.of for one in loops)
+    met = (f"{sum(one.met[k] for one in loops)} of {of}" for k in range(len(WAYS)))
+    gravity = {True: "yes", False: ""}[all(one.gravity for one in loops)]
+    numbers = f"{np.mean(rounds):14.2f}{max(rounds):6g}"
+    print(f"{name:14}{gravity:>8}{numbers}", *map("{:>18}".format, met), flush=True)
+
+
 def main() -> None:
     table = list(rows())
     print(f"{'object':14}{'templates':>12}{'raw':>8}{'spread: templates':>20}{'raw':>8}")
@@ -101,4 +180,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main_rounds() if sys.argv[1:] == ["rounds"] else main()

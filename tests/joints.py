@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from joda.scene import INERT
+from joda.scenes.scene import INERT
 
 SOLVERS = ("Newton", "CG", "PGS")
 EULER_LIKE = ("Euler", "implicit", "implicitfast")

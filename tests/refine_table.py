@@ -17,10 +17,10 @@ from joda import context, templates
 from joda._context import Context
 from joda.component import Component
 from joda.field import evaluate
-from joda.motion import Motion, release
+from joda.joints.rig import rig
+from joda.measured.runs import Run
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
-from joda.rig import rig
-from joda.runs import Run
+from joda.scenes.motion import Motion, release
 
 MODELS = __file__.rsplit("/tests/", 1)[0] + "/models"
 STEP = 0.005
@@ -90,9 +90,9 @@ def cabinet(seed: int):
 
 def problem_of(found: Context, start: Profile, runs, kinds=("values", "intervals")):
     """The fit of a profile to runs."""
-    from joda import solo
-    from joda.fitting import Problem
-    from joda.parameters import Parameters, gravity_scale
+    from joda.joints import solo
+    from joda.joints.parameters import Parameters, gravity_scale
+    from joda.refining.fitting import Problem
 
     first = solo.from_context(found, start, quiet_rig(found, start), 0)
     parameters = Parameters(start, kinds, gravity=gravity_scale(found, start))
@@ -226,13 +226,18 @@ def pushed(model: mujoco.MjModel, span: float, force: float, rng, pace=1.0, seco
 
 
 def recovery(case: Planted, iterations: int = 60):
+    """`errors` of what a fit makes of the start."""
+    problem = problem_of(case.found, case.start, case.runs)
+    return errors(case, problem.parameters.written(problem.fit(iterations).theta))
+
+
+def errors(case: Planted, after: Profile):
     """RMS and largest error of each channel over the visited range, in units of its peak.
 
     Where a curve jumps, `NEAR` on either side is left out: there any shift is as large as the jump.
     """
-    problem = problem_of(case.found, case.start, case.runs)
-    after = problem.parameters.written(problem.fit(iterations).theta)
-    visited = np.concatenate([run.position for run in case.runs]) / problem.span
+    span = np.ptp(case.found.joint.range)
+    visited = np.concatenate([run.position for run in case.runs]) / span
     s = np.linspace(max(visited.min(), 0), min(visited.max(), 1), 401)
     out = {}
     for name in CHANNELS:
@@ -258,9 +263,9 @@ def planted_table(seeds: int = 20, *names: str) -> None:
         jax.clear_caches()  # what is compiled for one template is of no use to the next
         for seed in range(int(seeds)):
             begun = time.time()
-            errors = recovery(planted(name, seed))
-            rms.append(max(e[0] for e in errors.values()))
-            line = "".join(f"  {c} {100 * e[0]:5.1f} {100 * e[1]:5.1f}" for c, e in errors.items())
+            off = recovery(planted(name, seed))
+            rms.append(max(e[0] for e in off.values()))
+            line = "".join(f"  {c} {100 * e[0]:5.1f} {100 * e[1]:5.1f}" for c, e in off.items())
             print(f"{name:40}{seed:3}{line}  {time.time() - begun:.1f} s", flush=True)
     share = np.mean(np.array(rms) <= 0.05)
     print(f"{len(rms)} profiles; every channel's RMS error within 5 %: {100 * share:.0f} %")

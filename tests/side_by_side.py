@@ -37,10 +37,10 @@ from scipy.optimize import least_squares
 
 from joda import attach
 from joda._context import Context
-from joda.motion import release
-from joda.parameters import Parameters
+from joda.joints.parameters import Parameters
+from joda.measured.runs import Run
 from joda.profile import Profile
-from joda.runs import Run
+from joda.scenes.motion import release
 
 Array = np.ndarray
 Fitted = tuple[int, mujoco.MjModel]

@@ -12,8 +12,9 @@ of the same weight. (Its own weights, one over the norm of a window's positions,
 where the joint's zero is.) Its friction row is as tight as the one that both are judged with.
 Ours names what is missing and adds it.
 
-Both are judged by one function: `joda.mending.error` in windows of 0.4 s on runs that neither saw;
-errors are in units of the encoder's noise, and `true` is that of the true joint (`hidden_bench`).
+Both are judged by one function: `joda.diagnosis.mending.error` in windows of 0.4 s on runs that
+neither saw; errors are in units of the encoder's noise, and `true` is that of the true joint
+(`hidden_bench`).
 Seconds are the processor's, of mujoco.sysid and of ours. `report` is what the log of mujoco.sysid's
 own report says about the fit; it is not made to name what is missing.
 """
@@ -36,14 +37,14 @@ from hidden_bench import AGAIN, read, true_error
 from mujoco import sysid
 from mujoco.sysid.report.sections.insights import AutomatedInsights
 
-from joda import smoothing
-from joda.comparison import Measured, read_measured
-from joda.diagnosis import diagnosed
+from joda.diagnosis.mending import error, mend, parted
+from joda.diagnosis.phrases import named
+from joda.diagnosis.verdict import diagnosed
 from joda.hidden import Case, draw, write
 from joda.hidden.cases import VISIBLE
-from joda.mending import error, mend, parted
-from joda.phrases import named
-from joda.replay import WINDOW
+from joda.measured import smoothing
+from joda.measured.reading import Measured, read_measured
+from joda.measured.replay import WINDOW
 
 Array = np.ndarray
 

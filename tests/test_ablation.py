@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from ablation import MODELS, OBJECTS, RUNS, TESTS, main, rows, spread
+from ablation import MODELS, OBJECTS, RUNS, TESTS, WAYS, loop, main, rows, spread
 
 from joda import context
 from joda.propose import Task
-from joda.propose.prompt import parse, parse_ablation
+from joda.propose.replies import parse, parse_ablation
 from joda.template import read_templates
 
 
@@ -34,3 +34,18 @@ def test_the_table_has_every_object_and_adds_up(capsys):
 
 def test_the_spread_of_two_runs_is_relative_to_the_peak():
     assert spread([np.array([0.0, 2.0]), np.array([0.0, 1.0])]) == pytest.approx(0.5 / np.sqrt(2))
+
+
+def test_feedback_and_the_sum_bring_what_the_first_proposal_and_the_largest_miss():
+    """The dishwasher's door: springs and a catch add up, and must carry its weight."""
+    found = loop("dishwasher", "0")
+    met = dict(zip(WAYS, found.met, strict=True))
+    assert found.gravity and found.rounds == 2
+    assert met["with feedback"] == found.of == 5
+    assert met["first proposal"] < 5
+    assert met["largest, not sum"] < 5
+
+
+def test_what_comes_true_at_once_takes_one_round():
+    found = loop("drawer", "0")
+    assert (found.gravity, found.rounds, found.met) == (False, 1, (found.of,) * 3)

@@ -15,7 +15,8 @@ from PIL import Image
 from test_prompts import TEMPLATES, answers, blank, images, task, texts, turn
 
 from joda import JodaError
-from joda.draw import png
+from joda.pictures.sheet import sheet as previews
+from joda.pictures.style import png
 from joda.profile import Profile
 from joda.proposal import Proposal
 from joda.propose import Ask, BatchProposer, price
@@ -23,7 +24,6 @@ from joda.propose import anthropic as proposer
 from joda.propose import batch as batches
 from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.prompt import MAX_TOKENS
-from joda.sheet import sheet as previews
 
 MODEL = "claude-sonnet-5-5"
 

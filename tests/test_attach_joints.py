@@ -24,7 +24,7 @@ from scenes import (
 
 from joda import attach
 from joda.errors import JodaError
-from joda.scene import read_profiles
+from joda.scenes.scene import read_profiles
 
 
 # --- several joints

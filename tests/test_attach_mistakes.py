@@ -17,7 +17,7 @@ from scenes import (
 
 from joda import attach
 from joda.errors import JodaError
-from joda.scene import read_profiles
+from joda.scenes.scene import read_profiles
 
 MISTAKES = {  # text, profile, options: the sentence
     "unknown joint": (
@@ -90,7 +90,7 @@ def test_a_mistake_is_told_in_a_sentence_and_nothing_is_written(
 
 def test_another_plugin_in_the_body_is_told(tmp_path, monkeypatch):
     _, after, _ = attached(tmp_path)
-    monkeypatch.setattr("joda.scene.PLUGIN", "another")  # MuJoCo brings none for bodies
+    monkeypatch.setattr("joda.scenes.scene.PLUGIN", "another")  # MuJoCo brings none for bodies
     with pytest.raises(JodaError) as error:
         attach(after, profile(), tmp_path / "new.xml")
     assert str(error.value) == (

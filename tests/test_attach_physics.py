@@ -8,7 +8,7 @@ import pytest
 from scenes import DOOR, EMPTY, LATCH, attached, model_of, profile, swing
 
 from joda import attach
-from joda.scene import read_profiles
+from joda.scenes.scene import read_profiles
 
 
 # --- the limits' elasticity

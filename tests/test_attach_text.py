@@ -22,7 +22,7 @@ from scenes import (
 )
 
 from joda import attach
-from joda.scene import read_profiles
+from joda.scenes.scene import read_profiles
 
 
 # --- the text

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from joda import context
-from joda.behaviour import AT_END, GRIP, STARTS, behaviour, grip
 from joda.component import Component
+from joda.interaction.behaviour import AT_END, GRIP, STARTS, behaviour, grip
 from joda.profile import Channel, Channels, Profile, Resistance
 
 SLIDE = """

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from joda.changes import changes, overlay
 from joda.component import Component
 from joda.field import evaluate
+from joda.pictures.changes import changes, overlay
 from joda.profile import CHANNELS, Channel, Channels, Joint, JointLimitHint, Profile, Resistance
 
 

@@ -4,13 +4,14 @@ import json
 import os
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import jsonschema
 import mujoco
 import pytest
 
-from joda import COMMANDS, JodaError, Profile, bench, demo, plot
+from joda import JodaError, Profile, bench, demo, plot
 from joda._bench import _without_plugin, hinges
 from joda._refine import Refined
 from joda.cli import app
@@ -52,6 +53,11 @@ def test_without_arguments_it_shows_its_help():
     assert joda().returncode == 0
 
 
+def test_it_says_which_version_it_is():
+    version = f"joda {metadata.version('joda')} for MuJoCo {mujoco.__version__}\n"
+    assert joda("--version").stdout == version
+
+
 def test_a_renderer_that_mujoco_does_not_know_is_one_sentence():
     result = joda("schema", MUJOCO_GL="nonsense")
     assert result.returncode == 2
@@ -59,11 +65,20 @@ def test_a_renderer_that_mujoco_does_not_know_is_one_sentence():
     assert "Traceback" not in result.stderr
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_help_has_an_example(command):
-    text = joda(command, "--help").stdout
-    assert "Example:" in text
-    assert f"joda {command}" in text.split("Example:")[1]
+def test_what_is_printed_meets_a_full_disk_a_closed_pipe_and_an_old_terminal():
+    command = [sys.executable, "-c", "from joda.cli import main; main()"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([*command, "schema"], stdout=full, stderr=subprocess.PIPE, text=True)
+    told = "joda: what is printed: cannot be written or read (No space left on device).\n"
+    assert (done.returncode, done.stderr) == (2, told)
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as closed:
+        done = subprocess.run([*command, "schema"], stdout=closed, stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (1, b"")
+    done = joda("context", MODELS / "é°.xml", "--joint", "j", PYTHONIOENCODING="ascii")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "\\xe9\\xb0.xml: no such file" in done.stderr
 
 
 def test_attach_then_plot(folder):
@@ -185,7 +200,7 @@ class TestBench:
         assert "one" not in bench(folder / "scene.xml")[0].what
 
     def test_the_native_scene_has_no_plugin_and_the_same_joints(self, folder):
-        from joda.scene import read_profiles
+        from joda.scenes.scene import read_profiles
 
         joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
         native = _without_plugin(folder / "scene.xml", read_profiles(folder / "scene.xml"), True)

@@ -8,7 +8,7 @@ import pytest
 from assets import NAMES, asset
 
 from joda import JodaError, context
-from joda.model import joint_type, load_model
+from joda.scenes.model import joint_type, load_model
 
 G = 9.81
 LID = """

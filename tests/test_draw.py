@@ -9,8 +9,9 @@ from matplotlib.colors import to_hex, to_rgb
 from scipy.interpolate import PchipInterpolator
 
 from joda.component import Component
-from joda.draw import COLOURS, draw, write_png
 from joda.errors import JodaError
+from joda.pictures.draw import draw
+from joda.pictures.style import COLOURS, write_png
 from joda.profile import Channel, Channels, Joint, Profile, Resistance
 
 HINGE = Joint(name="door", type="hinge", range=(-0.5, 1.5), unit="rad")
@@ -284,5 +285,5 @@ def test_write_png_names_a_folder_that_is_missing(tmp_path):
 
 
 def test_importing_joda_and_the_plotter_loads_no_matplotlib():
-    code = "import joda, joda.draw, sys; sys.exit('matplotlib' in sys.modules)"
+    code = "import joda, joda.pictures.draw, sys; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -12,9 +12,7 @@ from hypothesis import strategies as st
 from scenes import write
 
 from joda import JodaError, Profile, attach, read_profiles
-from joda.changes import changes
 from joda.component import Component
-from joda.draw import draw
 from joda.effects import (
     CHANNEL_EFFECTS,
     EFFECTS,
@@ -29,8 +27,10 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
+from joda.joints.resistance import damping, friction_bounds
+from joda.pictures.changes import changes
+from joda.pictures.draw import draw
 from joda.profile import Joint
-from joda.resistance import damping, friction_bounds
 
 DOOR = Joint(name="door", type="hinge", range=(0, 1.6), unit="rad")
 DRAWER = Joint(name="drawer", type="slide", range=(0, 0.4), unit="m")

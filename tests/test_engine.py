@@ -9,7 +9,7 @@ from mujoco import batch, rollout
 import joda
 from joda.component import Component
 from joda.profile import Channel, Channels, Joint, Profile, Resistance
-from joda.scene import INERT
+from joda.scenes.scene import INERT
 
 FULL = mujoco.mjtState.mjSTATE_INTEGRATION
 LATCH = component((0, 0.3), (0, 0.5, 1), (-2, -3, 0))

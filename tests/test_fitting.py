@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from refine_table import STEP, cabinet, planted, problem_of, recovery
 
-from joda.stretches import cut
+from joda.refining.stretches import cut
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -23,9 +23,9 @@ def test_nine_iterations_bring_the_papers_door_down_to_the_noise(seed):
     assert other.rms(first) ** 2 > 100 * other.rms(result.theta) ** 2
 
 
-@pytest.mark.parametrize("name", ["bistable_mechanism", "bistable_mechanism_internal"])
-def test_a_planted_profile_with_a_barrier_is_recovered(name):
+def test_a_planted_profile_with_a_barrier_is_recovered():
     seed = int(np.random.default_rng().integers(2**31))
+    name = ("bistable_mechanism", "bistable_mechanism_internal")[seed % 2]
     for channel, (rms, _) in recovery(planted(name, seed)).items():
         assert rms < 0.05, (name, seed, channel)
 

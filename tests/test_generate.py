@@ -18,12 +18,12 @@ from test_prompts import answers, blank, images, texts
 
 from joda import JodaError, generate
 from joda.cli import main
-from joda.history import History
-from joda.offscreen import NoRenderer
+from joda.pictures.offscreen import NoRenderer
 from joda.profile import Profile
 from joda.proposal import Proposal
 from joda.propose import Answer, Usage
 from joda.propose.anthropic import ProposalFailed
+from joda.propose.history import History
 from joda.propose.offline import Offline
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -61,7 +61,7 @@ def without_rendering(monkeypatch):
             path.write_bytes(blank(64, 48, (40 * k, 0, 0)))
         return paths
 
-    monkeypatch.setattr("joda.session.render", render)
+    monkeypatch.setattr("joda.propose.session.render", render)
     return asked
 
 
@@ -187,7 +187,7 @@ def test_without_a_renderer_it_goes_by_the_text(made, tmp_path, monkeypatch):
     def nothing(*arguments, **options):
         raise NoRenderer
 
-    monkeypatch.setattr("joda.session.render", nothing)
+    monkeypatch.setattr("joda.propose.session.render", nothing)
     blind = generate(OVEN, "door", tmp_path / "out")
     assert {path.name for path in blind.folder.iterdir()} == FILES - {"pictures"}
     assert content(blind.folder, RESULTS[:2]) == content(made.folder, RESULTS[:2])
@@ -222,6 +222,19 @@ def test_rounds_limit_the_proposals(made, quick, tmp_path):
     assert more.history.rounds == made.history.rounds
     assert content(more.folder, RESULTS[:2]) == content(made.folder, RESULTS[:2])
     assert quick == ["door"], "pictured once"
+
+
+def test_a_door_that_closes_from_an_angle_does_so_in_its_scene(quick, tmp_path):
+    said = "It closes by itself from about 40 degrees on."
+    out = generate(MODELS / "refrigerator.xml", "door", tmp_path / "out", describe=said)
+    assert out.history.complete and not out.history.rounds[-1].unmet
+    model = mujoco.MjModel.from_xml_path(str(out.folder / "scene.xml"))
+    for degrees, shuts in ((30, True), (50, False)):
+        data = mujoco.MjData(model)
+        data.joint("door").qpos = np.radians(degrees)
+        while data.time < 8:
+            mujoco.mj_step(model, data)
+        assert (abs(np.degrees(data.joint("door").qpos[0])) < 1) == shuts
 
 
 def test_a_file_is_taken_as_it_is(made, quick, joda, tmp_path):
@@ -332,7 +345,7 @@ def test_interrupted_and_resumed_it_gives_the_same_bytes(made, quick, tmp_path):
 @pytest.mark.parametrize("step", ["behaviour", "draw", "attach", "write_bytes", "write_text"])
 def test_interrupted_at_any_step_it_can_be_resumed(made, quick, tmp_path, monkeypatch, step):
     """In the second round, wherever the interruption falls; what it cost is kept."""
-    import joda.session as module
+    import joda.propose.session as module
 
     real, spent = getattr(module, step), Usage(requests=1, input_tokens=7)
     rounds = [Answer(round.proposal, spent) for round in made.history.rounds]
@@ -357,7 +370,7 @@ def test_interrupted_at_any_step_it_can_be_resumed(made, quick, tmp_path, monkey
 
 def test_interrupted_while_picturing_it_can_be_begun_again(quick, tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr("joda.session.render", interrupt)
+        patch.setattr("joda.propose.session.render", interrupt)
         with pytest.raises(KeyboardInterrupt):
             generate(OVEN, "door", tmp_path / "out")
     generate(OVEN, "door", tmp_path / "out", rounds=1)
@@ -368,7 +381,7 @@ def test_what_an_earlier_generation_left_is_no_edit(quick, tmp_path, monkeypatch
     generate(OVEN, "door", tmp_path / "out", rounds=1, key="old")
     old = (tmp_path / "out" / "composed.json").read_bytes()
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("joda.session.attach", interrupt)
+        patch.setattr("joda.propose.session.attach", interrupt)
         generate(OVEN, "door", tmp_path / "out", rounds=1, force=True)
     generate(OVEN, "door", tmp_path / "out", rounds=1, resume=True)
     assert (tmp_path / "out" / "composed.json").read_bytes() != old

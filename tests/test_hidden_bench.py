@@ -3,10 +3,14 @@
 import secrets
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hidden_bench import case_of, dice, fine, job_of, read, said, told, true_error
+from hidden_model import true_profile
 
-from joda.hidden import draw
+from joda.diagnosis.mending import error, mend, parted
+from joda.hidden import EFFECTS, draw
+from joda.measured.comparison import rms
 
 RELIABLE = (
     "constant_friction_hinge",
@@ -39,6 +43,21 @@ def test_the_true_model_misses_a_null_by_the_noise():
     assert true_error(case) == pytest.approx(case.noise, rel=0.15)
 
 
+@pytest.mark.parametrize("number", range(2))
+def test_in_mujoco_the_true_profile_moves_as_in_the_simulator(number):
+    """Effects of the plugin against laws, steps and friction that were written apart from it."""
+    seed = secrets.randbits(31)
+    effect = EFFECTS[seed % len(EFFECTS)]
+    print("seed", seed, effect)
+    case = draw(seed, effect)
+    _, held_out = read(case)
+    true = held_out.changed(true_profile(case, held_out.profile))
+    pairs = zip(true.runs, true.sigma, strict=True)
+    missed = [rms(w.misfit) for run, sigma in pairs for w in true.replayer.windows(run, sigma)]
+    # a half, as windows that end in a knock, or go over a barrier or just not, tell of luck
+    assert np.median(missed) < 3 * case.noise
+
+
 def test_the_true_memory_makes_the_error_small():
     case = draw(1, "backlash")
     assert true_error(case) < 1.5 * case.noise
@@ -49,3 +68,15 @@ def test_a_master_seed_gives_the_same_jobs_and_every_effect_in_turn():
     assert jobs == [job_of(5, "hard", k) for k in range(9)]
     assert len({job.effect for job in jobs[:3]}) == 3
     assert job_of(6, "hard", 0).seed != jobs[0].seed
+
+
+def test_a_curve_gets_as_many_control_points_as_the_data_support():
+    """A template's five control points make no over-centre spring."""
+    seed = secrets.randbits(31)
+    print("seed", seed)
+    train, held_out = read(draw(seed, "bistable_mechanism"))
+    mended = mend(*parted(train), "bistable_mechanism")
+    parts = mended.profile.channels.conservative.components
+    assert mended.after.window < 0.3 * mended.before.window
+    assert error(held_out, mended.profile).window < 0.3 * error(held_out).window
+    assert max(len(part.x) for part in parts) > 5

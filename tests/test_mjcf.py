@@ -3,7 +3,7 @@
 import mujoco
 import pytest
 
-from joda.mjcf import MjcfError, Source
+from joda.scenes.mjcf import MjcfError, Source
 
 
 def source(tmp_path, text: str | bytes, **files: str) -> Source:

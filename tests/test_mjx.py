@@ -18,7 +18,7 @@ from mujoco import mjx
 
 import joda.mjx
 from joda.profile import CHANNELS, Channels, Joint, Profile
-from joda.scene import INERT, profiles_of, set_profile
+from joda.scenes.scene import INERT, profiles_of, set_profile
 from joda.template import read_templates
 
 jax.config.update("jax_enable_x64", True)

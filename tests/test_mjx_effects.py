@@ -19,8 +19,8 @@ import joda
 
 jax.config.update("jax_enable_x64", True)
 import joda.mjx  # noqa: E402
-from joda import solo  # noqa: E402
 from joda.field.jaxeffects import NAMES, from_effects  # noqa: E402
+from joda.joints import solo  # noqa: E402
 from joda.profile import Channels  # noqa: E402
 
 H, STEPS = 0.004, 300

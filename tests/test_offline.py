@@ -11,14 +11,17 @@ from assets import NAMES, asset
 
 from joda import compile, context
 from joda._context import Context
-from joda.behaviour import Behaviour, behaviour
-from joda.model import joint_name, joint_type, load_model
+from joda.field import evaluate
+from joda.interaction.behaviour import Behaviour, behaviour
 from joda.proposal import Proposal
 from joda.propose import Task, Turn
-from joda.propose.kinds import UNKNOWN, recognise
+from joda.propose.checks import Seen
+from joda.propose.kinds import UNKNOWN
 from joda.propose.offline import Offline
+from joda.propose.recognise import recognise
+from joda.propose.wishes import WISHES, Wanted, read_wishes, unmet
+from joda.scenes.model import joint_name, joint_type, load_model
 from joda.template import read_templates
-from joda.wishes import WISHES, Seen, Wanted, read_wishes, unmet
 
 MODELS = Path(__file__).parents[1] / "models"
 OWN = {
@@ -271,6 +274,35 @@ def test_a_wish_leaves_what_it_does_not_touch():
     """A fridge that stays wide open still closes when nearly closed and stays where it is left."""
     done = own("refrigerator", "It stays fully open.")
     does(done.context, done.last.behaviour, "closes_near", "held_shut", "stays_put", "stays_open")
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize(("name", "degrees"), [("refrigerator", 20), ("microwave", 50)])
+def test_a_door_closes_from_the_angle_that_is_said(name, degrees, mirror):
+    found = context(MODELS / f"{name}.xml", OWN[name][0])
+    found = reflected(found) if mirror else found
+    done = loop_of(found, f"It closes by itself from about {degrees} degrees on.")
+    good(done)
+    does(found, done.last.behaviour, "closes_from", number=degrees)
+    names = [turned(e.effect_name) if mirror else e.effect_name for e in effects(done)]
+    assert names.count("magnetic_return_to_low_end") == 1, "instead of what shuts it usually"
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_a_catch_gives_way_and_the_door_moves_on_freely(key):
+    said = "A catch keeps it shut, past it the door moves on with hardly any resistance."
+    done = own("refrigerator", said, key)
+    good(done)
+    does(done.context, done.last.behaviour, "caught", "free", "held_shut")
+    low, high = (e for e in effects(done) if "return" in e.effect_name)
+    assert low.end_ratio == high.start_ratio
+    pull = -evaluate(done.last.profile.channels.conservative, np.linspace(0, 0.1, 201))[0]
+    assert 0.02 < pull.argmax() * 0.1 / 200 < 0.04, "it rises to where it gives way"
+    assert np.abs(np.diff(pull)).max() < 0.15 * pull.max(), "without a jump"
+
+
+def effects(done: Loop):
+    return done.last.proposal.effect_proposals
 
 
 # --- the answer is a function of the question

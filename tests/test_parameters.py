@@ -6,8 +6,8 @@ import pytest
 from joda import templates
 from joda.component import Component
 from joda.field import evaluate
-from joda.least_squares import bounded_step
-from joda.parameters import KINDS, Parameters
+from joda.joints.least_squares import bounded_step
+from joda.joints.parameters import KINDS, Parameters
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
 
 NAMES = sorted(templates())
@@ -49,7 +49,7 @@ def test_whatever_is_allowed_keeps_signs_and_rises_and_falls(name):
                 a, b = now.interval
                 assert 0 <= a < b <= 1
                 for old, new in ((was.y, now.y), (np.diff(was.y), np.diff(now.y))):
-                    assert np.all(np.sign(old) * np.array(new) >= -1e-6 * np.abs(now.y).max())
+                    assert np.all(np.sign(old) * np.array(new) >= -1e-6 * np.abs(was.y).max())
 
 
 def test_strengths_multiply_channels():

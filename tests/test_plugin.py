@@ -140,7 +140,7 @@ def test_plain_mujoco_loads_the_plugin():
     assert (result.stdout, result.stderr) == ("loaded\n", "")
 
 
-@pytest.mark.parametrize("first", ["joda", "mujoco", "joda.scene", "joda.cli"])
+@pytest.mark.parametrize("first", ["joda", "mujoco", "joda.scenes.scene", "joda.cli"])
 def test_any_import_order_works(first):
     code = f"import {first}, mujoco, joda; joda.plugin_path()"
     result = subprocess.run(
@@ -167,6 +167,7 @@ def test_the_command_line_says_so_and_stops():
     code = (
         "import mujoco; mujoco.mj_versionString = lambda: '3.17.0'\n"
         "import joda.plugin; joda.plugin._loaded = False\n"
+        "import sys; sys.argv = ['joda', 'schema']\n"
         "from joda.cli import main; main()"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -13,14 +13,15 @@ from messages_server import Wrong, check, picture
 from PIL import Image
 
 from joda import JodaError, compile, context, render
-from joda.behaviour import behaviour
-from joda.draw import draw, png
+from joda.interaction.behaviour import behaviour
+from joda.pictures.draw import draw
+from joda.pictures.sheet import sheet
+from joda.pictures.style import png
 from joda.profile import Profile
 from joda.proposal import EffectProposal, JointSummary, Proposal, RefineFactor, Strength
-from joda.propose import Task, Turn, prompt
+from joda.propose import Task, Turn, prompt, replies
 from joda.propose.file import FileProposer
 from joda.propose.price import tokens
-from joda.sheet import sheet
 from joda.template import read_templates
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -143,7 +144,7 @@ def test_the_schema_is_one_that_structured_output_supports_and_every_exchange_ob
     import jsonschema
 
     check(body(prompt.request(task(), [])))
-    schema = prompt.schema(TEMPLATES)
+    schema = replies.schema(TEMPLATES)
     for path in EXCHANGES.glob("*.json"):
         for answer in json.loads(path.read_text()):
             jsonschema.validate(answer, schema)
@@ -255,7 +256,7 @@ MISTAKES = {
 @pytest.mark.parametrize("reply,says", MISTAKES.values(), ids=MISTAKES.keys())
 def test_what_is_wrong_with_an_answer_is_said(reply, says):
     with pytest.raises(JodaError, match=says):
-        prompt.parse(reply, task(), [])
+        replies.parse(reply, task(), [])
 
 
 def changed(**values):
@@ -275,23 +276,23 @@ def changed(**values):
 )
 def test_what_a_schema_cannot_say_is_checked(values, says):
     with pytest.raises(JodaError, match=says):
-        prompt.parse(changed(**values), task(), [])
+        replies.parse(changed(**values), task(), [])
 
 
 def test_the_joint_is_given_not_chosen():
     answer = answers("refrigerator")[0]
     answer["proposal"]["joint_summary"]["joint_name"] = "Door (left)"
-    assert prompt.parse(json.dumps(answer), task(), []).joint_summary.joint_name == "door"
+    assert replies.parse(json.dumps(answer), task(), []).joint_summary.joint_name == "door"
     answer["proposal"]["joint_summary"]["joint_type"] = "prismatic"
     with pytest.raises(JodaError, match="revolute"):
-        prompt.parse(json.dumps(answer), task(), [])
+        replies.parse(json.dumps(answer), task(), [])
 
 
 def test_complete_ends_unless_the_user_complains():
     reply = '{"status": "complete", "proposal": null}'
-    assert prompt.parse(reply, task(), [turn()]) is None
+    assert replies.parse(reply, task(), [turn()]) is None
     with pytest.raises(JodaError, match="due"):
-        prompt.parse(reply, task(), [turn(complaint="too weak")])
+        replies.parse(reply, task(), [turn(complaint="too weak")])
 
 
 def test_the_ablation_names_no_template_and_yields_a_profile():
@@ -302,12 +303,12 @@ def test_the_ablation_names_no_template_and_yields_a_profile():
     flat = [{"s": 0, "value": 1.5}, {"s": 1, "value": 1.5}]
     pull = [{"s": 0, "value": -2}, {"s": 0.1, "value": 0}, {"s": 1, "value": 0}]
     reply = {"conservative": pull, "friction": flat, "damping": flat}
-    profile = prompt.parse_ablation(json.dumps(reply), task())
+    profile = replies.parse_ablation(json.dumps(reply), task())
     assert isinstance(profile, Profile)
     assert profile.channels.conservative.components[0].y == (-2, 0, 0)
     for wrong in (reply | {"friction": pull}, {"friction": flat}, reply | {"damping": flat[:1]}):
         with pytest.raises(JodaError):
-            prompt.parse_ablation(json.dumps(wrong), task())
+            replies.parse_ablation(json.dumps(wrong), task())
 
 
 def test_a_file_is_proposed_once(tmp_path):

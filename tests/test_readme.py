@@ -1,18 +1,32 @@
-"""Everything in the README runs, in the order in which it stands there."""
+"""Everything in the README runs, in the order in which it stands there, and so do the examples of
+`--help`, most of which are the README's."""
 
 import os
-import pydoc
 import re
+import shlex
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from urllib.request import urlopen
 
 import mujoco
 import pytest
+from typer.testing import CliRunner
+
+import joda
+from joda.cli import app
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text("utf-8")
-COMMANDS = re.findall(r"^\| [^|]+ \| `((?:joda|python) .+?)` \|$", TEXT, re.MULTILINE)
+README = re.findall(r"^\| [^|]+ \| `((?:joda|python) .+?)` \|$", TEXT, re.MULTILINE)
+HELP = {
+    name: re.findall(
+        r"^ {4,}(joda .+)$", CliRunner().invoke(app, [name, "-h"]).stdout, re.MULTILINE
+    )
+    for name in joda.COMMANDS
+}
+COMMANDS = list(dict.fromkeys([*README, *(line for lines in HELP.values() for line in lines)]))
 
 
 def shell(command: str, cwd: Path) -> subprocess.CompletedProcess:
@@ -33,16 +47,41 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("readme")
 
 
-def test_there_are_commands():
-    named = {"demo", "generate", "revise", "attach", "plot", "bench", "schema"}
-    assert named <= {line.split()[1] for line in COMMANDS}
+def test_every_command_has_an_example():
+    assert {line.split()[1] for line in README} >= set(joda.COMMANDS)
+    for name, lines in HELP.items():
+        assert lines
+        assert all(line.startswith(f"joda {name}") for line in lines)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [line for line in COMMANDS if line.split()[1] != "studio"])
 def test_command(command, folder):
     result = shell(command, folder)
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
+
+
+@pytest.mark.parametrize("command", [line for line in COMMANDS if line.split()[1] == "studio"])
+def test_the_studio_answers_until_it_is_interrupted(command, folder):
+    process = subprocess.Popen(
+        [Path(sys.executable).parent / "joda", *shlex.split(command)[1:], "--no-browser"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # NiceGUI serves pytest something else
+        env={name: value for name, value in os.environ.items() if "PYTEST" not in name},
+    )
+    try:
+        address = process.stdout.readline().split()[0]
+        with urlopen(address) as page:
+            assert "joda studio" in page.read().decode()
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=60)[1] == ""
+        assert process.returncode == 0
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def test_the_python_example(folder):
@@ -50,6 +89,22 @@ def test_the_python_example(folder):
     (folder / "example.py").write_text(code)
     result = shell("python example.py", folder)
     assert abs(float(result.stdout.strip("[]\n"))) < 0.002, result
+
+
+def test_a_proposer_of_ones_own(folder):
+    code = re.search(r"```python\n(.*?)```", (ROOT / "CONTRIBUTING.md").read_text(), re.DOTALL)[1]
+    (folder / "mine.py").write_text(code)
+    result = shell("python mine.py", folder)
+    assert result.returncode == 0, result
+    assert (folder / "mine" / "scene.xml").exists()
+
+
+def test_the_rooms_of_contributing_are_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    rooms = re.findall(r"`(\w+)/`", text[text.index("| room") : text.index("## A template")])
+    package = ROOT / "python" / "joda"
+    own = {path.name for path in package.iterdir() if path.is_dir()} - {"__pycache__", "_studio"}
+    assert set(rooms) == own - {"cases"} | {"cpp"}
 
 
 def test_the_xml_example_is_a_profile():
@@ -66,10 +121,11 @@ def test_the_xml_example_is_a_profile():
     assert data.qfrc_passive[0] == pytest.approx(-2)
 
 
-@pytest.mark.parametrize("name", re.findall(r"`(joda\.[\w.]+)\(", TEXT))
-def test_python_names_exist(name):
-    owner, _, attribute = name.rpartition(".")
-    assert hasattr(pydoc.locate(owner), attribute)
+def test_python_names_exist(folder):
+    names = sorted(set(re.findall(r"`(joda\.[\w.]+)\(", TEXT)))
+    assert "joda.mjx.step" in names
+    result = shell(f"python -c 'import joda; {'; '.join(names)}'", folder)
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 def test_ci_runs_the_two_setup_lines():

@@ -11,10 +11,11 @@ import pytest
 from assets import SHARED
 from scipy import signal
 
-from joda.comparison import read_measured
-from joda.diagnosis import DRIVING, RESISTING, diagnosed
-from joda.mending import mend, parted
-from joda.resistance import damping, friction_bounds
+from joda.diagnosis.mending import mend, parted
+from joda.diagnosis.rivals import DRIVING, RESISTING
+from joda.diagnosis.verdict import diagnosed
+from joda.joints.resistance import damping, friction_bounds
+from joda.measured.reading import read_measured
 
 DATA = SHARED / "data"
 pytestmark = pytest.mark.skipif(

@@ -15,8 +15,8 @@ from scipy.optimize import least_squares
 
 from joda import JodaError, Profile, attach, context, refine
 from joda._refine import Refined
-from joda.runs import Run, write_run
-from joda.scene import read_profiles
+from joda.measured.runs import Run, write_run
+from joda.scenes.scene import read_profiles
 
 RUN = "time,position\n" + "".join(f"{0.01 * k},{0.3 + 0.001 * k}\n" for k in range(40))
 CABINET = Path(MODELS, "cabinet.xml").read_text()

@@ -8,7 +8,8 @@ import pytest
 from assets import asset
 
 from joda import JodaError, render
-from joda.offscreen import NoRenderer, ask
+from joda.pictures import offscreen
+from joda.pictures.offscreen import NoRenderer
 
 MICROWAVE = Path(__file__).parents[1] / "models" / "microwave.xml"
 
@@ -49,7 +50,7 @@ RANDOM = """
 def _renders():
     """Skips the module's tests where there is no OpenGL at all."""
     try:
-        ask("joda.offscreen", [str(MICROWAVE), "front", "door", [0.0]])
+        offscreen.render(MICROWAVE, [])
     except NoRenderer:
         pytest.skip("nothing can render here")
 

@@ -7,10 +7,11 @@ from joints import component, flat, load
 
 from joda import attach, context
 from joda.component import Component
-from joda.model import find_joint, load_model
-from joda.motion import SET_OUT, gravity_force, pull, release, settle
+from joda.interaction.hand import SET_OUT, pull
+from joda.joints.rig import rig
 from joda.profile import Channel, Channels, Profile, Resistance
-from joda.rig import rig
+from joda.scenes.model import find_joint, load_model
+from joda.scenes.motion import gravity_force, release, settle
 
 SEEDS = range(24)
 

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from joda.smoothing import noise, smooth
+from joda.measured.smoothing import noise, smooth
 
 SIGMA = 1e-3
 

@@ -13,13 +13,13 @@ from mujoco import mjx
 from joda import context, templates
 from joda.component import Component
 from joda.field import evaluate
-from joda.parameters import KINDS, Parameters
+from joda.joints.parameters import KINDS, Parameters
+from joda.joints.rig import rig
 from joda.profile import CHANNELS, Channel, Channels, Profile, Resistance
-from joda.rig import rig
 
 jax.config.update("jax_enable_x64", True)
 import joda.mjx  # noqa: E402
-from joda import solo  # noqa: E402
+from joda.joints import solo  # noqa: E402
 
 MODELS = sorted((Path(__file__).parents[1] / "models").glob("*.xml"))
 FAST = {"xla_backend_optimization_level": "0"}  # compiles in a third of the time

@@ -9,9 +9,9 @@ from test_solo_effects import KINDS, cases, found_of, profile_of, pushes
 from joda import context, templates
 from joda._core import Solo
 from joda.effects import Backlash, PreslidingFriction
+from joda.joints.rig import gravity_factors
+from joda.joints.solo import ONLY_SLIDES
 from joda.profile import ATTRIBUTES
-from joda.rig import gravity_factors
-from joda.solo import ONLY_SLIDES
 
 PLAIN = ("", "sum", "0 1 | 0 1 | 1 1", "sum", "0 1 | 0 1 | 0.1 0.1", "sum", "")
 """Dry friction of 1 N and a damping of 0.1 N s/m."""

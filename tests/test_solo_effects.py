@@ -24,12 +24,12 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
+from joda.joints.rig import rig
 from joda.profile import Profile
-from joda.rig import rig
 
 jax.config.update("jax_enable_x64", True)
-from joda import laws, solo  # noqa: E402
 from joda.field.jaxeffects import NAMES, from_effects, prepare  # noqa: E402
+from joda.joints import laws, solo  # noqa: E402
 
 MODELS = Path(__file__).parents[1] / "models"
 FAST = {"xla_backend_optimization_level": "0"}  # compiles in a third of the time

@@ -15,11 +15,13 @@ import pytest
 from joda import context, templates
 from joda._context import Context
 from joda.component import Component
-from joda.motion import Motion, pull, release
+from joda.interaction.hand import pull
+from joda.joints.rig import rig
+from joda.measured.runs import QuasiStatic, Run, read_run
+from joda.measured.smoothing import resolution
+from joda.measured.suspicions import suspicions
 from joda.profile import Channel, Channels, Joint, Profile, Resistance
-from joda.rig import rig
-from joda.runs import QuasiStatic, Run, read_run
-from joda.suspicions import resolution, suspicions
+from joda.scenes.motion import Motion, release
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT.parent / "shared" / "data"

@@ -10,8 +10,8 @@ from scipy.interpolate import PchipInterpolator
 from test_cli import fails, joda
 
 from joda import JodaError, templates
-from joda.draw import COLOURS
-from joda.sheet import sheet
+from joda.pictures.sheet import sheet
+from joda.pictures.style import COLOURS
 
 PAPER = [
     "bistable_mechanism",

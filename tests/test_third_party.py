@@ -11,10 +11,10 @@ from assets import NAMES, asset
 
 from joda import attach
 from joda.component import Component
-from joda.model import describe_joint, joint_type, load_model
-from joda.motion import release
 from joda.profile import Channel, Channels, Profile, Resistance
-from joda.scene import read_profiles
+from joda.scenes.model import describe_joint, joint_type, load_model
+from joda.scenes.motion import release
+from joda.scenes.scene import read_profiles
 
 TIME = 0.1  # in which a scale's worth of force moves the joint through half its range, s
 MOVABLE = {"microwave": 1, "cabinet": 3, "table": 4, "kitchen": 14, "drawer": 1, "door": 2}

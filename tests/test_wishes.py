@@ -5,10 +5,11 @@ from itertools import permutations
 import pytest
 from test_behaviour import curve, joint, steady
 
-from joda.behaviour import behaviour
-from joda.wishes import WISHES, Wanted, read_wishes, state, unmet
+from joda.interaction.behaviour import behaviour
+from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
 
-ALL = [Wanted(name, 5 if name == "clicks" else 0) for name in WISHES if name != "moves"]
+NUMBERS = {"clicks": 5, "closes_from": 20}
+ALL = [Wanted(name, NUMBERS.get(name, 0)) for name in WISHES if name != "moves"]
 
 
 @pytest.mark.parametrize("wish", ALL, ids=lambda wish: wish.name)
@@ -61,6 +62,15 @@ def names(text: str, **kwargs) -> str:
         ("The stick returns to its centre from either side.", "returns_to_middle"),
         ("It springs back to neutral.", "returns_to_middle"),
         ("A button that pops in.", "snaps"),
+        ("It closes by itself from about 35 degrees on.", "closes_from"),
+        ("Self-closing within the last 20°.", "closes_from closes_near"),
+        ("A spring pulls it shut from 30 deg.", "closes_from"),
+        ("It closes from 30 degrees on, beyond that it stays where it is left.", "closes_from"),
+        ("A catch keeps it closed.", "caught held_shut"),
+        ("It is shut by a roller catch and gives way when pulled.", "caught"),
+        ("Past the catch it moves on with hardly any resistance.", "free"),
+        ("The knob turns lightly, with very little friction.", "free"),
+        ("It swings freely.", "free"),
         # two in one sentence
         ("It closes by itself when nearly closed and stays wide open.", "closes_near stays_open"),
         ("It does not latch and stays wherever it is left.", "stays_put"),
@@ -80,6 +90,9 @@ def names(text: str, **kwargs) -> str:
         ("The door is heavy and has a lot of friction.", ""),
         ("It closes with a bang.", ""),
         ("The detents are too strong.", ""),
+        ("It moves too freely.", ""),
+        ("It opens to 90 degrees.", ""),
+        ("The catch is made of brass.", ""),
         ("", ""),
     ],
 )
@@ -111,6 +124,8 @@ def test_numbers_of_positions_are_read_as_digits_and_words(text, number):
         ("The knob turns smoothly. It has no detents.", "clicks"),
         ("Without clicks", "clicks"),
         ("The door stays closed, but it does not latch.", "latched"),
+        ("It does not close by itself from 35 degrees on.", "closes_from"),
+        ("No catch keeps it shut.", "caught held_shut"),
         ("It stays open.", ""),
     ],
 )
@@ -137,13 +152,17 @@ FIVE = (
     (steady(4),),
 )
 HUMP = ((curve((0, -40, 0, 40, 0), (0.45, 0.55)),), (steady(0.5),), (steady(2),))
+SPRUNG = ((curve((-10, 0), (0, 0.4)),), (steady(1.3),), (steady(2),))
+CATCH = ((curve((-8, -12, 0), (0, 0.1)),), (steady(0.2),), (steady(0.2),))
 CASES = {
     "moves": (FRICTION, ((steady(-80),), (), ())),
     "closes_near": (MAGNET, FRICTION),
     "closes_anywhere": (RETURN, MAGNET),
+    "closes_from": (SPRUNG, MAGNET),
     "left_open": (FRICTION, MAGNET),
     "opens_past": (((curve((-4, 6)),), (steady(0.2),), (steady(5),)), RETURN),
     "held_shut": (MAGNET, ((steady(2),), (steady(0.1),), (steady(3),))),
+    "caught": (CATCH, ((steady(-6),), (steady(0.2),), (steady(3),))),
     "latched": (LATCH, MAGNET),
     "stays_put": (FRICTION, RETURN),
     "stays_half": (FRICTION, TOGGLE),
@@ -152,8 +171,15 @@ CASES = {
     "two_sides": (TOGGLE, RETURN),
     "returns_to_middle": (CENTRE, TOGGLE),
     "snaps": (HUMP, FRICTION),
+    "free": (CATCH, FRICTION),
     "soft": (RETURN, ((steady(-8),), (), (steady(1),))),
 }
+
+
+def turning(found):
+    """The same joint taken for a hinge: 1 rad instead of 1 m."""
+    joint = found.joint.model_copy(update={"type": "hinge", "unit": "rad"})
+    return found.model_copy(update={"joint": joint})
 
 
 def test_every_wish_has_its_two_joints():
@@ -163,12 +189,13 @@ def test_every_wish_has_its_two_joints():
 @pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize("name", CASES)
 def test_a_wish_is_met_by_a_joint_that_does_it_and_not_by_one_that_does_not(tmp_path, name, mirror):
-    wanted = [Wanted(name, 5 if name == "clicks" else 0)]
+    wanted = [Wanted(name, NUMBERS.get(name, 0))]
     does, does_not = CASES[name]
     lacking = []
     for parts in (does, does_not):
         found, given = joint(tmp_path, *parts, mass=0.2 if name == "snaps" else 1.0, mirror=mirror)
-        lacking.append(unmet(wanted, behaviour(found, given), found))
+        behaved = behaviour(found, given)
+        lacking.append(unmet(wanted, behaved, turning(found) if name == "closes_from" else found))
     assert lacking[0] == {}
     assert list(lacking[1]) == [name]
     assert lacking[1][name].startswith(f"It {wanted[0].sentence}: no, ")
@@ -186,3 +213,23 @@ def test_more_clicks_are_wanted_than_there_are(tmp_path):
     assert unmet([Wanted("clicks", 6)], behaved, found) == {
         "clicks": "It clicks into 6 positions: no, it rests by itself at 5 positions, not 6."
     }
+
+
+@pytest.mark.parametrize(
+    ("degrees", "said"),
+    [
+        (14, "let go at 33 % of the way it closes too"),
+        (30, "let go at 37 to 45 % of the way it stays"),
+    ],
+)
+def test_another_angle_than_it_closes_from_is_told(tmp_path, degrees, said):
+    """10 N (1 - s / 0.4) against 1.3 N: it closes from 0.348 rad, 20 degrees."""
+    found, given = joint(tmp_path, *SPRUNG)
+    lacking = unmet([Wanted("closes_from", degrees)], behaviour(found, given), turning(found))
+    assert said in lacking["closes_from"]
+
+
+def test_what_slides_has_no_degrees(tmp_path):
+    found, given = joint(tmp_path, *SPRUNG)
+    lacking = unmet([Wanted("closes_from", 20)], behaviour(found, given), found)
+    assert "no degrees" in lacking["closes_from"]

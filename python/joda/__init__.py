@@ -1,10 +1,11 @@
 """JODA: joint dynamics for articulated objects in MuJoCo.
 
 Every command is a function here, of the same name and meaning: `joda.attach`, `joda.plot`, ...
-They are loaded when they are first used, so that `import joda` stays light.
+They are loaded when they are first used, and the plugin with them, so that `import joda` stays
+light: it imports neither MuJoCo nor NumPy.
 """
 
-import warnings
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from joda.errors import JodaError
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from joda._context import context
     from joda._demo import demo
     from joda._diagnose import diagnose
+    from joda._doctor import doctor
+    from joda._experiments import experiments
     from joda._generate import generate
     from joda._generate_all import generate_all
     from joda._hidden_effect import hidden_effect
@@ -28,14 +31,11 @@ if TYPE_CHECKING:
     from joda._render import render
     from joda._revise import revise
     from joda._schema import schema
+    from joda._simulate import simulate
+    from joda._studio import studio
     from joda._templates import templates
     from joda.profile import Profile
-    from joda.scene import read_profiles, set_profile
-
-try:
-    load()
-except JodaError as error:  # the command line and every use of the plugin say it again, and stop
-    warnings.warn(str(error), RuntimeWarning, stacklevel=2)
+    from joda.scenes.scene import read_profiles, set_profile
 
 __version__ = "0.1.0"
 __all__ = [
@@ -49,6 +49,8 @@ __all__ = [
     "context",
     "demo",
     "diagnose",
+    "doctor",
+    "experiments",
     "generate",
     "generate_all",
     "hidden_effect",
@@ -61,6 +63,8 @@ __all__ = [
     "revise",
     "schema",
     "set_profile",
+    "simulate",
+    "studio",
     "templates",
 ]
 
@@ -73,6 +77,8 @@ COMMANDS = (
     "context",
     "demo",
     "diagnose",
+    "doctor",
+    "experiments",
     "generate",
     "improve",
     "plot",
@@ -80,21 +86,26 @@ COMMANDS = (
     "render",
     "revise",
     "schema",
+    "simulate",
+    "studio",
     "templates",
 )
+_MODULES = ("effects", "field", "mjx")
 _LAZY = {
     "Profile": "joda.profile",
     "generate_all": "joda._generate_all",
     "hidden_effect": "joda._hidden_effect",
-    "read_profiles": "joda.scene",
-    "set_profile": "joda.scene",
+    "read_profiles": "joda.scenes.scene",
+    "set_profile": "joda.scenes.scene",
     **{name: f"joda._{name}" for name in COMMANDS},
 }
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"joda.{name}")
     if name not in _LAZY:
         raise AttributeError(f"module 'joda' has no attribute '{name}'")
-    from importlib import import_module
-
+    if name != "doctor":
+        load()  # MuJoCo 4 did so by itself when it was imported; this says what is wrong if not
     return getattr(import_module(_LAZY[name]), name)

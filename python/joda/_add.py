@@ -8,13 +8,9 @@ from typing import Any
 import numpy as np
 
 from joda._diagnose import check_effect
-from joda.changes import changes
-from joda.comparison import rms
-from joda.draw import write_png
-from joda.errors import JodaError
-from joda.findings import read_diagnosis
-from joda.mending import Error, mend, parted
-from joda.outcome import (
+from joda.diagnosis.findings import read_diagnosis
+from joda.diagnosis.mending import Error, mend, parted
+from joda.diagnosis.outcome import (
     beside,
     held_out,
     mended_picture,
@@ -23,7 +19,11 @@ from joda.outcome import (
     told_errors,
     write_scene,
 )
-from joda.phrases import named
+from joda.diagnosis.phrases import named
+from joda.errors import JodaError
+from joda.measured.comparison import rms
+from joda.pictures.changes import changes
+from joda.pictures.style import write_png
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def add(
 
     Args:
         model: MJCF or URDF, with or without a profile on the joint.
-        joint: its name or address, see `joda.model.find_joint`.
+        joint: its name or address, see `joda.scenes.model.find_joint`.
         diagnosis: what `joda.diagnose` wrote as JSON.
         runs: CSV files with time, position and perhaps force.
         output: scene to write; beside it, with its name, go .composed.json and .png.

@@ -27,7 +27,7 @@ from joda.effects import (
 from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
-from joda.scene import DAMPING_ROW, INERT, TRACE, open_scene
+from joda.scenes.scene import DAMPING_ROW, INERT, TRACE, open_scene
 
 ALL_EFFECTS = (
     AsymmetricFriction(direction="positive", y=(0.05, 0.05)),

@@ -7,23 +7,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.comparison import (
+from joda.files import check_target, write_bytes, write_text
+from joda.measured.comparison import (
     Comparison,
-    Measured,
     RunError,
     failing,
     joined,
-    read_measured,
     rms,
     sentences,
     window_rows,
 )
-from joda.curves import curve_error, failing_force
-from joda.draw import house_style, png
-from joda.files import check_target, write_bytes, write_text
-from joda.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
-from joda.page import page, paragraph, table
-from joda.page import picture as embedded
+from joda.measured.curves import curve_error, failing_force
+from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
+from joda.measured.reading import Measured, read_measured
+from joda.measured.stepping import timestep_note
+from joda.pictures.page import page, paragraph, table
+from joda.pictures.page import picture as embedded
+from joda.pictures.style import house_style, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -46,7 +46,7 @@ def compare(
 
     Args:
         model: MJCF or URDF, with or without a profile on the joint.
-        joint: its name or address, see `joda.model.find_joint`.
+        joint: its name or address, see `joda.scenes.model.find_joint`.
         runs: CSV files with time, position and perhaps force; without time, position and the force
             that slowly moves the joint there, in the order measured.
         json, report, picture: files to write: all numbers, an HTML page that needs nothing else,
@@ -76,17 +76,19 @@ def compare(
         windows.append(left)
     short = window_rows(measured)
     described = measured.profile.joint
+    missed = rms(np.concatenate(windows)) if rows else None
+    note = timestep_note(measured, missed) if missed is not None else None
     comparison = Comparison(
         joint=described.name,
         unit=described.unit,
         runs=tuple(rows),
         rmse=rms(np.concatenate(wholes)) if rows else None,
-        rmse_window=rms(np.concatenate(windows)) if rows else None,
+        rmse_window=missed,
         noise_floor=rms(np.array(measured.sigma)) if rows else None,
         failing=tuple(failing(short)),
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
         failing_force=tuple(failing_force(measured.curves, described)),
-        notes=measured.notes,
+        notes=(*measured.notes, *([note] if note else [])),
     )
     if json:
         write_text(Path(json), comparison.to_json())

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from joda.model import describe_joint, find_joint, load_model, moves_with
-from joda.motion import gravity_force
 from joda.profile import Joint
+from joda.scenes.model import describe_joint, find_joint, load_model, moves_with
+from joda.scenes.motion import gravity_force
 
 POSITIONS = 21
 """At how many positions, evenly over the range, inertia and gravity are sampled."""
@@ -77,7 +77,7 @@ class Context(BaseModel):
         joint, hinge = self.joint, self.joint.type == "hinge"
         lo, hi = joint.range
         degrees = f" ({np.rad2deg(lo):.1f} to {np.rad2deg(hi):.1f} degrees)" if hinge else ""
-        force = "N·m" if hinge else "N"
+        force = joint.force_unit
         opens = {"low_end": "+q", "high_end": "-q", "unknown": "unknown"}[self.closed_end]
         rows = {
             "joint": f"{joint.name}, a {joint.type} between {self.parent} and {self.child}",
@@ -102,7 +102,7 @@ def context(model: str | Path, joint: str) -> Context:
 
     Args:
         model: MJCF or URDF file.
-        joint: its name or address, see `joda.model.find_joint`.
+        joint: its name or address, see `joda.scenes.model.find_joint`.
 
     Returns:
         the context.

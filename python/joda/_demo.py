@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,15 +10,16 @@ import numpy as np
 
 from joda._context import context
 from joda._generate import generate
-from joda.behaviour import FIRMNESS, SLOW, grip
-from joda.draw import house_style, write_png
 from joda.errors import JodaError
-from joda.files import make_folder, occupied, write_bytes
-from joda.history import History
-from joda.model import find_joint, load_model
-from joda.motion import Motion, pull, release
-from joda.offscreen import Image, render
-from joda.runs import Run, write_run
+from joda.files import fresh, make_folder, occupied, write_bytes
+from joda.interaction.behaviour import FIRMNESS, SLOW, grip
+from joda.interaction.hand import pull
+from joda.measured.runs import Run, write_run
+from joda.pictures.offscreen import Image, NoRenderer, render
+from joda.pictures.style import house_style, write_png
+from joda.propose.history import History
+from joda.scenes.model import find_joint, load_model
+from joda.scenes.motion import Motion, release
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -103,9 +103,12 @@ def demo(
         write_run(path, Run(path.name, *samples, force=np.zeros(len(samples[0])), forced=False))
     progress("drawing both doors")
     ends = [float(motion.position[-1]) for motion in let_go[0]]
-    views = render(scene, "front", JOINT, [float(STARTS[0]), *ends])
+    try:
+        views = render(scene, [np.array([angle]) for angle in (STARTS[0], *ends)])
+    except NoRenderer:
+        views = []
     picture = folder / "demo.png"
-    write_png(_picture(let_go, opened, views or []), picture, force=True)
+    write_png(_picture(let_go, opened, views), picture, force=True)
     plain_ends, joda_ends = zip(
         *[[float(m.position[-1]) for m in pair] for pair in let_go], strict=True
     )
@@ -123,12 +126,6 @@ def demo(
         joda_force=forces[1],
         duration=DURATION,
     )
-
-
-def fresh(name: str) -> Path:
-    """The first of NAME, NAME_2, NAME_3, ... that does not exist."""
-    candidates = (Path(f"{name}_{k}" if k > 1 else name) for k in count(1))
-    return next(path for path in candidates if not path.exists())
 
 
 def _picture(let_go: list[list[Motion]], opened: list[Motion], views: Sequence[Image]) -> "Figure":

@@ -4,17 +4,17 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from joda.comparison import Measured
-from joda.diagnosis import diagnosed
-from joda.draw import house_style, png
+from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.outcome import read_runs
+from joda.diagnosis.phrases import NAMES, named
+from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes, write_text
-from joda.findings import Diagnosis, Finding
-from joda.maps import SHOWN, draw_curves, draw_maps, draw_runs, replayed
-from joda.outcome import read_runs
-from joda.page import page, paragraph, table
-from joda.page import picture as embedded
-from joda.phrases import NAMES, named
+from joda.measured.maps import SHOWN, draw_curves, draw_maps, draw_runs, replayed
+from joda.measured.reading import Measured
+from joda.pictures.page import page, paragraph, table
+from joda.pictures.page import picture as embedded
+from joda.pictures.style import house_style, png
 from joda.profile import Profile
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def diagnose(
 
     Args:
         model: MJCF or URDF, with or without a profile on the joint.
-        joint: its name or address, see `joda.model.find_joint`.
+        joint: its name or address, see `joda.scenes.model.find_joint`.
         runs: CSV files with time, position and perhaps force.
         exclude: effects that are not considered.
         json, report, picture: files to write: all numbers, an HTML page that needs nothing else,

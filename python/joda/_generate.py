@@ -9,11 +9,11 @@ import mujoco
 
 from joda.errors import JodaError
 from joda.files import occupied
-from joda.history import History
-from joda.model import find_joint, joint_name, joint_type, load_model
 from joda.proposal import Proposal
 from joda.propose import Proposer
-from joda.session import Progress, Session, relative, silent
+from joda.propose.history import History
+from joda.propose.session import Progress, Session, relative, silent
+from joda.scenes.model import find_joint, joint_name, joint_type, load_model
 
 ROUNDS = 3
 
@@ -53,8 +53,8 @@ def generate(
 
     Args:
         model: MJCF or URDF file.
-        joint: a hinge or slide with a range, as `joda.model.find_joint` takes it. None: the only
-            one of the model.
+        joint: a hinge or slide with a range, as `joda.scenes.model.find_joint` takes it. None: the
+            only one of the model.
         output: folder to fill; made if missing.
         proposer: "anthropic", "offline", the path of a proposal.json, or an object with a
             `propose` of its own. By default anthropic where ANTHROPIC_API_KEY is set, else offline.

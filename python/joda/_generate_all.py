@@ -8,9 +8,9 @@ from typing import NamedTuple
 from joda._generate import ROUNDS, Generated, begin, check_rounds, choose, ranged, run
 from joda.errors import JodaError
 from joda.files import make_folder, read_text
-from joda.model import load_model
 from joda.propose import Ask, BatchProposer, Proposer
-from joda.session import Session
+from joda.propose.session import Session
+from joda.scenes.model import load_model
 
 Advance = Callable[[int, int, str], None]
 Results = dict[str, Generated | JodaError]

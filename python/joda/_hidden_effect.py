@@ -10,17 +10,16 @@ import numpy as np
 from joda._add import add
 from joda._add import sentences as of_added
 from joda._compare import compare
-from joda._demo import fresh
 from joda._diagnose import diagnose
 from joda._diagnose import sentences as of_diagnosis
-from joda.comparison import Comparison
-from joda.comparison import sentences as of_comparison
+from joda.diagnosis.findings import Diagnosis
+from joda.diagnosis.phrases import named
 from joda.errors import JodaError
-from joda.files import make_folder, occupied
-from joda.findings import Diagnosis
+from joda.files import fresh, make_folder, occupied
 from joda.hidden import EFFECTS, draw, write
 from joda.hidden.cases import PUSHED, VISIBLE
-from joda.phrases import named
+from joda.measured.comparison import Comparison
+from joda.measured.comparison import sentences as of_comparison
 
 
 @dataclass(frozen=True)

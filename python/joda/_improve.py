@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from joda.changes import changes
-from joda.comparison import Measured, rms
-from joda.draw import COLOURS, house_style, png
+from joda.diagnosis.improving import Step, improved
+from joda.diagnosis.mending import parted
+from joda.diagnosis.outcome import beside, draw_mended, held_out, read_timed, write_scene
+from joda.diagnosis.phrases import named
 from joda.files import check_target, write_bytes, write_text
-from joda.improving import Step, improved
-from joda.maps import draw_maps, replayed
-from joda.mending import parted
-from joda.outcome import beside, draw_mended, held_out, read_timed, write_scene
-from joda.page import page, paragraph, table
-from joda.page import picture as embedded
-from joda.phrases import named
+from joda.measured.comparison import rms
+from joda.measured.maps import draw_maps, replayed
+from joda.measured.reading import Measured
+from joda.pictures.changes import changes
+from joda.pictures.page import page, paragraph, table
+from joda.pictures.page import picture as embedded
+from joda.pictures.style import COLOURS, house_style, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -66,7 +67,7 @@ def improve(
 
     Args:
         model: MJCF or URDF, with or without a profile on the joint.
-        joint: its name or address, see `joda.model.find_joint`.
+        joint: its name or address, see `joda.scenes.model.find_joint`.
         runs: CSV files with time, position and perhaps force. Of four or more every fourth is
             held out of all fits, of fewer the last quarter of each.
         output: scene to write; beside it, with its name, go .composed.json and .png.

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
-from joda.draw import draw, write_png
 from joda.errors import JodaError
-from joda.model import find_joint
-from joda.motion import gravity_force
+from joda.pictures.draw import draw
+from joda.pictures.style import write_png
 from joda.profile import Profile
-from joda.scene import open_scene
+from joda.scenes.model import find_joint
+from joda.scenes.motion import gravity_force
+from joda.scenes.scene import open_scene
 
 
 def plot(

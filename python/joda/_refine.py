@@ -1,6 +1,5 @@
 """Gradient refinement: bends a joint's profile until simulation matches measured motions."""
 
-import json
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,33 +11,28 @@ from numpy.typing import NDArray
 
 from joda._attach import attach
 from joda._context import Context, context
-from joda.changes import changes, draw_channels
-from joda.draw import COLOURS, house_style, write_png
+from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
-from joda.field import evaluate
 from joda.files import check_target, write_text
-from joda.model import find_joint, joint_name, load
-from joda.parameters import KINDS, Kind, Parameters, gravity_scale
-from joda.profile import CHANNELS, Profile
-from joda.runs import read_run
-from joda.scene import profiles_of
+from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
+from joda.measured.runs import QuasiStatic, Run, read_measurement
+from joda.pictures.changes import changes
+from joda.pictures.style import write_png
+from joda.refining.curvefit import CurveProblem
+from joda.refining.refinement import history, picture, unseen
+from joda.scenes.model import find_joint, joint_name, load
+from joda.scenes.scene import profiles_of
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from joda.fitting import Fit, Problem
+    from joda.refining.fitting import Problem
 
 Array = NDArray[np.float64]
 
 ITERATIONS = 60
-SEEN = 0.5
-"""A part of a curve is seen where the data shrink its uncertainty at least by this factor."""
+STILL: tuple[Kind, ...] = ("values", "intervals", "strengths")
+"""What quasi-static curves can tell."""
 PARTED = 5.0
 """Whole runs that are missed by so many times more than windows have parted from the measured."""
-STEP = 1e-4
-RUNS = 4
-"""How many runs the picture shows."""
-GRID = np.linspace(0, 1, 201)
 
 
 @dataclass(frozen=True)
@@ -49,10 +43,10 @@ class Refined:
         scene, composed, picture, history: the files that were written.
         changes: a line per changed component.
         before, after: RMS position error of whole runs from their starts, which are fitted within
-            the measurement's error; rad or m.
-        windows: the same of windows of 0.4 s, before and after.
-        noise: of the measured position, rad or m.
-        checked: errors of whole runs that were held out of the fit; None without such.
+            the measurement's error, rad or m; of curves, RMS error of the force, N·m or N.
+        windows: the same of windows of 0.4 s, before and after; None of curves.
+        noise: of the measured position or force.
+        checked: the same error where it was held out of the fit; None without such.
         unseen: per channel, intervals of normalised position of which the data told little.
         iterations: how many there were.
         notes: what the user should be told, a sentence each.
@@ -65,7 +59,7 @@ class Refined:
     changes: tuple[str, ...]
     before: float
     after: float
-    windows: tuple[float, float]
+    windows: tuple[float, float] | None
     noise: float
     checked: tuple[float, float] | None
     unseen: dict[str, tuple[tuple[float, float], ...]]
@@ -84,6 +78,7 @@ def refine(
     method: Literal["lm", "adam"] = "lm",
     fit: Collection[Kind] = ("values", "intervals"),
     keep_shape: bool = True,
+    finer: int = 0,
     force: bool = False,
     progress: Callable[[str, int, int, float], None] = lambda stage, number, total, rms: None,
 ) -> Refined:
@@ -96,17 +91,20 @@ def refine(
 
     Args:
         model: a scene (MJCF) whose joint carries a profile.
-        joint: its name or address, see `joda.model.find_joint`.
-        runs: measured motions, CSV files with time, position and perhaps force.
+        joint: its name or address, see `joda.scenes.model.find_joint`.
+        runs: measured motions, CSV files with time, position and perhaps force; or all of them
+            quasi-static curves, without time.
         output: scene to write; beside it, with its name, go .composed.json, .png and .history.json.
-        check: measured motions that are held out of the fit and only compared.
+        check: such files that are held out of the fit and only compared.
         iterations: at most so many.
         method: Levenberg-Marquardt, or Adam as in the paper.
         fit: what may change: the control points' values, the intervals' ends, the channels'
             strengths, the damping_ratio of the ends of the range, inertia, a gravity offset.
         keep_shape: see above.
+        finer: so many times a control point is put halfway between each two, before the fit.
         force: overwrite what exists.
-        progress: told the stage, the iteration, of how many at most, and the RMS misfit (rad or m).
+        progress: told the stage, the iteration, of how many at most, and the RMS misfit (rad or m;
+            N·m or N of curves).
 
     Returns:
         what was written, and how much better it is.
@@ -114,14 +112,6 @@ def refine(
     Raises:
         JodaError: a file cannot be read or written, the joint carries no profile, JAX is missing.
     """
-    try:
-        from joda import solo
-        from joda.fitting import Problem
-    except ImportError as error:
-        raise JodaError(
-            f'refine needs JAX (no module {error.name}); run: pip install ".[mjx]"'
-        ) from None
-
     source, target = Path(model), Path(output)
     beside = {
         kind: target.with_suffix(f".{kind}") for kind in ("composed.json", "png", "history.json")
@@ -132,7 +122,9 @@ def refine(
         raise JodaError(f"fit: '{sorted(unknown)[0]}' is none of {', '.join(KINDS)}.")
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
-    measured, held_out = ([read_run(path) for path in paths] for paths in (runs, check))
+    measured, held_out = ([read_measurement(path) for path in paths] for paths in (runs, check))
+    if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
+        raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
     spec, compiled = load(source)
     number = find_joint(compiled, joint)
     name = joint_name(compiled, number)
@@ -143,32 +135,34 @@ def refine(
             "one with joda attach."
         )
     before, found = profiles[name], context(source, name)
-    first = solo.from_context(found, before, compiled, number, attached=True)
-    unit = gravity_scale(found, before)
-    parameters = Parameters(before, fit, keep_shape=keep_shape, gravity=unit)
+    begin = before
+    for _ in range(finer):
+        begin = resolved(begin)
+    unit = gravity_scale(found, begin)
+    parameters = Parameters(begin, fit, keep_shape=keep_shape, gravity=unit)
     if not len(parameters.start):
         raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
-    h = float(compiled.opt.timestep)
-    problem = Problem(first, parameters, measured, h)
+    problem = _problem(found, compiled, number, parameters, measured)
     result = problem.fit(
         iterations, method, lambda stage, k, rms: progress(stage, k, iterations, rms)
     )
     after = parameters.written(result.theta)
     errors = problem.rms(parameters.start), problem.rms(result.theta)
-    windows = problem.rms_window(parameters.start), problem.rms_window(result.theta)
+    windows = problem.windows(result.theta)
     checked = None
     if held_out:
-        other = Problem(first, parameters, held_out, h)
+        other = _problem(found, compiled, number, parameters, held_out)
         checked = other.rms(parameters.start), other.rms(result.theta)
-    hidden = unseen(before, parameters, result.covariance)
+    hidden = unseen(begin, parameters, result.covariance)
     also, said = _beyond(parameters, result.theta, compiled, number, found)
     notes = attach(source, after, target, joint=name, also=also, force=True) + said
+    notes += problem.notes
     write_text(beside["composed.json"], after.to_json())
     balance = np.array(found.positions), -np.array(found.gravity_force)
-    figure = _picture(before, after, balance, problem, result, hidden)
+    figure = picture(before, after, balance, problem, result, hidden)
     write_png(figure, beside["png"], force=True)
-    write_text(beside["history.json"], _history(result, errors, problem.sigma, checked, hidden))
-    if errors[1] > PARTED * max(windows[1], problem.sigma):
+    write_text(beside["history.json"], history(result, errors, problem.sigma, checked, hidden))
+    if windows and errors[1] > PARTED * max(windows[1], problem.sigma):
         notes.append(
             "Whole runs still part from the measured ones although windows of 0.4 s do not: near "
             "a barrier a small difference decides to which side a joint snaps."
@@ -192,47 +186,38 @@ def refine(
     )
 
 
-def unseen(
-    profile: Profile, parameters: Parameters, covariance: Array
-) -> dict[str, tuple[tuple[float, float], ...]]:
-    """Per channel, the intervals of normalised position of which the data told little.
-
-    There the curve's standard deviation is more than half of what it was before any data.
-
-    Args:
-        profile: the fitted profile's form.
-        parameters: what was fitted.
-        covariance: of the fitted numbers.
-    """
-    prior = np.diag(parameters.doubt**2)
-    out = {}
-    slopes = _curve_slopes(parameters)
-    for name in CHANNELS:
-        if not getattr(profile.channels, name).components:
-            continue
-        J = slopes[name]
-        left = np.sqrt(np.einsum("gi,ij,gj->g", J, covariance, J))
-        begun = np.sqrt(np.einsum("gi,ij,gj->g", J, prior, J))
-        hidden = (left > SEEN * begun) & (begun > 1e-9 * max(begun.max(), 1e-300))
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], hidden.astype(int), [0]])))
-        pairs = edges.reshape(-1, 2)
-        out[name] = tuple((float(GRID[a]), float(GRID[b - 1])) for a, b in pairs if b - a > 2)
-    return out
+def _of_one_kind(measured: Sequence[Run | QuasiStatic]) -> bool:
+    """Whether these are curves; raises JodaError if some are and some are not."""
+    curves = [one.name for one in measured if isinstance(one, QuasiStatic)]
+    if curves and len(curves) < len(measured):
+        raise JodaError(
+            f"{curves[0]}: a quasi-static curve among timed runs; refine to either, one after the "
+            "other."
+        )
+    return bool(curves)
 
 
-def _curve_slopes(parameters: Parameters) -> dict[str, Array]:
-    """Derivatives of the curves over GRID by the numbers, by central differences; (grid, n)."""
-    n = len(parameters.start)
-    out = {name: np.zeros((len(GRID), n)) for name in CHANNELS}
-    for k in range(n):
-        for sign in (1, -1):
-            moved = parameters.start.copy()
-            moved[k] += sign * STEP
-            profile = parameters.written(moved, exact=True)
-            for name in CHANNELS:
-                curve = evaluate(getattr(profile.channels, name), GRID)[0]
-                out[name][:, k] += sign * curve / (2 * STEP)
-    return out
+def _problem(
+    found: Context,
+    model: mujoco.MjModel,
+    joint: int,
+    parameters: Parameters,
+    measured: Sequence[Run | QuasiStatic],
+) -> "Problem | CurveProblem":
+    """What is to be fitted; raises JodaError if that takes JAX and it is missing."""
+    curves = [one for one in measured if isinstance(one, QuasiStatic)]
+    if curves:
+        return CurveProblem(found, model, joint, parameters, curves)
+    try:
+        from joda.joints import solo
+        from joda.refining.fitting import Problem
+    except ImportError as error:
+        raise JodaError(
+            f'refine needs JAX (no module {error.name}); run: pip install ".[mjx]"'
+        ) from None
+    first = solo.from_context(found, parameters.profile, model, joint, attached=True)
+    runs = [one for one in measured if isinstance(one, Run)]
+    return Problem(first, parameters, runs, float(model.opt.timestep))
 
 
 def _beyond(
@@ -263,62 +248,3 @@ def _beyond(
             f"Gravity's force on the joint lacks {what}; mend the bodies' centre of mass or tilt."
         )
     return also, said
-
-
-def _history(
-    result: "Fit",
-    errors: tuple[float, float],
-    noise: float,
-    checked: tuple[float, float] | None,
-    hidden: dict[str, tuple[tuple[float, float], ...]],
-) -> str:
-    content = {
-        "rmse_before": errors[0],
-        "rmse_after": errors[1],
-        "noise_floor": noise,
-        "held_out": checked,
-        "unseen": hidden,
-        "iterations": [{"stage": stage, "rmse": rms} for stage, rms in result.history],
-        "interrupted": result.interrupted,
-    }
-    return json.dumps(content, indent=2) + "\n"
-
-
-def _picture(
-    before: Profile,
-    after: Profile,
-    gravity: tuple[Array, Array],
-    problem: "Problem",
-    result: "Fit",
-    hidden: dict[str, tuple[tuple[float, float], ...]],
-) -> "Figure":
-    """Channels before and after, grey where the data told little; runs before and after."""
-    from matplotlib.figure import Figure
-
-    runs = problem.runs[:RUNS]
-    with house_style():
-        figure = Figure(figsize=(12, 7), dpi=120, layout="constrained")
-        left, right = figure.subfigures(1, 2, squeeze=False)[0]
-        panels = left.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
-        draw_channels(panels, before, after, gravity)
-        lo, hi = after.joint.range
-        for axes, name in zip(panels, CHANNELS, strict=True):
-            for k, (a, b) in enumerate(hidden.get(name, ())):
-                label = "not seen by the data" if k == 0 else None
-                span = (lo + a * (hi - lo), lo + b * (hi - lo))
-                axes.axvspan(*span, color="#dddddd", lw=0, zorder=-1, label=label)
-        panels[0].legend(frameon=False, fontsize=8, ncols=2)
-        panels[-1].set_xlabel(f"joint position ({after.joint.unit})")
-        plots = np.atleast_1d(right.subplots(len(runs), 1, sharex=True))
-        was, now = (problem.paths(theta) for theta in (problem.parameters.start, result.theta))
-        for axes, (time, measured), old, new in zip(plots, runs, was, now, strict=False):
-            axes.plot(time, measured, ".", color="#444444", ms=2.5, label="measured")
-            axes.plot(time, old, "--", color="#888888", lw=1.6, label="before")
-            axes.plot(time, new, color=COLOURS["conservative"], lw=1.6, label="after")
-            axes.set_ylabel(f"position ({after.joint.unit})")
-            axes.spines[["top", "right"]].set_visible(False)
-        plots[0].legend(frameon=False, fontsize=8, ncols=3)
-        plots[-1].set_xlabel("time (s)")
-        left.suptitle(f"{after.joint.name}: profile", x=0.02, ha="left", parse_math=False)
-        right.suptitle("measured runs", x=0.02, ha="left")
-        return figure

@@ -1,7 +1,7 @@
 """Pictures of a joint: what it moves, highlighted, from one end of its range to the other.
 
 The camera is chosen by looking: of many directions the one from which most of the moving part, and
-of its motion, can be seen. All the work is done in a child process, see `joda.offscreen`.
+of its motion, can be seen. All the work is done in a child process, see `joda.pictures.offscreen`.
 """
 
 import io
@@ -17,11 +17,12 @@ import numpy as np
 
 from joda.errors import JodaError
 from joda.files import check_target, make_folder, write_bytes
-from joda.model import describe_joint, find_joint, load_model
-from joda.offscreen import HEIGHT, Image, answer, ask
-from joda.part import Array, moving
+from joda.pictures.caption import captioned
+from joda.pictures.offscreen import Image, answer, ask
+from joda.pictures.stage import Stage, View
 from joda.profile import Joint
-from joda.studio import Studio, View
+from joda.scenes.model import describe_joint, find_joint, load_model
+from joda.scenes.part import Array, moving
 
 ARROW = (0.95, 0.36, 0.05)
 AXIS = (0.12, 0.12, 0.14)
@@ -42,7 +43,7 @@ def render(
 
     Args:
         model: MJCF or URDF file.
-        joint: a hinge or slide with a range, as `joda.model.find_joint` takes it.
+        joint: a hinge or slide with a range, as `joda.scenes.model.find_joint` takes it.
         output: folder; created if missing.
         count: how many pictures, at least 2.
         force: overwrite pictures that exist.
@@ -70,7 +71,7 @@ def _make(request: Any) -> list[str]:
     joint = describe_joint(model, index)
     if not moving(model, index):
         raise JodaError(f"{path}: joint '{joint.name}' moves no geom that can be seen.")
-    studio = Studio(model, index)
+    stage = Stage(model, index)
     fractions = np.linspace(0, 1, count)
     stem = re.sub(r"[^\w.-]+", "_", joint.name).strip("_") or "joint"
     digits = max(2, len(str(count - 2)))
@@ -83,7 +84,7 @@ def _make(request: Any) -> list[str]:
     labels = [_label(joint, q, s) for q, s in zip(positions, fractions, strict=True)]
     # Compressing one picture while the next is rendered.
     with ThreadPoolExecutor(2) as pool:
-        list(pool.map(_write, targets, labels, _shots(studio, positions)))
+        list(pool.map(_write, targets, labels, _shots(stage, positions)))
     return [str(target) for target in targets]
 
 
@@ -96,21 +97,8 @@ def _label(joint: Joint, q: float, s: float) -> str:
 
 def _write(target: Path, label: str, image: Image) -> None:
     """Writes the picture as PNG, its label in the lower left corner."""
-    import matplotlib
-    from PIL import Image as Pictures
-    from PIL import ImageDraw, ImageFont
-
-    picture = Pictures.fromarray(image)
-    pen = ImageDraw.Draw(picture, "RGBA")
-    face = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
-    font = ImageFont.truetype(str(face), 19)
-    place = (20, HEIGHT - 24)
-    left, top, right, bottom = pen.textbbox(place, label, font, anchor="ls")
-    box = (left - 8, top - 8, right + 8, bottom + 8)
-    pen.rounded_rectangle(box, radius=6, fill=(255, 255, 255, 217))
-    pen.text(place, label, "#222222", font, anchor="ls")
     content = io.BytesIO()
-    picture.save(content, "png")
+    captioned(image, label).save(content, "png")
     write_bytes(target, content.getvalue())
 
 
@@ -217,34 +205,34 @@ def _slide_marks(axis: Array, low: Array, union: Array) -> list[Marks]:
     return marks
 
 
-def _shots(studio: Studio, positions: Array) -> Iterator[Image]:
+def _shots(stage: Stage, positions: Array) -> Iterator[Image]:
     """The pictures at these positions, rad or m, all with the same camera."""
     lo, hi = positions[0], positions[-1]
     clouds = []
     for position in np.linspace(lo, hi, 9):
-        studio.pose(position)
-        clouds.append(studio.points())
+        stage.pose(position)
+        clouds.append(stage.points())
     union = np.concatenate(clouds)
-    studio.pose(lo)
-    anchor, axis = studio.data.xanchor[studio.joint].copy(), studio.data.xaxis[studio.joint].copy()
-    kind = describe_joint(studio.model, studio.joint).type
+    stage.pose(lo)
+    anchor, axis = stage.data.xanchor[stage.joint].copy(), stage.data.xaxis[stage.joint].copy()
+    kind = describe_joint(stage.model, stage.joint).type
     if kind == "hinge":
         options = _hinge_marks(anchor, axis, hi - lo, clouds[0], union)
     else:
         options = _slide_marks(axis, clouds[0], union)
-    studio.reach(union)
+    stage.reach(union)
     out = clouds[0].mean(axis=0) - anchor
-    view = _choose(studio, _views(kind, axis, out), union, (lo, (lo + hi) / 2, hi))
+    view = _choose(stage, _views(kind, axis, out), union, (lo, (lo + hi) / 2, hi))
     # The arrow on the side of the part that is turned to the camera.
     marks = min(options, key=lambda mark: float(mark.path.mean(axis=0) @ view.frame()[2]))
-    studio.settle(view.camera(np.concatenate([union, marks.path])), marks.add)
+    stage.settle(view.camera(np.concatenate([union, marks.path])), marks.add)
     for position in positions:
-        studio.pose(position)
-        yield studio.shoot()
+        stage.pose(position)
+        yield stage.shoot()
 
 
 def _choose(
-    studio: Studio,
+    stage: Stage,
     candidates: Iterator[tuple[View, float]],
     union: Array,
     positions: Sequence[float],
@@ -254,16 +242,16 @@ def _choose(
     cameras = [view.camera(union) for view in views]
     clear = []
     for position in positions:
-        studio.pose(position)
-        points = studio.points()
+        stage.pose(position)
+        points = stage.points()
         targets = points[np.linspace(0, len(points) - 1, 12).astype(int)]
-        clear.append([studio.clear(camera, targets) for camera in cameras])
+        clear.append([stage.clear(camera, targets) for camera in cameras])
     promise = np.array(suits) * (0.1 + np.mean(clear, axis=0))
     tried = np.argsort(-promise, kind="stable")[:TRIED]
     seen = []
     for position in positions:
-        studio.pose(position)
-        seen.append(np.stack(studio.scout([cameras[k] for k in tried])))
+        stage.pose(position)
+        seen.append(np.stack(stage.scout([cameras[k] for k in tried])))
     cover = np.stack([masks.mean(axis=(1, 2)) for masks in seen])
     changed = (seen[0] ^ seen[-1]).mean(axis=(1, 2))
     shown = cover.mean(axis=0) + 8 * cover.min(axis=0) + changed

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from joda._generate import choose
-from joda.changes import changes, overlay
-from joda.draw import write_png
 from joda.errors import JodaError
-from joda.history import History
+from joda.pictures.changes import changes, overlay
+from joda.pictures.style import write_png
 from joda.propose import Proposer
-from joda.session import Progress, Session, silent
+from joda.propose.history import History
+from joda.propose.session import Progress, Session, silent
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from joda.draw import write_png
 from joda.errors import JodaError
-from joda.sheet import sheet
+from joda.pictures.sheet import sheet
+from joda.pictures.style import write_png
 from joda.template import Template, read_templates
 
 
@@ -19,7 +19,7 @@ def templates(
     """The library's templates and those of further folders; their previews as a picture.
 
     Args:
-        folders: folders of *.json files; a template there replaces one of the same name.
+        folders: folders of JSON files; a template there replaces one of the same name.
         output: PNG to write, one preview per template. None: no picture.
         name: only this template.
         force: overwrite the output.

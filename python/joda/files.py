@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from itertools import count
 from pathlib import Path
 
 from joda.errors import JodaError
@@ -9,6 +10,8 @@ from joda.errors import JodaError
 
 def read_text(path: Path) -> str:
     """Text of a UTF-8 file; raises JodaError if it is missing, unreadable or not text."""
+    if path.is_char_device():  # it may never end
+        raise JodaError(f"{path}: cannot be read (a device, no file).")
     try:
         return path.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
@@ -28,6 +31,12 @@ def check_target(path: Path, force: bool) -> None:
 def occupied(folder: Path) -> bool:
     """Whether something is there already: a file, or a folder that is not empty."""
     return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+
+
+def fresh(name: str) -> Path:
+    """The first of NAME, NAME_2, NAME_3, ... that does not exist."""
+    candidates = (Path(f"{name}_{k}" if k > 1 else name) for k in count(1))
+    return next(path for path in candidates if not path.exists())
 
 
 def make_folder(path: Path) -> None:

@@ -1,6 +1,7 @@
 """The engine plugin `joda.joint_dynamics`: where it is, and loading it.
 
-`import mujoco` loads it by itself, through the entry point group `mujoco.plugins`.
+`import mujoco` loads it by itself, through the entry point group `mujoco.plugins`; every use of
+joda makes sure of it.
 """
 
 import os

@@ -113,6 +113,11 @@ class Joint(Frozen):
             raise ValueError("unit must be rad for a hinge and m for a slide")
         return self
 
+    @property
+    def force_unit(self) -> Literal["N·m", "N"]:
+        """Of the generalised force on it."""
+        return "N·m" if self.type == "hinge" else "N"
+
 
 class JointLimitHint(Frozen):
     """How the joint's end stops feel: `elasticity` sets the damping ratio of the limit.
@@ -161,16 +166,20 @@ class Profile(File):
 
     def with_effect(self, effect: AnyEffect) -> Self:
         """The profile with the effect, in the place of one of the same name and direction."""
-        kept = [other.model_dump() for other in self.effects if other.key != effect.key]
-        content = self.model_dump(exclude={"schema_version"})
-        return type(self).model_validate({**content, "effects": [*kept, effect.model_dump()]})
+        kept = tuple(other for other in self.effects if other.key != effect.key)
+        return type(self)(
+            joint=self.joint,
+            channels=self.channels,
+            effects=(*kept, effect),
+            joint_limit_hint=self.joint_limit_hint,
+        )
 
     def with_component(self, channel: str, component: Component) -> Self:
         """The profile with one more component in a channel."""
-        content = self.model_dump()
-        parts = content["channels"][channel]["components"]
-        content["channels"][channel]["components"] = [*parts, component.model_dump()]
-        return type(self).model_validate(content)
+        old: Channel = getattr(self.channels, channel)
+        new = type(old)(combine=old.combine, components=(*old.components, component))
+        channels = self.channels.model_copy(update={channel: new})
+        return self.model_copy(update={"channels": channels})
 
     def attributes(self) -> dict[str, str]:
         """The plugin's attributes for the joint, key to text; empty channels are left out."""

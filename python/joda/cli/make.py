@@ -53,9 +53,9 @@ def demo(
     Or simulate a joint with an effect that its model lacks, find it from measured runs, add it,
     and open the seal. Needs no key and no network. Example:
 
-        joda demo -o joda_demo
+        joda demo -o out
 
-        joda demo hidden-effect --seed 4
+        joda demo hidden-effect --seed 9 --position-only -o hidden
     """
     if what == "hidden-effect":
         _hidden_effect(
@@ -130,7 +130,7 @@ def generate(
     Leaves context.json, pictures, proposal.json, composed.json, profile.png, scene.xml and
     history.json. A folder of models is done joint by joint. Example:
 
-        joda generate microwave.xml --joint door -o out --describe "it latches shut"
+        joda generate out/oven.xml --joint door -o stays --describe "it stays wherever it is left"
     """
     from joda import generate as run
     from joda import generate_all as run_all
@@ -177,7 +177,7 @@ def revise(
 
     Example:
 
-        joda revise out --feedback "the final closing pull is too strong"
+        joda revise oven --feedback "the final closing pull is too strong"
     """
     from joda import revise as run
 
@@ -212,7 +212,7 @@ def compile(
 
     The same proposal and key give the same bytes. Example:
 
-        joda compile proposal.json --model microwave.xml --joint door -o composed.json
+        joda compile oven/proposal.json --model out/oven.xml -o composed.json
     """
     from joda import compile as run
 
@@ -245,7 +245,7 @@ def attach(
 
     The scene loads in plain MuJoCo wherever joda is installed. Example:
 
-        joda attach microwave.xml composed.json -o scene.xml
+        joda attach out/oven.xml out/composed.json -o scene.xml
     """
     from joda import attach as run
 

@@ -1,6 +1,7 @@
 """Commands that measure: profiles against measured motions, and what they cost."""
 
 import os
+import warnings
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
@@ -42,6 +43,9 @@ def refine(
     free_shape: Annotated[
         bool, typer.Option("--free-shape", help="Let curves change sign, rising parts fall.")
     ] = False,
+    finer: Annotated[
+        int, typer.Option(min=0, max=3, help="So many times control points are doubled first.")
+    ] = 0,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -49,19 +53,20 @@ def refine(
 
     Leaves, beside the scene, its .composed.json, .png and .history.json. Example:
 
-        joda refine scene.xml run1.csv run2.csv --joint door -o better.xml
+        joda refine oven/scene.xml out/let_go_5.csv out/let_go_45.csv --joint door -o better.xml
     """
     from joda import Profile
     from joda import refine as run
 
     # what JAX compiles takes longer than the fit itself, so it is kept for the next call
     caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    warnings.filterwarnings("ignore", "Error .* persistent compilation cache")  # a full disk
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(caches / "joda" / "jax"))
     with loss_bar() as bar:
         result = run(
             model, joint, runs, output, check=check or (), iterations=iterations, method=method,
             fit=[name.strip() for name in fit.split(",") if name.strip()],  # type: ignore[misc]
-            keep_shape=not free_shape, force=force, progress=bar,
+            keep_shape=not free_shape, finer=finer, force=force, progress=bar,
         )  # fmt: skip
     if as_json:
         print_json(with_text_paths(asdict(result)))
@@ -93,10 +98,10 @@ def compare(
 
     Example:
 
-        joda compare scene.xml run1.csv run2.csv --joint door --report compare.html
-    """
+        joda compare oven/scene.xml out/let_go_5.csv out/let_go_45.csv --joint door --report compare.html
+    """  # noqa: E501
     from joda import compare as run
-    from joda.comparison import sentences
+    from joda.measured.comparison import sentences
 
     with spinner("compare") as progress:
         found = run(
@@ -119,7 +124,7 @@ def bench(
 
     Example:
 
-        joda bench
+        joda bench scene.xml
     """
     from joda import bench as run
 

@@ -32,7 +32,7 @@ def diagnose(
 
     Example:
 
-        joda diagnose scene.xml run1.csv run2.csv --joint door --json diagnosis.json
+        joda diagnose hidden/model.xml hidden/run?.csv --joint joint --json diagnosis.json
     """
     from joda import diagnose as run
     from joda._diagnose import sentences
@@ -66,8 +66,8 @@ def add(
 
     Leaves, beside the scene, its .composed.json and .png. Example:
 
-        joda add scene.xml run1.csv run2.csv --joint door --diagnosis diagnosis.json -o new.xml
-    """
+        joda add hidden/model.xml hidden/run?.csv --joint joint --diagnosis diagnosis.json -o new.xml
+    """  # noqa: E501
     from joda import add as run
     from joda._add import sentences
 
@@ -96,7 +96,7 @@ def improve(
 
     Leaves, beside the scene, its .composed.json and .png. Example:
 
-        joda improve scene.xml run1.csv run2.csv --joint door -o new.xml --report story.html
+        joda improve hidden/model.xml hidden/run?.csv --joint joint -o improved.xml
     """
     from joda import improve as run
     from joda._improve import sentences

@@ -21,7 +21,7 @@ def context(
 
     Example:
 
-        joda context microwave.xml --joint door
+        joda context out/oven.xml --joint door
     """
     from joda import context as run
     from joda.files import check_target, write_text
@@ -47,7 +47,7 @@ def render(
 
     Example:
 
-        joda render microwave.xml --joint door -o pictures
+        joda render out/oven.xml --joint door -o pictures
     """
     from joda import render as run
 
@@ -71,7 +71,7 @@ def plot(
 
     Gravity is drawn for a scene. Example:
 
-        joda plot scene.xml --joint door -o profile.png
+        joda plot scene.xml -o profile.png
     """
     from joda import plot as run
 

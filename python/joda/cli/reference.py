@@ -1,12 +1,14 @@
-"""Commands that say what may be written: the library of templates, and the files' formats."""
+"""Commands that say what there is: templates, the files' formats, what is installed and works."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from joda.cli.options import Force, Json, Templates
-from joda.cli.tell import print_json, tell_templates
+from joda.cli.progress import spinner
+from joda.cli.tell import print_json, tell_checks, tell_templates
 
 
 def templates(
@@ -52,3 +54,22 @@ def schema(
     from joda import schema as run
 
     print_json(run(file))
+
+
+def doctor(as_json: Json = False) -> None:
+    """Say what is installed, whether plugin and renderers work, and what to do if not.
+
+    Ends with status 1 if something that joda needs does not work. Example:
+
+        joda doctor
+    """
+    from joda import doctor as run
+
+    with spinner("doctor"):
+        checks = run()
+    fatal = any(check.fatal for check in checks)
+    if as_json:
+        print_json({"ok": not fatal, "checks": [asdict(check) for check in checks]})
+    else:
+        tell_checks(checks)
+    raise typer.Exit(int(fatal))

@@ -14,10 +14,12 @@ from joda.errors import JodaError
 if TYPE_CHECKING:
     from joda._bench import Row
     from joda._demo import Demo
+    from joda._doctor import Check
     from joda._generate import Generated
     from joda._refine import Refined
-    from joda.history import Round
+    from joda.cases.gallery import Shown
     from joda.propose import Usage
+    from joda.propose.history import Round
     from joda.template import Template
 
 
@@ -134,13 +136,16 @@ def tell_errors(result: "Refined", unit: str) -> None:
         result: of a refinement.
         unit: of its joint's position, rad or m.
     """
+    what = "Position"
+    if result.windows is None:
+        what, unit = "Force", {"rad": "N·m", "m": "N"}[unit]
     print(
-        f"Position error: {result.before:.3g} → {result.after:.3g} {unit} RMS after "
+        f"{what} error: {result.before:.3g} → {result.after:.3g} {unit} RMS after "
         f"{result.iterations} iterations; the measurement's noise is {result.noise:.2g} {unit}."
     )
-    print(
-        f"The same over windows of 0.4 s: {result.windows[0]:.3g} → {result.windows[1]:.3g} {unit}."
-    )
+    if result.windows:
+        first, last = result.windows
+        print(f"The same over windows of 0.4 s: {first:.3g} → {last:.3g} {unit}.")
     if result.checked:
         print(
             f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS."
@@ -163,6 +168,42 @@ def tell_ratios(rows: "Iterable[Row]") -> None:
             row.what, f"{row.ratio:.3f} ± {row.spread:.3f}", row.bar, f"{ours:.2f} / {other:.2f}"
         )
     Console(width=None if sys.stdout.isatty() else 110).print(table)
+
+
+def tell_cases(shown: "Iterable[Shown]") -> None:
+    """The table of `joda experiments`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    ways = {"joda": "profile", "constant": "constant", "spring": "spring"}
+    ways |= {"usual": "constant, usual solver"}
+    table = Table("case", "number", *ways.values(), "separated", box=None, pad_edge=False)
+    for one in shown:
+        number = f"{one.case.meaning} ({one.unit}; {one.case.better} is better)"
+        spans = (one.span(way) for way in ways)
+        table.add_row(one.case.name, number, *spans, "yes" if one.separated else "NO")
+    Console(width=None if sys.stdout.isatty() else 130).print(table)
+
+
+def tell_checks(checks: "Iterable[Check]") -> None:
+    """A line per check, below it what to do, and a sentence about all."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    marks = {"ok": ("ok", "green"), "missing": ("missing", "yellow"), "broken": ("broken", "red")}
+    table = Table.grid(padding=(0, 2))
+    checks = list(checks)
+    for check in checks:
+        style = "bold red" if check.fatal else marks[check.state][1]
+        told = Text(check.found)
+        if check.remedy:
+            told.append(f"\n→ {check.remedy}", "bold" if check.fatal else "dim")
+        table.add_row(Text(check.state, style), check.what, told)
+    console = Console(width=None if sys.stdout.isatty() else 160)
+    console.print(table)
+    fatal = [check.what for check in checks if check.fatal]
+    console.print(f"Not working: {', '.join(fatal)}." if fatal else "All that joda needs works.")
 
 
 def tell_templates(found: "Iterable[Template]") -> None:

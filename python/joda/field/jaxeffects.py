@@ -1,6 +1,6 @@
 """A joint's effects beyond the three channels in JAX: differentiable in every number.
 
-Units are those of a hinge; for a slide read N, m and kg. Their laws are in `joda.laws`.
+Units are those of a hinge; for a slide read N, m and kg. Their laws are in `joda.joints.laws`.
 """
 
 from collections.abc import Collection

@@ -17,7 +17,7 @@ from joda.hidden.laws import Law
 from joda.hidden.measuring import draw_encoder, measure, move, shows
 from joda.hidden.outside import BEYOND
 from joda.hidden.truth import Truth
-from joda.runs import Run, write_run
+from joda.measured.runs import Run, write_run
 
 EFFECTS = tuple(KNOWN)
 """Effects that a diagnosis knows by name."""

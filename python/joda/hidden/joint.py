@@ -5,6 +5,10 @@ import numpy as np
 from joda.hidden.truth import Joint, Truth
 
 GRAVITY = 9.81
+TIMESTEP = 0.002
+"""Of a base model, s, unless its joint is fast."""
+STEPS = 700
+"""Steps of a base model in its joint's natural time, at least."""
 
 
 def draw_truth(
@@ -84,7 +88,7 @@ def base_model(truth: Truth, name: str) -> str:
     )
     return f"""<mujoco model="{name}">
   <compiler angle="radian"/>
-  <option timestep="0.002" gravity="0 0 -{GRAVITY!r}"/>
+  <option timestep="{_timestep(joint)!r}" gravity="0 0 -{GRAVITY!r}"/>
   <worldbody>
     <body name="part">
       <joint name="{name}" type="{joint.kind}" axis="{axis}" limited="true"
@@ -96,6 +100,11 @@ def base_model(truth: Truth, name: str) -> str:
   </worldbody>
 </mujoco>
 """
+
+
+def _timestep(joint: Joint) -> float:
+    """A part of the usual one that is short for the joint, s."""
+    return TIMESTEP / float(np.ceil(STEPS * TIMESTEP / joint.time))
 
 
 def _hinge(joint: Joint) -> tuple[str, str, float]:

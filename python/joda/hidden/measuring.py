@@ -8,7 +8,7 @@ from joda.hidden.laws import Array
 from joda.hidden.motions import FLICKS, FORCED, FREE, GUARD, KNOCKS, Draw, Ground, Hands, release
 from joda.hidden.simulator import Tape, Trace, simulate
 from joda.hidden.truth import Joint, Truth
-from joda.runs import Run
+from joda.measured.runs import Run
 
 TO_LOW = ("magnetic_return_to_low_end", "spring_loaded_snap_detent_to_low_end")
 TO_HIGH = ("magnetic_return_to_high_end", "spring_loaded_snap_detent_to_high_end")

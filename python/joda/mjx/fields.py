@@ -15,9 +15,9 @@ from joda.effects import CurveEffect
 from joda.errors import JodaError
 from joda.field import jaxeffects, jaxfield
 from joda.field.jaxeffects import Effects, from_effects
-from joda.model import find_joint
 from joda.profile import CHANNELS, Profile
-from joda.scene import DAMPING_ROW
+from joda.scenes.model import find_joint
+from joda.scenes.scene import DAMPING_ROW
 
 Array = jax.Array
 

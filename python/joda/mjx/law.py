@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
-from joda import laws
 from joda.field import jaxfield
 from joda.field.jaxeffects import Backlash
+from joda.joints import laws
+from joda.joints.stiffness import IDLE_ROW, implicit_stiffness, reach
 from joda.mjx.fields import Prepared
 from joda.mjx.internals import Rows
 from joda.profile import CHANNELS
-from joda.stiffness import IDLE_ROW, implicit_stiffness, reach
 
 Array = jax.Array
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from joda._context import Context
-from joda.behaviour import Behaviour
 from joda.component import Frozen
 from joda.errors import JodaError
+from joda.interaction.behaviour import Behaviour
 from joda.profile import Profile
 from joda.proposal import Proposal
 from joda.template import Template

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from joda.errors import JodaError
 from joda.profile import Profile
 from joda.proposal import Proposal
-from joda.propose import Answer, Ask, Task, Turn, Usage
+from joda.propose import Answer, Ask, Task, Turn, Usage, replies
 from joda.propose import prompt as prompts
 from joda.propose.batch import HALF, Batches, Request, why
 from joda.propose.price import Tally, price
@@ -103,7 +103,7 @@ class Anthropic:
         tally = Tally(self._price)
         asked = self._request(task, turns)
         with self._client() as client:
-            proposal = self._converse(client, tally, asked, lambda t: prompts.parse(t, task, turns))
+            proposal = self._converse(client, tally, asked, lambda t: replies.parse(t, task, turns))
         return Answer(proposal, tally.usage, tally.notes)
 
     def ablate(self, task: Task) -> tuple[Profile, Usage]:
@@ -116,7 +116,7 @@ class Anthropic:
         asked = {"model": self.model, **prompts.ablation(task)}
         with self._client() as client:
             profile = self._converse(
-                client, tally, asked, lambda t: prompts.parse_ablation(t, task)
+                client, tally, asked, lambda t: replies.parse_ablation(t, task)
             )
         return profile, tally.usage
 
@@ -250,7 +250,7 @@ class Anthropic:
         tally.pay(result.message, HALF)
 
         def parse(text: str) -> Proposal | None:
-            return prompts.parse(text, ask.task, ask.turns)
+            return replies.parse(text, ask.task, ask.turns)
 
         try:
             proposal = self._converse(client, tally, asked, parse, result.message)
@@ -285,8 +285,8 @@ class Anthropic:
 @cache
 def _sheet(templates: tuple[str, ...]) -> bytes:
     """PNG file of templates, each given as JSON."""
-    from joda.draw import png
-    from joda.sheet import sheet
+    from joda.pictures.sheet import sheet
+    from joda.pictures.style import png
 
     read = [Template.model_validate_json(text) for text in templates]
     return png(sheet({template.name: template for template in read}))

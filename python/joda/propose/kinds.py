@@ -1,78 +1,10 @@
-"""What kinds of joints there are, as far as names, motion and gravity tell, and what each does.
+"""What kinds of joints there are and what each does.
 
-Places are shares of the way from the closed end (0) to the other (1). In an effect's name {closed}
-and {open} stand for those ends, {opening} and {closing} for the sign of the motion.
+Places and the names of effects are as in `joda.propose.parts`.
 """
 
-import re
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
-
-from joda._compile import reference_scales
 from joda._context import Context
-from joda.proposal import Label
-
-Gravity = Literal["level", "opens", "closes"]
-
-
-@dataclass(frozen=True)
-class Part:
-    """An effect of a kind.
-
-    Attributes:
-        effect: the template's name.
-        place: from where to where.
-        conservative, friction, damping: strengths.
-        reason: why it is there.
-        serves: the wishes that it is there for; without them it goes.
-    """
-
-    effect: str
-    place: tuple[float, float]
-    reason: str
-    conservative: Label = "none"
-    friction: Label = "none"
-    damping: Label = "none"
-    serves: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of joint.
-
-    Attributes:
-        title: what it is.
-        own: words in the name of the joint or of the body that it moves.
-        objects: words in any name around, of the object that it belongs to.
-        alone: whether its own name is enough where there are `objects`.
-        joint: hinge, slide, or either.
-        gravity: what gravity may do to it.
-        wishes: what it does, by name; {number} wishes get theirs from `count`.
-        parts: how.
-    """
-
-    title: str
-    own: str = ""
-    objects: str = ""
-    alone: bool = False
-    joint: str = "hinge or slide"
-    gravity: tuple[Gravity, ...] = ("level", "opens", "closes")
-    wishes: tuple[str, ...] = ()
-    parts: tuple[Part, ...] = ()
-    suits: Callable[[Context], bool] = lambda context: True
-
-
-FRICTION = Part("constant_friction_hinge", (0, 1), "hinges and guides rub", friction="weak")
-DAMPING = Part("constant_damping_hinge", (0, 1), "grease and air", damping="weak")
-MAGNET = "magnetic_return_to_{closed}"
-SPRING = "spring_return_to_{closed}"
-SNAP = "spring_loaded_snap_detent_to_{closed}"
-
-
-def _catch(strength: Label, width: float, what: str) -> Part:
-    serves = ("closes_near", "held_shut")
-    return Part(MAGNET, (0, width), what, strength, serves=serves)
+from joda.propose.parts import DAMPING, FRICTION, SNAP, SPRING, Kind, Part, catch
 
 
 def _returns_inside(context: Context) -> bool:
@@ -116,7 +48,7 @@ KINDS = (
         joint="hinge",
         gravity=("level",),
         wishes=("closes_near", "held_shut", "stays_put"),
-        parts=(_catch("strong", 0.12, "a magnetic seal pulls it shut"), FRICTION, DAMPING),
+        parts=(catch("strong", 0.12, "a magnetic seal pulls it shut"), FRICTION, DAMPING),
     ),
     Kind(
         "oven door",
@@ -151,7 +83,7 @@ KINDS = (
                 "springs carry its weight",
                 "strong",
             ),
-            _catch("medium", 0.12, "a catch pulls it shut"),
+            catch("medium", 0.12, "a catch pulls it shut"),
             Part("constant_friction_hinge", (0, 1), "the springs' ropes rub", friction="medium"),
             Part(
                 "constant_{opening}_conservative_hinge",
@@ -171,7 +103,7 @@ KINDS = (
         gravity=("opens",),
         wishes=("closes_near", "held_shut", "opens_past"),
         parts=(
-            _catch("strong", 0.12, "a magnetic catch holds it shut"),
+            catch("strong", 0.12, "a magnetic catch holds it shut"),
             FRICTION,
             Part(
                 "constant_damping_hinge",
@@ -218,7 +150,7 @@ KINDS = (
         joint="hinge",
         gravity=("level",),
         wishes=("closes_near", "held_shut", "stays_put"),
-        parts=(_catch("strong", 0.1, "a sprung hinge pulls it shut"), FRICTION, DAMPING),
+        parts=(catch("strong", 0.1, "a sprung hinge pulls it shut"), FRICTION, DAMPING),
     ),
     Kind(
         "drawer",
@@ -227,7 +159,7 @@ KINDS = (
         alone=True,
         joint="slide",
         wishes=("closes_near", "held_shut", "stays_put"),
-        parts=(_catch("strong", 0.12, "its runners pull it in"), FRICTION, DAMPING),
+        parts=(catch("strong", 0.12, "its runners pull it in"), FRICTION, DAMPING),
         suits=_level_slide,
     ),
     Kind(
@@ -331,75 +263,3 @@ KINDS = (
 )
 
 UNKNOWN = Kind("joint of an unknown kind", wishes=(), parts=(FRICTION, DAMPING))
-
-WISHED: dict[str, tuple[Part, ...]] = {
-    "closes_near": (_catch("strong", 0.1, "it is to close by itself"),),
-    "held_shut": (_catch("strong", 0.1, "it is to stay shut"),),
-    "closes_anywhere": (Part(SPRING, (0, 1), "it is to return from anywhere", "medium"),),
-    "left_open": (
-        Part("constant_friction_hinge", (0, 1), "it is not to close by itself", friction="weak"),
-    ),
-    "opens_past": (
-        Part("constant_{opening}_conservative_hinge", (0.4, 1), "it is to open", "medium"),
-    ),
-    "latched": (Part(SNAP, (0, 0.07), "it is to latch", "strong", "weak"),),
-    "stays_put": (
-        Part("constant_friction_hinge", (0.1, 1), "it is to stay where left", friction="medium"),
-    ),
-    "stays_half": (
-        Part("constant_friction_hinge", (0.3, 0.7), "it is to hold half-way", friction="strong"),
-    ),
-    "stays_open": (
-        Part("magnetic_return_to_{open}", (0.88, 1), "it is to stay open", "medium", "weak"),
-    ),
-    "clicks": (Part("detents", (0, 1), "it is to click", "medium"),),
-    "two_sides": (Part("bistable_mechanism", (0, 1), "it is to have two sides", "strong"),),
-    "returns_to_middle": (Part("detent_internal", (0, 1), "it is to return", "strong"),),
-    "snaps": (Part("detent_internal", (0.3, 0.7), "it is to snap through", "medium"),),
-    "soft": (Part("constant_damping_hinge", (0, 0.3), "it is to close softly", damping="medium"),),
-}
-"""What is added for a wish that the kind does not have."""
-
-
-def gravity_role(context: Context) -> Gravity:
-    """What gravity does to the joint over most of its range."""
-    force = context.gravity_force
-    if context.gravity_scale < 0.05 * reference_scales(context)["conservative"]:
-        return "level"
-    towards_high = sum(force) > 0
-    return "opens" if towards_high != (context.closed_end == "high_end") else "closes"
-
-
-def recognise(context: Context, description: str = "") -> tuple[Kind, float]:
-    """The kind of a joint, and how sure that is, 0 to 1.
-
-    Args:
-        context: the joint.
-        description: what the user says of it; its words count most.
-    """
-    near = " ".join(context.names[:2]).lower()
-    everything = " ".join((*context.names, *context.around)).lower()
-    said = description.lower()
-    best, most = UNKNOWN, 0
-    for kind in KINDS:
-        if context.joint.type not in kind.joint or gravity_role(context) not in kind.gravity:
-            continue
-        if not kind.suits(context):
-            continue
-        object_known = _in(kind.objects, everything) or _in(kind.objects, said)
-        if kind.objects and not kind.alone and not object_known:
-            continue
-        score = 4 * _in(kind.own, near) + 3 * _in(kind.objects, everything)
-        score += 10 * _in(kind.objects, said) + 5 * _in(_word(kind.own), said)
-        if score > most:
-            best, most = kind, score
-    return best, {0: 0.2, 3: 0.4, 4: 0.5}.get(most, 0.7)
-
-
-def _word(words: str) -> str:
-    """As nouns: what latches, or needs a push to latch, is not a latch."""
-    return rf"(?<!to )\b(?:{words})s?\b" if words else ""
-
-
-def _in(words: str, text: str) -> bool:
-    return bool(words and re.search(words, text))

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from joda._compile import contributions, reference_scales
 from joda._context import Context
-from joda.behaviour import grip
 from joda.field import evaluate
+from joda.interaction.behaviour import grip
 from joda.profile import Channel
 from joda.proposal import EffectProposal, Proposal
+from joda.propose.checks import ABOUT, FELT, share
+from joda.propose.wishes import Wanted
 from joda.template import Template
-from joda.wishes import Wanted
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,10 @@ HELD = 0.8
 """Up to which share of the friction a drive should be to be held by it."""
 LEAST = 0.02
 """Least excess of a drive, in units of the reference force."""
+NEARLY = 0.8 * ABOUT
+"""How far from an angle given by eye the joint may be undecided, as a share of it."""
+EVEN = 0.9
+"""Share of a pull that is left where another one takes over."""
 FACTORS = (0.02, 50.0)
 """How far a strength may be changed in all."""
 LACK = 1e3
@@ -89,7 +94,7 @@ def mend(
     def side(way: float) -> float:
         return way if sign > 0 else 1 - way
 
-    def share(place: tuple[int, str], s: float, drive: float, friction: float) -> float:
+    def moved(place: tuple[int, str], s: float, drive: float, friction: float) -> float:
         number, channel = place
         component = parts[number][channel]
         value = float(evaluate(Channel(components=(component,)), np.array([s]))[0][0])
@@ -100,7 +105,7 @@ def mend(
     for k, demand in enumerate(demands):
         for way, drive, friction in demand.terms:
             s = side(way)
-            rows[k] += [share(place, s, drive, friction) for place in places]
+            rows[k] += [moved(place, s, drive, friction) for place in places]
             least[k] -= drive * float(np.interp(s, grid, gravity))
     n, m = len(places), len(demands)
     # Unknowns: factors, how far each is from 1, what each demand lacks.
@@ -159,6 +164,11 @@ def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]
             return [_at(wish, way, sign, -1, -most) for way in ways for sign in (1, -1)]
         case "closes_near":
             return shut(0.01, 0.045)
+        case "closes_from":
+            way = share(context, wish.number)
+            beyond = np.linspace(min((1 + NEARLY) * way, 1.0), 1, 21) if way < 1 else ()
+            held = [_at(wish, far, 1, HELD) for far in beyond]
+            return shut(0.01, (1 - NEARLY) * way) + held + _steady(wish, proposal, context)
         case "closes_anywhere":
             return shut(0.02, 1)
         case "left_open":
@@ -167,6 +177,12 @@ def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]
             return open_(0.48, 0.985)
         case "held_shut":
             return held_shut
+        case "caught":
+            return held_shut + _steady(wish, proposal, context)
+        case "free":
+            ways = np.array([0.45, 0.5, 0.55])
+            most = 0.5 * FELT * context.lever_arm / reference_scales(context)["conservative"]
+            return [_at(wish, way, sign, -1, -most) for way in ways for sign in (1, -1)]
         case "latched":
             return held_shut + _latch(wish, proposal, context)
         case "stays_put":
@@ -212,6 +228,20 @@ def _latch(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]:
         width = b - a
         out.append(_at(wish, a + 0.8 * width, 1, 0, 0.1))
         out.append(_at(wish, a + 0.15 * width, -1, -SURE, 0.3))
+    return out
+
+
+def _steady(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]:
+    """No jump where a pull that rises gives way to one that fades."""
+    out = []
+    for _, top in _places(proposal, context, "spring_return"):
+        for begin, _ in _places(proposal, context, "magnetic_return"):
+            if abs(top - begin) < 1e-3:
+                ends = (top - 1e-3, begin + 1e-3)
+                out += [
+                    Demand(wish.name, ((one, -1, 0), (other, EVEN, 0)))
+                    for one, other in (ends, ends[::-1])
+                ]
     return out
 
 

@@ -13,10 +13,13 @@ from joda._context import Context
 from joda.errors import JodaError
 from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
 from joda.propose import Answer, Task, Turn
+from joda.propose.added import RISING, WISHED
+from joda.propose.checks import FELT, SOFT, share
 from joda.propose.complaints import revise
-from joda.propose.kinds import WISHED, Kind, Part, recognise
 from joda.propose.mend import mend, rescale
-from joda.wishes import SOFT, WISHES, Wanted, read_wishes, state, unmet
+from joda.propose.parts import Kind, Part
+from joda.propose.recognise import recognise
+from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
 
 APART = 0.785
 """Angle (rad) between the positions of a knob, where nobody says how many it has."""
@@ -27,10 +30,12 @@ CLICKS = re.compile(r"detent_internal|spring_return")
 """Effects that make a joint click into positions."""
 
 EXCLUSIVE = {
-    "closes_anywhere", "stays_put", "stays_half", "opens_past", "two_sides", "returns_to_middle",
-    "clicks",
+    "closes_from", "closes_anywhere", "stays_put", "stays_half", "opens_past", "two_sides",
+    "returns_to_middle", "clicks",
 }  # fmt: skip
 """Wishes about the middle of the way: the user's replace those of the kind."""
+
+CLOSES = {"closes_near", "closes_from", "closes_anywhere"}
 
 
 class Offline:
@@ -56,6 +61,8 @@ class Offline:
         mended = last.proposal
         if "soft" in lacking:
             mended = _softer(mended, task.context, last)
+        if "free" in lacking:
+            mended = _lighter(mended, task.context, last)
         if lacking.keys() - {"soft"}:
             mended = self._mended(mended, task, wanted)
         return Answer(None if mended == last.proposal else mended)
@@ -66,7 +73,9 @@ class Offline:
         mended, hopeless = mend(proposal, *arguments)
         added = [part for name in sorted(hopeless & WISHED.keys()) for part in WISHED[name]]
         if added:
-            more = _effects(added, task.context, _number(wanted), 0.3)
+            there = {_place(effect) for effect in proposal.effect_proposals}
+            more = _effects(added, task.context, wanted, 0.3)
+            more = tuple(effect for effect in more if _place(effect) not in there)
             mended, _ = mend(_with(proposal, more), *arguments)
         return mended
 
@@ -94,7 +103,7 @@ class Offline:
             raise JodaError(f"in simulation {state(asked).lower().rstrip('.')} already.")
         if "clicks" in names:  # as many as are asked for, not besides those that there are
             others = [e for e in stated.effect_proposals if not CLICKS.search(e.effect_name)]
-            clicks = _effects(WISHED["clicks"], task.context, _number(wanted), 0.3)
+            clicks = _effects(WISHED["clicks"], task.context, wanted, 0.3)
             stated = _with(stated.model_copy(update={"effect_proposals": tuple(others)}), clicks)
         return self._mended(stated, task, wanted)
 
@@ -102,16 +111,19 @@ class Offline:
         context = task.context
         kind, confidence = recognise(context, task.description)
         wanted, parts = _plan(kind, context, task.description)
-        effects = _effects(parts, context, _number(wanted), confidence)
+        effects = _effects(parts, context, wanted, confidence)
         summary = JointSummary(
             joint_name=context.joint.name,
             joint_type="revolute" if context.joint.type == "hinge" else "prismatic",
             motion_description=f"{kind.title}, by its names, motion and gravity",
             overall_confidence=confidence,
         )
-        return Proposal(
+        proposal = Proposal(
             joint_summary=summary, whole_motion_descrptn=state(wanted), effect_proposals=effects
         )
+        if any(wish.name in RISING for wish in wanted):  # one pull in two parts, drawn apart
+            proposal, _ = mend(proposal, context, task.templates, wanted, self.key)
+        return proposal
 
 
 def _plan(kind: Kind, context: Context, description: str) -> tuple[list[Wanted], list[Part]]:
@@ -124,9 +136,10 @@ def _plan(kind: Kind, context: Context, description: str) -> tuple[list[Wanted],
     names = {wish.name for wish in wanted}
     parts = [part for part in kind.parts if not part.serves or names & set(part.serves)]
     served = {name for part in parts for name in part.serves} | set(kind.wishes) - dropped
-    for name in asked.keys() - served:
-        parts += WISHED.get(name, ())
-    return _counted(wanted, context), parts
+    added = [part for name in asked if name not in served for part in WISHED.get(name, ())]
+    taken = {name for part in added for name in part.serves}
+    parts = [part for part in parts if not part.serves or set(part.serves) - taken]
+    return _counted(wanted, context), parts + added
 
 
 def _counted(wanted: Sequence[Wanted], context: Context) -> list[Wanted]:
@@ -139,10 +152,12 @@ def _conflicting(names: AbstractSet[str]) -> set[str]:
     """The wishes that these leave no room for."""
     out = EXCLUSIVE if names & EXCLUSIVE else set()
     if "closes_anywhere" in names:
-        out = out | {"stays_open", "latched"}
+        out = out | {"stays_open"}
+    if names & {"closes_from", "closes_anywhere"}:
+        out = out | {"latched"}
     if "left_open" in names:
-        return out | {"closes_near", "closes_anywhere"}
-    return out | ({"left_open"} if names & {"closes_near", "closes_anywhere"} else set())
+        return out | CLOSES
+    return out | ({"left_open"} if names & CLOSES else set())
 
 
 def _positions(context: Context) -> int:
@@ -151,14 +166,14 @@ def _positions(context: Context) -> int:
     return min(max(round((hi - lo) / APART) + 1, 2), 12) if context.joint.type == "hinge" else 3
 
 
-def _number(wanted: Sequence[Wanted]) -> int:
-    return next((wish.number for wish in wanted if wish.name == "clicks"), 0)
+def _number(wanted: Sequence[Wanted], name: str) -> int:
+    return next((wish.number for wish in wanted if wish.name == name), 0)
 
 
 def _effects(
-    parts: Sequence[Part], context: Context, positions: int, confidence: float
+    parts: Sequence[Part], context: Context, wanted: Sequence[Wanted], confidence: float
 ) -> tuple[EffectProposal, ...]:
-    """Parts placed on the joint's own range."""
+    """Parts placed on the joint's own range, as many and as far as the wishes say."""
     mirrored = context.closed_end == "high_end"
     words = {
         "closed": "high_end" if mirrored else "low_end",
@@ -168,7 +183,9 @@ def _effects(
     }
     out = []
     for part in parts:
-        for name, (a, b) in _spread(part, positions):
+        reach = share(context, _number(wanted, part.reach)) if part.reach else 1.0
+        for name, (a, b) in _spread(part, _number(wanted, "clicks")):
+            a, b = (min(reach * end, 1.0) for end in (a, b))
             start, end = (1 - b, 1 - a) if mirrored else (a, b)
             out.append(
                 EffectProposal(
@@ -200,6 +217,11 @@ def _spread(part: Part, positions: int) -> list[tuple[str, tuple[float, float]]]
     ]
 
 
+def _place(effect: EffectProposal) -> tuple[str, float, float]:
+    """What an effect is and where; a second one of these could only make it stronger."""
+    return effect.effect_name, effect.start_ratio, effect.end_ratio
+
+
 def _with(proposal: Proposal, effects: Sequence[EffectProposal]) -> Proposal:
     return proposal.model_copy(update={"effect_proposals": (*proposal.effect_proposals, *effects)})
 
@@ -218,5 +240,18 @@ def _softer(proposal: Proposal, context: Context, last: Turn) -> Proposal:
         for effect in proposal.effect_proposals
     ]
     if tuple(effects) == proposal.effect_proposals:
-        return _with(proposal, _effects(WISHED["soft"], context, 0, 0.3))
+        return _with(proposal, _effects(WISHED["soft"], context, (), 0.3))
+    return proposal.model_copy(update={"effect_proposals": tuple(effects)})
+
+
+def _lighter(proposal: Proposal, context: Context, last: Turn) -> Proposal:
+    """Less damping half-way, so that a slow hand hardly feels it."""
+    ways = last.behaviour.opening, last.behaviour.closing
+    factor = 0.5 * FELT * context.lever_arm / max(abs(way.middle) for way in ways)
+    effects = [
+        rescale(effect, "damping", min(factor, 1.0))
+        if effect.strength.damping != "none" and effect.start_ratio < 0.7 and effect.end_ratio > 0.3
+        else effect
+        for effect in proposal.effect_proposals
+    ]
     return proposal.model_copy(update={"effect_proposals": tuple(effects)})

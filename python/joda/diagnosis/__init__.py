@@ -1,0 +1,1 @@
+"""What a model lacks: found, said, added."""

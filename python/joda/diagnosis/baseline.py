@@ -1,0 +1,129 @@
+"""The model as it is, with the strengths of its components as numbers to be fitted again."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._core import Solo
+from joda.diagnosis.cutting import windows_of
+from joda.diagnosis.hypotheses import Hypothesis, Units
+from joda.diagnosis.judge import Make, Unknowns
+from joda.diagnosis.static import Still, curve_windows
+from joda.diagnosis.windows import Windows
+from joda.joints.single import Single
+from joda.measured.reading import Measured
+from joda.profile import CHANNELS, Profile
+
+Array = NDArray[np.float64]
+
+BASE_DOUBT = 0.15
+"""How far off (one standard deviation, relative) the model's own strengths may be."""
+LEAST = 4
+"""Fewest samples of a window that counts."""
+
+
+@dataclass(frozen=True)
+class Base:
+    """The model as it is, with a factor for each of its components' strengths.
+
+    Attributes:
+        profile: of the joint.
+        single: the joint.
+        h: step, s.
+        places: channel and number of each component that has a factor.
+        unknowns: the factors.
+    """
+
+    profile: Profile
+    single: Single
+    h: float
+    places: tuple[tuple[str, int], ...]
+    unknowns: Unknowns
+
+    def written(self, x: Array) -> Profile:
+        """The profile with its factors."""
+        channels = {}
+        for name in CHANNELS:
+            channel = getattr(self.profile.channels, name)
+            parts = list(channel.components)
+            for (where, number), factor in zip(self.places, x, strict=True):
+                if where == name:
+                    old = parts[number]
+                    y = tuple(float(factor) * value for value in old.y)
+                    parts[number] = old.model_copy(update={"y": y})
+            channels[name] = channel.model_copy(update={"components": tuple(parts)})
+        return self.profile.model_copy(
+            update={"channels": self.profile.channels.model_copy(update=channels)}
+        )
+
+    def solo(self, x: Array) -> Solo:
+        """The joint with its factors."""
+        return self.single.solo(self.written(x), self.h)
+
+
+def base_of(profile: Profile, single: Single, h: float) -> Base:
+    """The model as it is."""
+    places = tuple(
+        (name, number)
+        for name in CHANNELS
+        for number, part in enumerate(getattr(profile.channels, name).components)
+        if any(part.y)
+    )
+    k = len(places)
+    unknowns = Unknowns(
+        np.zeros(k), np.full(k, 20.0), np.full(k, 0.01), np.ones(k), np.full(k, BASE_DOUBT)
+    )
+    return Base(profile, single, h, places, unknowns)
+
+
+def joined(base: Base, hypothesis: Hypothesis) -> tuple[Make, Unknowns]:
+    """The model's factors and the hypothesis' numbers as one vector."""
+    n = len(base.places)
+
+    def make(x: Array) -> Solo:
+        return base.single.solo(hypothesis.write(base.written(x[:n]), x[n:]), base.h)
+
+    return make, base.unknowns.and_(hypothesis.unknowns)
+
+
+def units_of(windows: Windows, measured: Measured) -> Units:
+    """The joint's own units, from the measured motion."""
+    profile, inertia = measured.profile, measured.single.inertia
+    velocity = windows.start[:, 1]
+    same = ~windows.fresh[1:]
+    pace = np.diff(windows.at)[same] * windows.h
+    acceleration = np.diff(velocity)[same] / pace
+    speed = float(np.sqrt(np.mean(velocity**2)))
+    pushed = float(np.sqrt(np.mean(windows.force**2)))
+    force = max(pushed, inertia * float(np.sqrt(np.mean(acceleration**2))) if len(pace) else 0.0)
+    friction = max((max(c.y) for c in profile.channels.friction.components), default=0.0)
+    return Units(
+        force=force or inertia,
+        speed=speed or 1.0,
+        inertia=inertia,
+        span=float(np.ptp(profile.joint.range)),
+        friction=friction,
+        forced=not measured.runs or any(run.forced for run in measured.runs),
+        weight=max(map(abs, measured.context.gravity_force)),
+        hinge=measured.single.hinge,
+    )
+
+
+def windows_for(measured: Measured, length: float | None = None, fine: bool = True) -> Windows:
+    """The runs in windows of some length (s), see `windows_of`; curves where there are no runs."""
+    if not measured.runs:
+        return curve_windows(measured)
+    lo, hi = measured.profile.joint.range
+    fixed = lo, measured.single.inertia, measured.timestep
+    return windows_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine)
+
+
+def single_for(measured: Measured) -> Single:
+    """The joint, to be simulated where there are runs."""
+    return measured.single if measured.runs else Still(**vars(measured.single))
+
+
+def usable(windows: Windows) -> NDArray[np.bool_]:
+    """Which windows tell of the joint: enough samples, and no knock at an end of the range."""
+    return np.asarray((windows.count >= LEAST) & ~windows.knocks)

@@ -1,0 +1,187 @@
+"""Cuts measured runs into windows, and weighs their samples by what noise they have."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from joda.diagnosis.windows import LOOSE, Array, Integers, Windows, rows_of
+from joda.measured import smoothing
+from joda.measured.runs import Run, known
+
+SHORTEST, LONGEST = 0.1, 0.5
+"""Of windows, s."""
+TRAVEL = 0.15
+"""What part of the range a window goes through at the usual speed."""
+FEWEST = 12
+"""Samples that a window has at least."""
+MOST = 160
+"""Samples of a window that count at most; of more, every second or third does."""
+STEPS = 300
+"""Steps that a window has at least."""
+STOP = 0.004
+"""How near an end of the range, in normalised position, counts as touching it."""
+CLEAR = 1.5
+"""How much larger the noise of fast samples must be to count as such."""
+
+
+def windows_of(
+    runs: Sequence[Run],
+    sigmas: Sequence[float],
+    span: float,
+    lo: float,
+    inertia: float,
+    timestep: float,
+    length: float | None = None,
+    fine: bool = True,
+) -> Windows:
+    """Cuts runs into windows; parts where the force is not known are left out.
+
+    Args:
+        runs: measured.
+        sigmas: noise of each run's position, rad or m.
+        span, lo: of the joint's range, rad or m.
+        inertia: kg·m² or kg: how far the force's noise moves the joint.
+        timestep: the scene's, s.
+        length: of the windows, s; None: by the joint's pace.
+        fine: whether steps are shortened, so that the laws act and not their steps.
+    """
+    length = length or _length(runs, sigmas, span)
+    h = float(timestep / np.ceil(timestep * STEPS / length)) if fine else timestep
+    parts: list[tuple[NDArray[Any], ...]] = []
+    samples: list[tuple[NDArray[Any], ...]] = []
+    step, count = 0, 0
+    for number, (run, sigma) in enumerate(zip(runs, sigmas, strict=True)):
+        for piece in known(run):
+            time, position = run.time[piece], run.position[piece]
+            steps = int(np.ceil((time[-1] - time[0]) / h - 1e-9)) + 1
+            each = max(round(length / h), 1)
+            many = max(round(steps / each), 1)
+            begins = np.round(np.arange(many) * steps / many).astype(int)
+            place = (time - time[0]) / h
+            index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
+            window = np.searchsorted(begins, index, side="right") - 1
+            enough = np.bincount(window, minlength=many) >= smoothing.LEAST
+            begun = smoothing.smooth(time, position, time[0] + h * begins, sigma)
+            velocity, doubt = begun.velocity.copy(), begun.velocity_error.copy()
+            if smoothing.rests(velocity[0], doubt[0]):
+                velocity[0], doubt[0] = 0.0, 0.1 * doubt[0] / LOOSE
+            force = np.interp(time[0] + h * np.arange(steps), run.time, run.force)
+            fresh = np.arange(many) == 0
+            start = np.stack([begun.position, velocity], axis=1)
+            doubts = np.stack([begun.position_error, doubt], axis=1)
+            same = np.full(many, number)
+            parts.append((force, step + begins, fresh, start, doubts, same))
+            window = np.where(enough[window] & _thinned(window), window + count, -1)
+            noise = _spread(time, position, sigma), _rough(time, run.force[piece], run.forced)
+            samples.append((step + index, place - index, position, time, window, *noise))
+            step, count = step + steps, count + many
+    force, at, fresh, start, doubts, run_of = (np.concatenate(x) for x in zip(*parts, strict=True))
+    index, share, position, time, window, spread, push = (
+        np.concatenate(x) for x in zip(*samples, strict=True)
+    )
+    rows = rows_of(window, count)
+    return Windows(
+        h=h,
+        force=force,
+        at=at,
+        fresh=fresh,
+        start=start,
+        doubt=LOOSE * doubts,
+        step=index,
+        share=share,
+        position=position,
+        time=time,
+        run=run_of,
+        rows=rows,
+        whitener=_whitener(rows, time, spread, push / inertia),
+        knocks=_knocks(rows, (position - lo) / span, spread / span),
+    )
+
+
+def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
+    """Of the windows, by the joint's usual speed and the sampling, s."""
+    speeds, gaps = [], []
+    for run, sigma in zip(runs, sigmas, strict=True):
+        apart = np.interp(run.time[0] + 0.05 * np.arange(10_000), run.time, run.position)
+        apart = apart[: max(int(np.ptp(run.time) / 0.05), 2)]
+        speed = np.abs(np.diff(apart)) / 0.05
+        speeds.append(speed[speed > 4 * sigma / 0.05])
+        gaps.append(np.diff(run.time))
+    moving = np.concatenate(speeds)
+    usual = float(np.median(moving)) if len(moving) else 0.0
+    length = TRAVEL * span / usual if usual else LONGEST
+    least = FEWEST * float(np.median(np.concatenate(gaps)))
+    return max(min(max(length, SHORTEST), LONGEST), least)
+
+
+def _thinned(window: Integers) -> NDArray[np.bool_]:
+    """Which samples are kept: at most `MOST` of a window, evenly."""
+    place = np.arange(len(window)) - np.searchsorted(window, window)
+    each = -(-np.bincount(window, minlength=1) // MOST)
+    return np.asarray(place % np.maximum(each, 1)[window] == 0)
+
+
+def _spread(time: Array, position: Array, sigma: float) -> Array:
+    """Standard deviations of the samples: the encoder's, and what uneven clocks make at speed."""
+    slope = np.abs(np.gradient(position, time))
+    smooth = np.convolve(slope, np.full(9, 1 / 9), mode="same")
+    fast = smooth > np.quantile(smooth, 0.7)
+    fast[[0, 1, -2, -1]] = False
+    if len(time) < 5 or fast.sum() < FEWEST:
+        return np.full(len(time), sigma)
+    own = smoothing.deviation(smoothing.departures(time, position)[fast[2:-2]])
+    late = np.sqrt(max(own**2 - (CLEAR * sigma) ** 2, 0.0)) / np.median(smooth[fast])
+    return np.asarray(np.hypot(sigma, late * smooth))
+
+
+def _rough(time: Array, force: Array, forced: bool) -> Array:
+    """Standard deviations of the force: its noise, and what it does between samples."""
+    if not forced:
+        return np.zeros(len(time))
+    bends = np.zeros(len(force))
+    bends[1:-1] = np.abs(np.diff(force, 2)) / 8  # a line through a parabola misses it by as much
+    return np.hypot(smoothing.noise(time, force), np.maximum(bends, np.roll(bends, -1)))
+
+
+def _whitener(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
+    """Inverse Cholesky factors of the windows' covariances.
+
+    Besides the position's noise there is that of the force: an error of acceleration `push`, from
+    one sample to the next, moves a free joint by that time, and on at the speed that it got.
+    """
+    m, most = rows.shape
+    out = np.zeros((m, most, most))
+    for k, row in enumerate(rows):
+        own = row[row >= 0]
+        if not len(own):
+            continue
+        t = time[own] - time[own[0]]
+        gaps = np.diff(t, append=t[-1])
+        moved = np.maximum(t[:, None] - t - 0.5 * gaps, 0.0) * (gaps * push[own])
+        covariance = moved @ moved.T
+        covariance[np.diag_indices(len(own))] += sigma[own] ** 2
+        factor = np.linalg.cholesky(covariance)
+        out[k, : len(own), : len(own)] = solve_triangular(factor, np.eye(len(own)), lower=True)
+    return out
+
+
+def _knocks(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
+    """Whether the joint comes to an end of its range in a window, at some speed."""
+    out = np.zeros(len(rows), bool)
+    for k, row in enumerate(rows):
+        own = row[row >= 0]
+        if len(own) < 3:
+            continue
+        travel = np.abs(np.diff(s[own]))
+        travel = np.maximum(np.append(travel, 0.0), np.append(0.0, travel))
+        near = STOP + 3 * noise[own]
+        reach = near + np.where(travel > near, travel, 0.0)  # a knock may be between two samples
+        touches = (s[own] < reach) | (s[own] > 1 - reach)
+        moves = np.ptp(s[own]) > STOP + 6 * noise[own[0]]
+        arrives = touches[1:] & ~touches[:-1]
+        rebounds = touches[0] and 2 * travel[0] > near[0]
+        out[k] = bool(moves and (arrives.any() or rebounds))
+    return out

@@ -1,0 +1,87 @@
+"""What a diagnosis says: a verdict, and the effects that may be missing."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from joda.diagnosis.weighing import Verdict
+from joda.errors import JodaError
+from joda.files import read_text
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An effect that may be missing.
+
+    Attributes:
+        effect: its name.
+        interval: where it acts, in normalised position.
+        probability: that it is the missing one, 0 to 1.
+        direction: both, positive or negative.
+        magnitude: how large it is.
+        magnitude_error: its standard deviation.
+        unit: of the magnitude.
+        explanation: for a person.
+        held_out_error_before, held_out_error_after: RMS misfit of windows that were held out of the
+            fit, rad or m.
+        indistinguishable_from: effects that these data cannot tell from it.
+    """
+
+    effect: str
+    interval: tuple[float, float]
+    probability: float
+    direction: Literal["both", "positive", "negative"]
+    magnitude: float
+    magnitude_error: float
+    unit: str
+    explanation: str
+    held_out_error_before: float
+    held_out_error_after: float
+    indistinguishable_from: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a model lacks.
+
+    Attributes:
+        joint: its name.
+        verdict: one effect is missing; the model is adequate; something is missing that no known
+            effect explains; the data tell nothing.
+        summary: the verdict in a sentence.
+        effects: the most likely first.
+        noise_floor: of the measured positions, or of the forces of curves.
+        unit: of that noise and of the errors held out.
+        next_experiment: that would decide what is open; None if nothing is.
+        notes: what is suspicious about the data.
+    """
+
+    joint: str
+    verdict: Verdict
+    summary: str
+    effects: tuple[Finding, ...]
+    noise_floor: float
+    unit: str
+    next_experiment: str | None
+    notes: tuple[str, ...]
+
+    def to_json(self) -> str:
+        """The diagnosis as JSON."""
+        return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
+
+
+def read_diagnosis(path: Path) -> dict[str, Any]:
+    """A diagnosis that was written before; raises JodaError if it is none."""
+    try:
+        content = json.loads(read_text(path))
+    except json.JSONDecodeError as error:
+        raise JodaError(f"{path}, line {error.lineno}: not JSON ({error.msg}).") from None
+    except (ValueError, RecursionError) as error:  # numbers too long, brackets too deep
+        raise JodaError(f"{path}: not JSON that can be read ({error}).") from None
+    effects = content.get("effects") if isinstance(content, dict) else None
+    if not isinstance(effects, list) or not all(
+        isinstance(one, dict) and isinstance(one.get("effect"), str) for one in effects
+    ):
+        raise JodaError(f"{path}: key 'effects' is missing; give what joda diagnose --json wrote.")
+    return dict(content)

@@ -1,0 +1,147 @@
+"""A hypothesis fitted together with the model's own strengths, from where it promises most."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.diagnosis.baseline import Base, joined
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.judge import BEND, Fit, Judge, Linear
+from joda.profile import Profile
+
+Array = NDArray[np.float64]
+
+MOVES = (0.1, 0.04, 0.015)
+"""How far ends of intervals are moved on trial, in normalised position."""
+FAR = 10.0
+"""How far other numbers are moved, in their steps."""
+FEW = 4
+"""Iterations after that."""
+ROUGH = 6
+"""Iterations in which windows that are far off count in full."""
+BEST = 3
+"""How many trials of a hypothesis are fitted."""
+APART = 0.06
+"""How much these must differ in one of their numbers."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A hypothesis, fitted.
+
+    Attributes:
+        hypothesis: what is missing.
+        fit: of the model's factors and the hypothesis' numbers.
+        score: its loss, and what its numbers cost.
+        cost: of its numbers.
+    """
+
+    hypothesis: Hypothesis
+    fit: Fit
+    score: float
+    cost: float
+
+    @property
+    def x(self) -> Array:
+        """The hypothesis' numbers."""
+        return self.fit.x[-len(self.hypothesis.unknowns.low) :]
+
+    @property
+    def vanished(self) -> bool:
+        """Whether its size is the least that is tried: what is left fits by something else."""
+        least = self.hypothesis.unknowns.low[0]
+        return bool(least > 0 and self.x[0] < 1.01 * least)
+
+    def written(self, base: Base) -> Profile:
+        """The model's profile with the effect."""
+        return self.hypothesis.write(base.written(self.fit.x[: len(base.places)]), self.x)
+
+
+def screened(
+    judge: Judge, base: Base, fit: Fit, about: Linear, hypothesis: Hypothesis
+) -> list[Array]:
+    """The most promising trials, by the gain that a small strength promises."""
+    if len(hypothesis.trials) == 1:
+        return list(hypothesis.trials)
+    windows = judge.windows
+    profile = base.written(fit.x)
+    H, gradient = about.normal()
+    H = H + np.diag(base.unknowns.doubt**-2.0)
+    gains, out = [], []
+    for trial in hypothesis.trials:
+        solo = base.single.solo(hypothesis.write(profile, trial), base.h)
+        d = (windows.residuals(windows.misfit(solo, fit.start)) - about.r)[:, :, None]
+        across = about.products(d, about.J)[0]
+        taken = (
+            np.linalg.solve(H, np.stack([gradient, across], axis=1)) if len(H) else np.zeros((0, 2))
+        )
+        slope = (
+            about.products(about.r[:, :, None], d, about.z[:, :, None])[0, 0] - across @ taken[:, 0]
+        )
+        bend = about.products(d, d)[0, 0] - across @ taken[:, 1]
+        amount = -slope / max(bend, 1e-12)
+        gains.append(slope**2 / max(bend, 1e-12) if amount > 0 else 0.0)
+        first = trial.copy()
+        first[0] = np.clip(
+            trial[0] * np.clip(amount, 0.3, 30.0),
+            hypothesis.unknowns.low[0],
+            hypothesis.unknowns.high[0],
+        )
+        out.append(first)
+    order = np.argsort(gains)[::-1]
+    chosen: list[int] = []
+    for k in order:
+        if len(chosen) == BEST:
+            break
+        apart = [
+            np.abs(hypothesis.trials[k] - hypothesis.trials[c])[1:].max(initial=0.0) for c in chosen
+        ]
+        if min(apart, default=1.0) > APART:
+            chosen.append(int(k))
+    return [out[k] for k in chosen]
+
+
+def guess(judge: Judge, base: Base, fit: Fit, about: Linear, hypothesis: Hypothesis) -> Guess:
+    """The hypothesis fitted, from its most promising trials."""
+    make, unknowns = joined(base, hypothesis)
+    wide = BEND * usual(judge, fit)
+
+    rough = [
+        judge.fit(make, unknowns, np.concatenate([fit.x, trial]), fit.start, ROUGH, wide)
+        for trial in screened(judge, base, fit, about, hypothesis)
+    ]
+    near = min(rough, key=lambda f: judge.loss(f.squares))
+    return guessed(judge, hypothesis, judge.fit(make, unknowns, near.x, near.start))
+
+
+def moved(judge: Judge, base: Base, found: Guess) -> Guess:
+    """The guess after its numbers were tried elsewhere: a fit does not see across an edge that few
+    windows cross, nor past a speed at which the joint begins to stick."""
+    make, unknowns = joined(base, found.hypothesis)
+    best = found.fit
+    n = len(best.x)
+    first = len(base.places)
+    places = [(k, by) for by in MOVES for k in range(n - found.hypothesis.ends, n)]
+    shapes = [(k, FAR * unknowns.step[k]) for k in range(first, n - found.hypothesis.ends)]
+    for k, by in places + shapes:
+        for way in (-by, by):
+            x = best.x.copy()
+            x[k] += way
+            trial = judge.fit(make, unknowns, x, best.start, FEW)
+            if trial.loss < best.loss - 1:
+                best = judge.fit(make, unknowns, trial.x, trial.start)
+    return guessed(judge, found.hypothesis, best)
+
+
+def guessed(judge: Judge, hypothesis: Hypothesis, fit: Fit) -> Guess:
+    """A fit of a hypothesis, with what its numbers cost."""
+    samples = judge.samples
+    cost = hypothesis.rarity + len(hypothesis.unknowns.low) * np.log(max(samples, 2.0))
+    return Guess(hypothesis, fit, fit.loss + cost, cost)
+
+
+def usual(judge: Judge, fit: Fit) -> float:
+    """Mean square residual of the windows, in the median; at least 1."""
+    each = (fit.squares / np.maximum(judge.windows.count, 1))[judge.counts]
+    return max(float(np.median(each)), 1.0) if len(each) else 1.0

@@ -1,0 +1,25 @@
+"""What may be missing from a joint's model: every template and effect, with unknown numbers."""
+
+from collections.abc import Mapping
+
+from joda.diagnosis.hypotheses.base import Hypothesis, Units
+from joda.diagnosis.hypotheses.effects import free_curves, from_effects
+from joda.diagnosis.hypotheses.templates import from_templates
+from joda.profile import Profile
+from joda.template import Template
+
+__all__ = ["Hypothesis", "Units", "hypotheses"]
+
+
+def hypotheses(
+    units: Units, templates: Mapping[str, Template], profile: Profile
+) -> list[Hypothesis]:
+    """All that may be missing; what the profile has already may not."""
+    out = [*from_templates(units, templates), *free_curves(units), *from_effects(units)]
+    present = {effect.key for effect in profile.effects}
+    return [h for h in out if not _there(h, present)]
+
+
+def _there(h: Hypothesis, present: set[str]) -> bool:
+    key = h.effect if h.direction == "both" else f"{h.effect} {h.direction}"
+    return key in present or f"{h.effect} both" in present

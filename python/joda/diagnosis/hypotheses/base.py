@@ -1,0 +1,102 @@
+"""What a hypothesis is: an effect that may be missing, with unknown numbers, and where to begin.
+
+The numbers are in the joint's own units: forces in its usual force, positions normalised, speeds in
+its usual speed.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.diagnosis.judge import Unknowns
+from joda.profile import Profile
+
+Array = NDArray[np.float64]
+Write = Callable[[Profile, Array], Profile]
+Direction = Literal["both", "positive", "negative"]
+Bounds = list[tuple[float, float, float]]
+"""Low, high and step of each number."""
+
+TRIAL = 0.1
+"""Strength with which an effect is tried, in usual forces."""
+STRENGTH = (0.0, 30.0, 0.005)
+"""Bounds and step of a strength, in usual forces."""
+KNOWN_LAW, KNOWN_SHAPE = 0.12, 0.3
+"""Part of the excess misfit that a true effect may leave, by what is known of it."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """A joint's own units.
+
+    Attributes:
+        force: usual force, N·m or N.
+        speed: usual speed, rad/s or m/s.
+        inertia: kg·m² or kg.
+        span: of the range, rad or m.
+        friction: usual dry friction of the model, N·m or N; 0 for none.
+        forced: whether a force was recorded.
+        weight: largest force of gravity, N·m or N.
+        hinge: whether it is a hinge.
+    """
+
+    force: float
+    speed: float
+    inertia: float
+    span: float
+    friction: float
+    forced: bool
+    weight: float
+    hinge: bool
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect that may be missing.
+
+    Attributes:
+        effect: its name.
+        direction: both, positive or negative.
+        unknowns: its numbers.
+        trials: values to begin with, shape (trials, k).
+        write: the profile with the effect.
+        interval: where it acts, in normalised position.
+        magnitude: how large it is, in `unit`.
+        unit: of the magnitude.
+        ends: how many of the last numbers are ends of its interval.
+        rarity: twice the logarithm of how much rarer it is than others.
+        remains: part of the excess misfit that it may leave where it is the true one: more where
+            only the rough shape of its curve is known.
+    """
+
+    effect: str
+    direction: Direction
+    unknowns: Unknowns
+    trials: Array
+    write: Write
+    interval: Callable[[Array], tuple[float, float]]
+    magnitude: Callable[[Array], float]
+    unit: str
+    ends: int = 0
+    rarity: float = 0.0
+    remains: float = KNOWN_LAW
+
+
+def unit_of(units: Units, power: int = 0) -> str:
+    """Of a force, or of one per speed to that power."""
+    force, length = ("N·m", "rad") if units.hinge else ("N", "m")
+    return force + ("", f"·s/{length}", f"·s²/{length}²")[power]
+
+
+def everywhere(x: Array) -> tuple[float, float]:
+    """All over the range."""
+    return 0.0, 1.0
+
+
+def unknowns_of(*rows: tuple[float, float, float]) -> Unknowns:
+    """From low, high and step of each number."""
+    low, high, step = np.array(rows).T
+    return Unknowns(low, high, step, np.zeros(len(low)), np.full(len(low), np.inf))

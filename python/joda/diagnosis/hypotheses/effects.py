@@ -1,0 +1,232 @@
+"""The effects beyond the templates as hypotheses."""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from joda.component import Component
+from joda.diagnosis.hypotheses.base import (
+    KNOWN_LAW,
+    KNOWN_SHAPE,
+    STRENGTH,
+    TRIAL,
+    Array,
+    Bounds,
+    Direction,
+    Hypothesis,
+    Units,
+    everywhere,
+    unit_of,
+    unknowns_of,
+)
+from joda.effects import (
+    AddedInertia,
+    AnyEffect,
+    AsymmetricFriction,
+    Backlash,
+    DirectionDependentDamping,
+    EndStopRestitution,
+    GravityOffset,
+    LoadDependentFriction,
+    PreslidingFriction,
+    QuadraticDamping,
+    StribeckFriction,
+)
+from joda.profile import Profile
+
+Way = Literal["positive", "negative"]
+
+KNOTS = 9
+"""Control points of a free curve."""
+TINY = 1e-12
+"""As good as no force."""
+HEAVIEST = 0.45
+"""Inertia of a handle that has play, in units of the joint's; the plugin takes half of it."""
+
+
+def free_curves(units: Units) -> Iterator[Hypothesis]:
+    """Friction and damping that differ along the way."""
+    yield _curve(units, "position_dependent_friction", "friction")
+    yield _curve(units, "position_dependent_damping", "damping")
+
+
+def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
+    power = int(channel == "damping")
+    unit = units.force / units.speed**power
+    at = tuple(np.linspace(0, 1, KNOTS))
+
+    def write(profile: Profile, x: Array) -> Profile:
+        part = Component(label=effect, interval=(0, 1), x=at, y=tuple(unit * x))
+        return profile.with_component(channel, part)
+
+    return Hypothesis(
+        effect,
+        "both",
+        unknowns_of(*[STRENGTH] * KNOTS),
+        np.full((1, KNOTS), 0.5 * TRIAL),
+        write,
+        everywhere,
+        lambda x: unit * float(np.ptp(x)),
+        unit_of(units, power),
+    )
+
+
+def from_effects(units: Units) -> Iterator[Hypothesis]:
+    """The effects beyond the channels that can show in such a joint's motion."""
+    yield from _resistances(units)
+    if units.friction:
+        yield _presliding(units)
+    yield from _mechanics(units)
+
+
+def _effect(
+    name: str,
+    bounds: Bounds,
+    trials: Sequence[Sequence[float]],
+    make: Callable[[Array], AnyEffect],
+    magnitude: Callable[[Array], float],
+    unit: str,
+    direction: Direction = "both",
+    remains: float = KNOWN_LAW,
+) -> Hypothesis:
+    """One of the effects beyond the channels."""
+    return Hypothesis(
+        name,
+        direction,
+        unknowns_of(*bounds),
+        np.array(trials, float),
+        lambda profile, x: profile.with_effect(make(x)),
+        everywhere,
+        magnitude,
+        unit,
+        remains=remains,
+    )
+
+
+def _resistances(units: Units) -> Iterator[Hypothesis]:
+    """Effects of friction and damping."""
+    F, V = units.force, units.speed
+
+    def flat(value: float) -> tuple[float, float]:
+        return value, value
+
+    def asymmetric(way: Way) -> Hypothesis:
+        return _effect(
+            "asymmetric_friction",
+            [STRENGTH],
+            [[TRIAL]],
+            lambda x: AsymmetricFriction(direction=way, y=flat(F * x[0])),
+            lambda x: F * float(x[0]),
+            unit_of(units),
+            way,
+        )
+
+    def one_way(way: Way) -> Hypothesis:
+        return _effect(
+            "direction_dependent_damping",
+            [STRENGTH],
+            [[TRIAL]],
+            lambda x: DirectionDependentDamping(direction=way, y=flat(F / V * x[0])),
+            lambda x: F / V * float(x[0]),
+            unit_of(units, 1),
+            way,
+        )
+
+    for build in (asymmetric, one_way):
+        yield build("positive")
+        yield build("negative")
+    yield _effect(
+        "quadratic_damping",
+        [STRENGTH],
+        [[TRIAL]],
+        lambda x: QuadraticDamping(y=flat(F / V**2 * x[0])),
+        lambda x: F / V**2 * float(x[0]),
+        unit_of(units, 2),
+    )
+    yield _effect(
+        "stribeck_friction",
+        [STRENGTH, (np.log(1e-3), np.log(3.0), 0.05)],
+        [(TRIAL, np.log(v)) for v in (0.02, 0.06, 0.2, 0.6)],
+        lambda x: StribeckFriction(y=flat(F * x[0]), velocity=V * float(np.exp(x[1]))),
+        lambda x: F * float(x[0]),
+        unit_of(units),
+        remains=KNOWN_SHAPE,
+    )
+    if units.forced or units.weight:
+        yield _effect(
+            "load_dependent_friction",
+            [(0.0, 0.7, 0.002)],
+            [[0.05]],
+            lambda x: LoadDependentFriction(coefficient=float(x[0])),
+            lambda x: float(x[0]),
+            "1",
+        )
+
+
+def _presliding(units: Units) -> Hypothesis:
+    """Bristles by how far they give way, and how they are damped."""
+    soft = units.friction / units.span
+
+    def make(x: Array) -> PreslidingFriction:
+        stiffness = soft * float(np.exp(x[0]))
+        damping = float(x[1]) * (stiffness * units.inertia) ** 0.5
+        return PreslidingFriction(stiffness=stiffness, damping=damping, breakaway=0.0)
+
+    return _effect(
+        "presliding_friction",
+        [(np.log(20.0), np.log(5e3), 0.05), (0.0, 1.5, 0.02)],
+        [(np.log(1 / part), 0.0) for part in (0.001, 0.003, 0.01, 0.03)],
+        make,
+        lambda x: soft * float(np.exp(x[0])),
+        "N·m/rad" if units.hinge else "N/m",
+    )
+
+
+def _mechanics(units: Units) -> Iterator[Hypothesis]:
+    """Effects of masses, tilt, play and end stops."""
+    F, M, span = units.force, units.inertia, units.span
+    yield _effect(
+        "added_inertia",
+        [(1e-4, 5.0, 0.002)],
+        [[0.1]],
+        lambda x: AddedInertia(inertia=M * float(x[0])),
+        lambda x: M * float(x[0]),
+        "kg·m²" if units.hinge else "kg",
+    )
+    if units.hinge:
+        yield _effect(
+            "gravity_offset",
+            [(-20.0, 20.0, 0.005)] * 2,
+            [(TRIAL, 0.0), (0.0, TRIAL)],
+            lambda x: GravityOffset(sin=F * float(x[0]) or TINY, cos=F * float(x[1])),
+            lambda x: F * float(np.hypot(*x)),
+            "N·m",
+        )
+    else:
+        yield _effect(
+            "gravity_offset",
+            [(-20.0, 20.0, 0.005)],
+            [[TRIAL]],
+            lambda x: GravityOffset(force=F * float(x[0]) or TINY),
+            lambda x: F * abs(float(x[0])),
+            "N",
+        )
+    if units.forced:
+        yield _effect(
+            "backlash",
+            [(3e-3, 0.2, 0.002), (np.log(3e-3), np.log(HEAVIEST), 0.05)],
+            list(product((0.01, 0.03), (np.log(0.03), np.log(0.15)))),
+            lambda x: Backlash(play=span * float(x[0]), inertia=M * float(np.exp(x[1]))),
+            lambda x: span * float(x[0]),
+            "rad" if units.hinge else "m",
+        )
+    yield _effect(
+        "end_stop_restitution",
+        [(0.35, 0.95, 0.02)],
+        [[0.45], [0.7]],
+        lambda x: EndStopRestitution(restitution=float(x[0])),
+        lambda x: float(x[0]),
+        "1",
+    )

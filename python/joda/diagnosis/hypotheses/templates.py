@@ -1,0 +1,271 @@
+"""The templates as hypotheses: laws of their kind with few numbers, written as PCHIP components."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from joda.component import Component
+from joda.diagnosis.hypotheses.base import (
+    KNOWN_SHAPE,
+    STRENGTH,
+    TRIAL,
+    Array,
+    Hypothesis,
+    Units,
+    everywhere,
+    unit_of,
+    unknowns_of,
+)
+from joda.diagnosis.hypotheses.intervals import ends, places
+from joda.profile import Profile
+from joda.template import Template
+
+WIDEST = 0.5
+"""Of a latch."""
+EDGE = (0.002, 0.3, 0.01)
+"""Of a constant on a part of the range, in units of that part."""
+CATCH = (0.0, 0.3, 0.01)
+"""Dry friction of a catch, in units of its force."""
+BARRIER = (0.2, 3.0, 0.02)
+"""Of a latch, in units of its hold."""
+RARE = 3.0
+"""Rarity of a constant force all over a slide's range: a tilt is the same, and more usual."""
+NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
+"""Control points of a magnet, in units of its gap: there its force has fallen to 2 %."""
+SEEN = 3.47
+"""Where it has fallen to 5 %."""
+
+
+def from_templates(units: Units, templates: Mapping[str, Template]) -> Iterator[Hypothesis]:
+    """A hypothesis or two for each template."""
+    for name, template in templates.items():
+        if name.startswith("constant_"):
+            yield from _constant(units, name, template)
+        elif name.startswith("spring_return"):
+            yield from _spring(units, name)
+        elif name.startswith("spring_loaded_snap"):
+            yield _snap(units, name)
+        elif name.startswith("magnetic"):
+            yield _magnet(units, name)
+        elif name == "bistable_mechanism":
+            yield _bistable(units, name)
+        elif name == "bistable_mechanism_internal":
+            yield _wells(units, name, (1.0, -1.0, 1.0, -1.0))
+        elif name == "detent_internal":
+            yield _wells(units, name, (1.0, -1.0))
+
+
+def _caught(profile: Profile, name: str, interval: tuple[float, float], most: float) -> Profile:
+    """With the dry friction of a catch."""
+    if most <= 0:
+        return profile
+    first, last = (most if end in (0.0, 1.0) else 0.0 for end in interval)
+    y = (first, most, most, last)
+    part = Component(label=name, interval=interval, x=(0, 0.15, 0.85, 1), y=y)
+    return profile.with_component("friction", part)
+
+
+def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
+    """Potential wells: strength, where within its part each pulls most, friction, the interval.
+
+    Args:
+        units: of the joint.
+        name: of the template.
+        lobes: signs of the force from one end of the interval to the other, of even count.
+    """
+    parts = len(lobes)
+    zeros = np.arange(parts // 2 + 1) * 2 / parts
+    centres = 0.5 * (zeros[1:] + zeros[:-1])
+
+    def write(profile: Profile, x: Array) -> Profile:
+        half = float(x[1]) / parts
+        tops = np.stack([centres - half, centres + half], axis=1).ravel()
+        at = np.concatenate([zeros, centres, tops])
+        order = np.argsort(at)
+        y = np.concatenate([np.zeros(len(zeros) + len(centres)), lobes])[order]
+        interval = ends("anywhere", x)
+        own = tuple(units.force * x[0] * y)
+        part = Component(label=name, interval=interval, x=tuple(at[order]), y=own)
+        most = units.force * x[0] * x[2]
+        return _caught(profile.with_component("conservative", part), name, interval, most)
+
+    bounds, tries = places("anywhere")
+    return Hypothesis(
+        name,
+        "both",
+        unknowns_of(STRENGTH, (0.3, 0.7, 0.02), CATCH, *bounds),
+        np.array([(TRIAL, 0.45, 0.0, *t) for t in tries]),
+        write,
+        lambda x: ends("anywhere", x),
+        lambda x: units.force * float(x[0]),
+        unit_of(units),
+        len(bounds),
+        remains=KNOWN_SHAPE,
+    )
+
+
+def _magnet(units: Units, name: str) -> Hypothesis:
+    """An attraction 1 / (distance + gap)²: strength, friction, gap."""
+    low = name.endswith("low_end")
+    law = (1 + NEAR) ** -2.0 - (1 + NEAR[-1]) ** -2.0
+    law /= law[0]
+
+    def write(profile: Profile, x: Array) -> Profile:
+        reach = min(float(x[2]) * NEAR[-1], 1.0)
+        at, y = NEAR * float(x[2]) / reach, units.force * x[0] * law
+        kept = at < 1
+        end = np.interp(1.0, at, y)
+        at, y = np.append(at[kept], 1.0), np.append(y[kept], end)
+        interval = (0.0, reach) if low else (1 - reach, 1.0)
+        at, y = (at, -y) if low else (1 - at[::-1], y[::-1])
+        part = Component(label=name, interval=interval, x=tuple(at), y=tuple(y))
+        most = units.force * x[0] * x[1]
+        pulled = profile.with_component("conservative", part)
+        return _caught(pulled, name, felt(x), most)
+
+    def felt(x: Array) -> tuple[float, float]:
+        reach = min(SEEN * float(x[2]), 1.0)
+        return (0.0, reach) if low else (1 - reach, 1.0)
+
+    return Hypothesis(
+        name,
+        "both",
+        unknowns_of(STRENGTH, CATCH, (0.004, 0.4, 0.002)),
+        np.array([(2 * TRIAL, 0.0, gap) for gap in (0.02, 0.04, 0.08, 0.16)]),
+        write,
+        felt,
+        lambda x: units.force * float(x[0]),
+        unit_of(units),
+        remains=KNOWN_SHAPE,
+    )
+
+
+def _spring(units: Units, name: str) -> Iterator[Hypothesis]:
+    """Its largest force, what part of that is preload, and how far it reaches."""
+    low = name.endswith("low_end")
+    place = "low" if low else "high"
+
+    def one(reach: str) -> Hypothesis:
+        def write(profile: Profile, x: Array) -> Profile:
+            most = units.force * x[0]
+            # the force is largest at the far end
+            y = (-x[1] * most, -most) if low else (most, x[1] * most)
+            part = Component(label=name, interval=ends(reach, x), x=(0, 1), y=y)
+            return profile.with_component("conservative", part)
+
+        bounds, tries = places(reach)
+        return Hypothesis(
+            name,
+            "both",
+            unknowns_of(STRENGTH, (0.0, 0.7, 0.02), *bounds),
+            np.array([(TRIAL, 0.25, *t) for t in tries]),
+            write,
+            lambda x: ends(reach, x),
+            lambda x: units.force * float(x[0]),
+            unit_of(units),
+            len(bounds),
+        )
+
+    yield one("whole")
+    yield one(place)
+
+
+def _snap(units: Units, name: str) -> Hypothesis:
+    """A latch: how it holds, its barrier, the hold at the very end, where it tips over, where it
+    holds most, friction, how far it reaches."""
+    low = name.endswith("low_end")
+    place = "low" if low else "high"
+
+    def write(profile: Profile, x: Array) -> Profile:
+        hold, share, end, tip, most = (float(value) for value in x[:5])
+        barrier, rest = share * hold, 1 - tip
+        at = np.array((0.0, most * tip, tip, tip + 0.4 * rest, tip + 0.75 * rest, 1.0))
+        y = units.force * np.array((-end * hold, -hold, 0.0, barrier, 0.35 * barrier, 0.0))
+        if not low:
+            at, y = 1 - at[::-1], -y[::-1]
+        interval = ends(place, x)
+        part = Component(label=name, interval=interval, x=tuple(at), y=tuple(y))
+        rubs = units.force * max(hold, barrier) * float(x[5])
+        return _caught(profile.with_component("conservative", part), name, interval, rubs)
+
+    bounds, tries = places(place, WIDEST)
+    own = [STRENGTH, BARRIER, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), (0.15, 0.7, 0.02), CATCH]
+    return Hypothesis(
+        name,
+        "both",
+        unknowns_of(*own, *bounds),
+        np.array([(TRIAL, 0.8, 0.5, tip, 0.45, 0.0, *t) for t in tries for tip in (0.4, 0.6)]),
+        write,
+        lambda x: ends(place, x),
+        lambda x: units.force * float(x[0]) * max(1.0, float(x[1])),
+        unit_of(units),
+        len(bounds),
+        remains=KNOWN_SHAPE,
+    )
+
+
+def _bistable(units: Units, name: str) -> Hypothesis:
+    """Strength, where it tips over, and how far from there the force is largest."""
+
+    def write(profile: Profile, x: Array) -> Profile:
+        tip, far = float(x[1]), float(x[2])
+        at = (0.0, tip * (1 - far), tip, tip + (1 - tip) * far, 1.0)
+        y = tuple(units.force * x[0] * np.array((-0.6, -1.0, 0.0, 1.0, 0.6)))
+        part = Component(label=name, interval=(0, 1), x=at, y=y)
+        return profile.with_component("conservative", part)
+
+    return Hypothesis(
+        name,
+        "both",
+        unknowns_of(STRENGTH, (0.2, 0.8, 0.01), (0.15, 0.85, 0.01)),
+        np.array(list(product((TRIAL,), (0.35, 0.5, 0.65), (0.3, 0.6)))),
+        write,
+        everywhere,
+        lambda x: units.force * float(x[0]),
+        unit_of(units),
+        remains=KNOWN_SHAPE,
+    )
+
+
+def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesis]:
+    """A constant in one channel, all over the range or on a part of it."""
+    channel, sign = next(
+        (c, np.sign(curve.y[0]))
+        for c in ("conservative", "friction", "damping")
+        if (curve := getattr(template.channels, c)) is not None
+    )
+    unit = sign * units.force / (units.speed if channel == "damping" else 1.0)
+
+    def one(place: str) -> Hypothesis:
+        whole = place == "whole"
+
+        def write(profile: Profile, x: Array) -> Profile:
+            y, interval = float(unit * x[0]), ends(place, x)
+            if whole:
+                part = Component(label=name, interval=interval, x=(0, 1), y=(y, y))
+                return profile.with_component(channel, part)
+            edge = float(x[1])
+            first, last = (y if at in (0.0, 1.0) else 0.0 for at in interval)
+            at = (0.0, edge, 1 - edge, 1.0)
+            part = Component(label=name, interval=interval, x=at, y=(first, y, y, last))
+            return profile.with_component(channel, part)
+
+        bounds, tries = places(place)
+        soft = [] if whole else [EDGE]
+        same = whole and channel == "conservative" and not units.hinge
+        return Hypothesis(
+            name,
+            "both",
+            unknowns_of(STRENGTH, *soft, *bounds),
+            np.array([(TRIAL, *[EDGE[0]] * len(soft), *t) for t in tries]),
+            write,
+            lambda x: ends(place, x),
+            lambda x: abs(float(unit)) * float(x[0]),
+            unit_of(units, int(channel == "damping")),
+            len(bounds),
+            RARE if same else 0.0,
+        )
+
+    yield one("whole")
+    yield one("anywhere")

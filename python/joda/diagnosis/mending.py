@@ -1,0 +1,145 @@
+"""Adds an effect to a joint's profile and fits everything together.
+
+First the effect's few numbers with the model's strengths; then every control point, interval and
+number (`joda.diagnosis.reshaping`). What is written makes runs that no fit has seen likelier.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.ranking import asked
+from joda.diagnosis.reshaping import Likelihood, checked, reshaped
+from joda.measured.comparison import joined, rms
+from joda.measured.reading import Measured
+from joda.measured.runs import Run
+from joda.profile import Profile
+
+NEARLY = 0.95
+"""Part of the error before, and of the loss, to which an effect must bring runs held out."""
+STRENGTHS = (1.0, 3.0, 10.0)
+"""Of an effect whose place is known: the trials, in units of the usual one."""
+FEWEST = 4
+"""Runs from which every fourth is held out; of fewer, the last quarter of each."""
+
+
+@dataclass(frozen=True)
+class Error:
+    """How far a model is off, rad or m.
+
+    Attributes:
+        whole: RMS of open-loop replays of whole runs.
+        window: RMS of windows of 0.4 s.
+    """
+
+    whole: float
+    window: float
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A profile with an effect more.
+
+    Attributes:
+        profile: the whole one (`joda.scenes.native`).
+        effect: that was added; None if nothing did better than the model as it was.
+        before, after: errors on runs held out of the fit.
+    """
+
+    profile: Profile
+    effect: str | None
+    before: Error
+    after: Error
+
+
+def parted(measured: Measured) -> tuple[Measured, Measured]:
+    """The runs to fit, and those held out: every fourth, or of few runs each one's last quarter."""
+    count = len(measured.runs)
+    if count >= FEWEST:
+        held = list(range(3, count, 4))
+        kept = [k for k in range(count) if k not in held]
+        return measured.changed(runs=kept), measured.changed(runs=held)
+    cuts = [3 * len(run.time) // 4 for run in measured.runs]
+    first = tuple(_cut(run, slice(0, at)) for run, at in zip(measured.runs, cuts, strict=True))
+    last = tuple(_cut(run, slice(at, None)) for run, at in zip(measured.runs, cuts, strict=True))
+    return measured.with_runs(first), measured.with_runs(last)
+
+
+def _cut(run: Run, part: slice) -> Run:
+    velocity = None if run.velocity is None else run.velocity[part]
+    return Run(run.name, run.time[part], run.position[part], velocity, run.force[part], run.forced)
+
+
+def error(measured: Measured, profile: Profile | None = None) -> Error:
+    """How far the model, or another profile, is off in MuJoCo with the plugin."""
+    one = measured if profile is None else measured.changed(profile)
+    wholes, windows = [], []
+    for run, sigma in zip(one.runs, one.sigma, strict=True):
+        path = one.replayer.whole(run, sigma) - run.position
+        wholes.append(path[~np.isnan(path)])
+        windows.append(joined(one.replayer.windows(run, sigma)))
+    return Error(rms(np.concatenate(wholes)), rms(np.concatenate(windows)))
+
+
+def mend(
+    train: Measured,
+    held: Measured,
+    effect: str,
+    direction: str | None = None,
+    near: tuple[float, float] | None = None,
+    told: Callable[[str], None] = lambda what: None,
+) -> Mended:
+    """Adds an effect, if that lowers the error on runs held out.
+
+    Of what is tried, the likeliest is taken that makes those runs likelier and their error less.
+
+    Args:
+        train: the joint, its profile as it is, and runs to fit.
+        held: the same with runs held out.
+        effect: its name.
+        direction: of the effect, if it is known.
+        near: where it is, in normalised position, if that is known.
+        told: what is being done.
+    """
+    before = error(held)
+    told("the effect's own numbers")
+    profile = _guessed(train, effect, direction, near)
+    if profile is None:
+        return Mended(train.profile, None, before, before)
+    most = NEARLY * Likelihood(held).loss(train.profile)
+    tried = reshaped(train, held, profile, effect, told)
+    for one in sorted(tried, key=lambda one: one.score):
+        if (
+            one.unseen < most
+            and (after := error(held, one.profile)).window < NEARLY * before.window
+        ):
+            return Mended(one.profile, effect, before, after)
+    return Mended(train.profile, None, before, before)
+
+
+def _guessed(
+    train: Measured, effect: str, direction: str | None, near: tuple[float, float] | None
+) -> Profile | None:
+    """The profile with the effect at its most likely place; None if it can be nowhere."""
+    begun = asked(train)
+    every = [h for h in begun.hypotheses if h.effect == effect]
+    tried = [h for h in every if direction in (None, h.direction)] or every
+    guesses = [found for h in tried if (found := begun.tell(h))]
+    guesses += [begun.guess(there) for h in tried if (there := _placed(h, near))]
+    if not guesses:
+        return None
+    return checked(begun.moved(min(guesses, key=lambda found: found.score)).written(begun.base))
+
+
+def _placed(hypothesis: Hypothesis, near: tuple[float, float] | None) -> Hypothesis | None:
+    """A hypothesis that begins at an interval, with several strengths; None if it has none."""
+    ends = hypothesis.ends
+    if near is None or not ends:
+        return None
+    own = near if ends == 2 else near[1:] if near[0] <= 0 else near[:1]
+    trials = np.repeat(hypothesis.trials[:1], len(STRENGTHS), axis=0)
+    trials[:, 0] *= STRENGTHS
+    trials[:, -ends:] = own
+    return replace(hypothesis, trials=trials)

@@ -1,0 +1,168 @@
+"""What may be missing, ranked: each hypothesis is fitted together with the model's own numbers."""
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from os import cpu_count
+
+import numpy as np
+
+from joda._templates import templates
+from joda.diagnosis.baseline import Base, base_of, single_for, units_of, usable, windows_for
+from joda.diagnosis.guessing import Guess, guess, moved, usual
+from joda.diagnosis.hypotheses import Hypothesis, hypotheses
+from joda.diagnosis.judge import BEND, Fit, Judge, Linear
+from joda.diagnosis.knocks import knock_guess
+from joda.measured.reading import Measured
+
+POLISHED = 4
+"""Of how many effects the numbers are tried elsewhere."""
+CALM = 0.3
+"""Part of the windows, the better ones, that tell the noise."""
+WORST = 1.5
+"""Mean square residual that noise may make."""
+QUIET = 0.5
+"""The least: noise is not estimated better."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A model fitted to measured runs, and what it may lack.
+
+    Attributes:
+        judge: of the windows.
+        base: the model as it is.
+        fit: of its factors alone.
+        about: the model there, linear.
+        hypotheses: all of the catalogue.
+    """
+
+    judge: Judge
+    base: Base
+    fit: Fit
+    about: Linear
+    hypotheses: tuple[Hypothesis, ...]
+
+    def tell(self, hypothesis: Hypothesis) -> Guess | None:
+        """The hypothesis fitted; None if the data cannot tell of it."""
+        if hypothesis.effect == "end_stop_restitution":
+            return knock_guess(self.judge, self.base, self.fit, hypothesis)
+        return self.guess(hypothesis)
+
+    def guess(self, hypothesis: Hypothesis) -> Guess:
+        """The hypothesis fitted to windows without knocks."""
+        return guess(self.judge, self.base, self.fit, self.about, hypothesis)
+
+    def apart(self) -> "Asked":
+        """The same, but what is fitted from here on has every window's start apart."""
+        return replace(self, judge=replace(self.judge, apart=True))
+
+    def moved(self, found: Guess) -> Guess:
+        """The guess with its numbers tried elsewhere."""
+        return moved(self.judge, self.base, found)
+
+
+def asked(measured: Measured, length: float | None = None) -> Asked:
+    """Fits the model's own strengths in windows of some length (s); None: by the joint's pace."""
+    windows = windows_for(measured, length)
+    judge = Judge(windows, usable(windows))
+    base = base_of(measured.profile, single_for(measured), windows.h)
+    given = np.ones(len(base.places))
+    starts = windows.start, judge.started(base.solo(given)).start
+    fits = [judge.fit(base.solo, base.unknowns, given, start) for start in starts]
+    fit = min(fits, key=lambda f: f.loss)
+    about = judge.linear(base.solo, base.unknowns, fit.x, fit.start, BEND * usual(judge, fit))
+    every = hypotheses(units_of(windows, measured), templates(), measured.profile)
+    return Asked(judge, base, fit, about, tuple(every))
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What may be missing from a model.
+
+    Attributes:
+        asked: the model and its runs.
+        guesses: the best one of each effect, the most likely first.
+        level: mean square residual that counts as noise.
+        told: how many samples count.
+    """
+
+    asked: Asked
+    guesses: tuple[Guess, ...]
+    level: float
+    told: float
+
+
+Told = Callable[[int, int, str], None]
+
+
+def rank(
+    begun: Asked,
+    exclude: Collection[str] = (),
+    heed: Told = lambda done, total, what: None,
+    known: Sequence[Guess] = (),
+) -> Ranking:
+    """Fits every hypothesis to measured runs.
+
+    Args:
+        begun: the model and its runs.
+        exclude: effects that are not tried.
+        heed: told how many hypotheses are done, of how many, and the last one's name.
+        known: guesses of the same windows that are there already; the better ones are taken.
+    """
+    tried = [h for h in begun.hypotheses if h.effect not in exclude]
+    total = len(tried) + POLISHED
+    done = 0
+
+    def heard(found: Iterable[Guess | None]) -> list[Guess]:
+        nonlocal done
+        out = []
+        for one in found:
+            done += 1
+            if one is not None:
+                heed(done, total, one.hypothesis.effect)
+                out.append(one)
+        return out
+
+    with ThreadPoolExecutor(cpu_count()) as pool:
+        guesses = heard(pool.map(begun.tell, tried))
+        best = _best(guesses)[:POLISHED]
+        guesses += heard(pool.map(begun.moved, best))
+    there = [one for one in (*guesses, *known) if not one.vanished]
+    return Ranking(begun, *_levelled(begun.judge, there))
+
+
+def _best(guesses: Iterable[Guess]) -> list[Guess]:
+    """The best guess of each effect, the lowest score first."""
+    best: dict[str, Guess] = {}
+    for one in sorted(guesses, key=lambda g: g.score):
+        best.setdefault(one.hypothesis.effect, one)
+    return list(best.values())
+
+
+def _levelled(judge: Judge, guesses: Sequence[Guess]) -> tuple[tuple[Guess, ...], float, float]:
+    """The best guesses, scored by what the best of them leaves in its better windows.
+
+    Recorded noise is often less than all that a simulation cannot follow: clocks, forces, whatever
+    else is a little wrong. Such a misfit is all of one piece within a window, which then counts as
+    one sample.
+
+    Returns:
+        the best one of each effect, the most likely first; the mean square residual that is
+        noise; how many samples count.
+    """
+    samples = judge.samples
+    if not guesses or not samples:
+        return (), 1.0, samples
+    best = min(guesses, key=lambda g: g.fit.loss + g.cost).fit.squares
+    each = (best / np.maximum(judge.windows.count, 1))[judge.counts]
+    level = max(float(np.quantile(each, CALM)), QUIET)
+    told = float(judge.counts.sum()) if level > WORST else samples
+
+    def scored(one: Guess) -> Guess:
+        beside = (one.fit.loss - judge.loss(one.fit.squares)) / max(level, 1.0)  # priors; knocks
+        loss = (judge.loss(one.fit.squares, level=level) + beside) * told / samples
+        cost = one.hypothesis.rarity + len(one.x) * np.log(max(told, 2.0))
+        return replace(one, score=loss + cost)
+
+    return tuple(_best(map(scored, guesses))), level, told

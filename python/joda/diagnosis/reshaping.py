@@ -1,0 +1,173 @@
+"""Fits all numbers of a profile, with as many control points of an effect as the data support.
+
+First its shape is kept; then control points are added halfway between those it has, and each is
+free. Windows of the runs grow longer, as what is right in short ones is a good start for longer
+ones.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._core import Solo
+from joda.component import Component
+from joda.diagnosis.baseline import LEAST, usable, windows_for
+from joda.diagnosis.guessing import usual
+from joda.diagnosis.hypotheses.effects import HEAVIEST
+from joda.diagnosis.judge import BEND, Judge, Unknowns
+from joda.field import evaluate
+from joda.joints.parameters import Kind, Parameters
+from joda.measured.reading import Measured
+from joda.measured.replay import WINDOW
+from joda.profile import CHANNELS, Channel, Channels, Profile
+
+Array = NDArray[np.float64]
+
+LONGER = (1 / 3, 1.0, 3.0)
+"""Lengths of windows, in units of the diagnosis' own."""
+FINER = 2
+"""How often control points are doubled."""
+ROUNDS = 6
+"""Iterations with each length, while windows that are far off count, and after."""
+NUDGE = 0.004
+"""Step of a number for differences, in its own unit."""
+PRICE = 2.0
+"""What a control point must gain, of twice the log-likelihood (Akaike 1974)."""
+
+
+class Likelihood:
+    """Of measured runs, as MuJoCo would move the joint at the scene's own step."""
+
+    def __init__(self, measured: Measured) -> None:
+        """Cuts the runs into windows."""
+        self.single, self.windows = measured.single, windows_for(measured, WINDOW, fine=False)
+        self.judge = Judge(self.windows, self.windows.count >= LEAST)
+
+    def loss(self, profile: Profile) -> float:
+        """Twice the negative log-likelihood, robustly: a window that is missed altogether, as the
+        joint goes over a barrier or just not, counts little."""
+        return self.judge.started(self.single.solo(profile, self.windows.h)).loss
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A profile that was tried.
+
+    Attributes:
+        profile: the whole one (`joda.scenes.native`).
+        unseen: its loss on runs held out of the fit.
+        score: its loss on all runs, and the price of its control points.
+    """
+
+    profile: Profile
+    unseen: float
+    score: float
+
+
+def reshaped(
+    train: Measured,
+    held: Measured,
+    profile: Profile,
+    effect: str,
+    told: Callable[[str], None],
+) -> Iterator[Tried]:
+    """A profile, and what fits of all its numbers make of it.
+
+    Args:
+        train: the joint and runs to fit.
+        held: the same with runs held out.
+        profile: to be fitted.
+        effect: label of the components that may get more control points.
+        told: what is being done.
+    """
+    seen, unseen = Likelihood(train), Likelihood(held)
+    usual_length = windows_for(train).length
+
+    def tried(profile: Profile) -> Tried:
+        loss = unseen.loss(profile)
+        price = PRICE * sum(len(part.x) for part in _parts(profile))
+        return Tried(profile, loss, seen.loss(profile) + loss + price)
+
+    yield tried(profile)
+    for finer in range(FINER + 1):
+        profile = resolved(profile, effect) if finer else profile
+        points = sum(len(part.x) for part in _parts(profile) if part.label == effect)
+        if finer and not points:
+            return
+        for length in (factor * usual_length for factor in LONGER):
+            told(f"all numbers, {points} control points of the effect, windows of {length:.2g} s")
+            profile = refitted(train, profile, length, effect if finer else None)
+            yield tried(profile)
+
+
+def _parts(profile: Profile) -> list[Component]:
+    channels = (getattr(profile.channels, name) for name in CHANNELS)
+    return [part for channel in channels for part in channel.components]
+
+
+def resolved(profile: Profile, effect: str | None = None) -> Profile:
+    """The same curves, nearly, of an effect or of all, with a control point halfway between each
+    two."""
+    channels = {}
+    for name in CHANNELS:
+        channel = getattr(profile.channels, name)
+        parts = tuple(
+            _finer(part) if effect in (None, part.label) else part for part in channel.components
+        )
+        channels[name] = channel.model_copy(update={"components": parts})
+    return profile.model_copy(update={"channels": Channels(**channels)})
+
+
+def _finer(part: Component) -> Component:
+    x, (a, b) = np.array(part.x), part.interval
+    halves = (x[1:] + x[:-1]) / 2
+    between = evaluate(Channel(components=(part,)), a + (b - a) * halves)[0]
+    order = np.argsort(at := np.append(x, halves))
+    y = np.append(part.y, between)[order]
+    return part.model_copy(update={"x": tuple(map(float, at[order])), "y": tuple(map(float, y))})
+
+
+def checked(profile: Profile) -> Profile:
+    """The profile, validated as one from a file."""
+    return Profile.model_validate(profile.model_dump(exclude={"schema_version"}))
+
+
+def refitted(train: Measured, profile: Profile, length: float, free: str | None = None) -> Profile:
+    """All numbers of a profile fitted, near where they were.
+
+    Args:
+        train: measured.
+        profile: its shapes are kept.
+        length: of windows, s.
+        free: effect whose shape need not be.
+    """
+    windows = windows_for(train, length, fine=False)  # at the scene's own step
+    judge = Judge(windows, usable(windows))
+    if not judge.counts.any():
+        return profile
+    kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
+    handle = HEAVIEST * train.single.inertia
+    parameters = Parameters(checked(profile), kinds, free=free, handle=handle)
+    n = len(parameters.start)
+    if not n:
+        return profile
+    unbounded = np.full(n, np.inf)
+    unknowns = Unknowns(
+        -unbounded,
+        unbounded,
+        np.full(n, NUDGE),
+        parameters.start,
+        parameters.doubt,
+        parameters.constraints,
+    )
+    single, h = train.single, windows.h
+
+    def make(theta: Array) -> Solo:
+        return single.solo(parameters.written(theta, exact=True), h)
+
+    fit = judge.fit(make, unknowns, parameters.start, iterations=0)
+    for bend in (BEND * usual(judge, fit), BEND):
+        fit = judge.fit(make, unknowns, fit.x, fit.start, ROUNDS, bend)
+    return parameters.written(fit.x)

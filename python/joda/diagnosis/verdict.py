@@ -1,0 +1,208 @@
+"""What a model lacks: the verdict on a ranking, with probabilities, sizes and sentences."""
+
+from collections.abc import Collection
+
+import numpy as np
+
+from joda.diagnosis.baseline import joined, usable, windows_for
+from joda.diagnosis.coverage import moved_one_way, too_little
+from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.guessing import Guess
+from joda.diagnosis.holdout import Holdout
+from joda.diagnosis.phrases import explained
+from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
+from joda.diagnosis.ranking import Ranking, Told, asked, rank
+from joda.diagnosis.rivals import indistinguishable
+from joda.diagnosis.summary import strengths_off, summarised
+from joda.diagnosis.weighing import Verdict, Weighed, weigh
+from joda.measured.reading import Measured
+from joda.profile import Profile
+
+LONGER, LONGEST = 9.0, 1.5
+"""How much longer the windows of a second look are, and at most how long, s."""
+SLOWEST = 0.02
+"""Part of the range per second that a motion is proposed at, at the least."""
+STRICTLY, LOOSELY = 0.7, 3.0
+"""Strictness of that second look; and where the joint went one way only, which tells little."""
+SURE = 0.9
+"""Probability from which no further experiment is proposed."""
+TOO_SHORT = "The measurements are too short to tell anything."
+GAUGE_BACK = "Measure the way back too, as slowly."
+NAMED, WORTH_NAMING = 5, 0.01
+"""How many effects are named, besides the first those of at least some probability."""
+
+
+def diagnosed(
+    measured: Measured,
+    exclude: Collection[str] = (),
+    told: Told = lambda done, total, what: None,
+) -> tuple[Diagnosis, Profile | None]:
+    """Finds what a model lacks.
+
+    Args:
+        measured: the joint and its runs.
+        exclude: effects that are not considered.
+        told: how much is done, of how much, and what.
+
+    Returns:
+        the diagnosis, and the profile with the likeliest effect; None if there is none.
+    """
+    if not usable(windows_for(measured)).any():
+        return _said(measured, "insufficient_data", TOO_SHORT, (), None), None
+    ranking = rank(asked(measured), exclude, told)
+    one_way = moved_one_way(measured)
+    strictness = LOOSELY if one_way else 1.0
+    weighed = weigh(ranking, strictness)
+    if weighed.verdict == "unexplained" and measured.runs:  # fits that stuck may be freed
+        ranking = rank(ranking.asked.apart(), exclude, told, ranking.guesses)
+        weighed = weigh(ranking, strictness)
+    if weighed.verdict == "unexplained" and measured.runs:  # what is weak shows in longer windows
+        length = min(LONGER * ranking.asked.judge.windows.length, LONGEST)
+        longer = rank(asked(measured, length), exclude, told)
+        again = weigh(longer, STRICTLY)
+        if again.verdict == "missing_effect" or again.share < weighed.share:
+            ranking, weighed = longer, again
+    if weighed.verdict == "adequate" and (why := too_little(measured)):
+        return _said(measured, "insufficient_data", why, (), None), None
+    if weighed.verdict == "adequate":
+        summary = (
+            f"The model is adequate: nothing beyond the noise ({_floor(measured):.2g} "
+            f"{_unit(measured)}) that an effect would explain.{strengths_off(ranking)}"
+        )
+        return _said(measured, "adequate", summary, (), None), None
+    held = Holdout(ranking.asked)
+    named = range(min(NAMED, len(ranking.guesses)))
+    findings = tuple(
+        _finding(
+            measured, ranking, held, k, weighed, indistinguishable(ranking, weighed, k, one_way)
+        )
+        for k in named
+        if k == 0 or weighed.probabilities[k] > WORTH_NAMING
+    )
+    profile = ranking.guesses[0].written(ranking.asked.base)
+    experiment = _next(measured, ranking, weighed, one_way)
+    summary = summarised(findings[0], weighed, one_way)
+    return _said(measured, weighed.verdict, summary, findings, experiment), profile
+
+
+def _said(
+    measured: Measured,
+    verdict: Verdict,
+    summary: str,
+    effects: tuple[Finding, ...],
+    experiment: str | None,
+) -> Diagnosis:
+    joint = measured.profile.joint
+    if verdict == "insufficient_data":
+        experiment = (
+            "Record more: move the joint through its whole range in both directions, slowly and "
+            "fast, with the force if it can be measured, for some 20 s in all."
+        )
+    return Diagnosis(
+        joint=joint.name,
+        verdict=verdict,
+        summary=summary,
+        effects=effects,
+        noise_floor=_floor(measured),
+        unit=_unit(measured),
+        next_experiment=experiment,
+        notes=measured.notes,
+    )
+
+
+def _floor(measured: Measured) -> float:
+    """Noise of the runs' positions, or of the curves' forces where there are no runs."""
+    noises = measured.sigma or tuple(gauged.sigma for gauged in measured.curves)
+    return float(np.sqrt(np.mean(np.square(noises))))
+
+
+def _unit(measured: Measured) -> str:
+    """Of what is missed: position, or force where there are only curves."""
+    joint = measured.profile.joint
+    return joint.unit if measured.runs else joint.force_unit
+
+
+def _finding(
+    measured: Measured,
+    ranking: Ranking,
+    held: Holdout,
+    number: int,
+    weighed: Weighed,
+    alike: tuple[str, ...],
+) -> Finding:
+    guess = ranking.guesses[number]
+    hypothesis, x = guess.hypothesis, guess.x
+    before, after = held.errors(guess)
+    magnitude = hypothesis.magnitude(x)
+    doubt = _doubt(ranking, guess)
+    interval = hypothesis.interval(x)
+    joint = measured.profile.joint
+    return Finding(
+        effect=hypothesis.effect,
+        interval=interval,
+        probability=weighed.probabilities[number],
+        direction=hypothesis.direction,
+        magnitude=magnitude,
+        magnitude_error=doubt,
+        unit=hypothesis.unit,
+        explanation=explained(
+            hypothesis.effect,
+            hypothesis.direction,
+            interval,
+            (magnitude, doubt, hypothesis.unit),
+            (before, after, _floor(measured)),
+            _unit(measured),
+            joint,
+        ),
+        held_out_error_before=before,
+        held_out_error_after=after,
+        indistinguishable_from=alike,
+    )
+
+
+def _doubt(ranking: Ranking, found: Guess) -> float:
+    """Standard deviation of an effect's magnitude, from the curvature of the loss."""
+    make, unknowns = joined(ranking.asked.base, found.hypothesis)
+    x = found.fit.x
+    H = ranking.asked.judge.linear(make, unknowns, x, found.fit.start).normal()[0]
+    H = H + np.diag(unknowns.doubt**-2.0) + 1e-9 * np.diag(np.maximum(np.diag(H), 1e-12))
+    covariance = np.linalg.pinv(H)
+    n = len(ranking.asked.base.places)
+    slope = np.zeros(len(x))
+    for k in range(n, len(x)):
+        step = 1e-4 * (np.arange(len(x)) == k)
+        ends = (found.hypothesis.magnitude((x + way)[n:]) for way in (step, -step))
+        slope[k] = (next(ends) - next(ends)) / 2e-4
+    samples = max(ranking.asked.judge.samples, 1.0)
+    worse = max(float(found.fit.squares[ranking.asked.judge.counts].sum()) / samples, 1.0)
+    return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0) * worse))
+
+
+def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool) -> str | None:
+    """The experiment that tells the likeliest two apart; None if the first is sure."""
+    if not measured.runs:
+        return GAUGE_BACK if one_way else None
+    velocity = ranking.asked.judge.windows.start[:, 1]
+    least = SLOWEST * float(np.ptp(measured.profile.joint.range))
+    means = Means(
+        joint=measured.profile.joint,
+        inertia=measured.single.inertia,
+        speed=max(float(np.sqrt(np.mean(velocity**2))), least),
+        h=ranking.asked.base.h,
+        sigma=_floor(measured),
+        forced=any(run.forced for run in measured.runs),
+    )
+    if one_way:
+        return there_and_back(means).sentence
+    if weighed.verdict == "unexplained":
+        return (
+            "Repeat one slow motion three times, to and fro, then the same fast: what differs "
+            "between repeats depends on time or on what was before, what differs with speed is a "
+            "resistance, what does neither is a force over position."
+        )
+    if weighed.probabilities[0] > SURE or len(ranking.guesses) < 2:
+        return None
+    first, second = (
+        Model(*joined(ranking.asked.base, g.hypothesis), g.fit.x) for g in ranking.guesses[:2]
+    )
+    return next_experiment(first, second, means)

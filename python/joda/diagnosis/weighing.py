@@ -1,0 +1,81 @@
+"""From a ranking to a verdict: is anything missing, how likely is each effect, is one enough."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from joda.diagnosis.judge import BEND
+from joda.diagnosis.ranking import WORST, Ranking
+
+Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
+
+SHARPNESS = 3.0
+"""How fast an effect's probability falls with the misfit that it leaves; calibrated on simulated
+joints with a hidden effect (docs/diagnose.md)."""
+LEAST_GAIN = 60.0
+"""Least gain in loss of an effect that is more than chance."""
+NOTICEABLE = 0.02
+"""The same, per sample."""
+LEFT = 0.25
+"""Excess per sample that any true effect may leave: noise is not known better."""
+LITTLE = 0.05
+"""Excess per sample that is never worth a word."""
+HARDLY = 0.1
+"""Probability of the first effect below which a small excess is nothing that an effect explains."""
+MUCH = 0.5
+"""Excess per sample that is, even if no effect lowers it."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A ranking with its probabilities.
+
+    Attributes:
+        verdict: on the model.
+        probabilities: of the guesses, in their order.
+        excess: per sample, of the model as it is and of each guess.
+    """
+
+    verdict: Verdict
+    probabilities: tuple[float, ...]
+    excess: tuple[float, tuple[float, ...]]
+
+    @property
+    def share(self) -> float:
+        """Part of the model's excess that the first guess leaves."""
+        own, left = self.excess
+        return left[0] / max(own, LITTLE) if left else 1.0
+
+
+def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
+    """The verdict on a ranking, and how likely each effect is the missing one.
+
+    Args:
+        ranking: of what may be missing.
+        strictness: factor of what the true effect may leave.
+    """
+    judge, guesses = ranking.asked.judge, ranking.guesses
+    samples = judge.samples
+    if not guesses or not samples:
+        return Weighed("adequate", (), (0.0, ()))
+    first = guesses[0]
+
+    def excess(loss: float, count: float) -> float:
+        """Per sample, beyond what noise makes."""
+        return max(loss / count - BEND * float(np.log1p(1 / BEND)), 0.0)
+
+    own = excess(judge.loss(ranking.asked.fit.squares, level=ranking.level), samples)
+    left = np.array([excess(guess.score, ranking.told) for guess in guesses])
+    remains = strictness * first.hypothesis.remains
+    weights = (left + LITTLE) ** -SHARPNESS
+    likely = weights / (weights.sum() + (remains * own + LITTLE) ** -SHARPNESS)
+    gain = ranking.asked.fit.loss - first.fit.loss - first.cost
+    if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and likely[0] < HARDLY):
+        noise = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
+        said: Verdict = "adequate" if excess(noise, samples) < MUCH else "unexplained"
+    elif left[0] > max(remains * own, LEFT) or likely[0] < 1 - likely.sum():
+        said = "unexplained"
+    else:
+        said = "missing_effect"
+    return Weighed(said, tuple(map(float, likely)), (own, tuple(map(float, left))))

@@ -1,0 +1,274 @@
+"""What of a joint a fit may change, as a vector, and what must stay true of it.
+
+Numbers are made comparable: a control point in units of its component's largest magnitude, an
+interval's end in normalised position, inertia and the damping ratio as logarithms.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._context import Context
+from joda.component import Component
+from joda.effects import Effect
+from joda.joints.least_squares import Inequalities
+from joda.profile import CHANNELS, Profile, rounded
+
+Array = NDArray[np.float64]
+Kind = Literal["values", "intervals", "strengths", "damping_ratio", "inertia", "gravity", "effects"]
+KINDS: tuple[Kind, ...] = tuple(kind for kind in get_args(Kind) if kind != "effects")
+"""What gradients fit; effects' numbers are fitted by differences (`joda.diagnosis.mending`)."""
+
+NARROWEST = 0.005
+"""Least width of an interval, in normalised position."""
+
+SIGNED = ("sin", "cos", "force")
+"""Numbers of effects that may have either sign."""
+LARGEST = {"breakaway": 1.0, "restitution": 0.95}
+LEAST_LEFT = 0.02
+"""Least part of an effect's number that a fit may leave."""
+
+DOUBT: dict[Kind, float] = {
+    "values": 0.5,
+    "intervals": 0.1,
+    "strengths": 0.5,
+    "damping_ratio": 0.7,
+    "inertia": 0.2,
+    "gravity": 0.2,
+    "effects": 0.5,
+}
+"""How far (one standard deviation) a number may be from its first value before any data."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One number of the vector.
+
+    Attributes:
+        kind: what it is.
+        channel: of a value, an interval's end or a strength.
+        component: number of the component in its channel.
+        index: number of the control point; 0 and 1 of an interval's ends; 0 and 1 of gravity.
+        key: of an effect's number: which of its parameters; the effect is `component`.
+    """
+
+    kind: Kind
+    channel: str = ""
+    component: int = 0
+    index: int = 0
+    key: str = ""
+
+
+class Parameters:
+    """The numbers of a profile that a fit may change.
+
+    Attributes:
+        slots: what each number is.
+        start: the numbers as they are, shape (n,).
+        scales: what one unit of each is in the profile, shape (n,).
+        doubt: standard deviations before any data, shape (n,).
+        constraints: what must stay true: friction and damping not negative, intervals in order and
+            within the range, and, if shapes are kept, each part of a curve rising, falling or of
+            the sign that it is.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        kinds: Collection[Kind],
+        *,
+        keep_shape: bool = True,
+        free: str | None = None,
+        gravity: float = 1.0,
+        handle: float = np.inf,
+    ) -> None:
+        """Lists the numbers.
+
+        Args:
+            profile: to be changed.
+            kinds: of numbers that may change.
+            keep_shape: see `constraints`.
+            free: label of components whose shapes are not kept all the same.
+            gravity: the unit of a gravity offset, N·m or N, see `gravity_scale`.
+            handle: largest inertia of one that has play, kg·m² or kg.
+        """
+        self.profile = profile
+        slots: list[Slot] = []
+        start: list[float] = []
+        rows: list[tuple[dict[int, float], float]] = []
+        for name in CHANNELS:
+            components = getattr(profile.channels, name).components
+            if "strengths" in kinds and components:
+                rows.append(({len(slots): 1.0}, 0.0))
+                slots.append(Slot("strengths", name))
+                start.append(1.0)
+            for number, component in enumerate(components):
+                if "values" in kinds:
+                    kept = keep_shape and component.label != free
+                    _values(name, number, component, kept, slots, start, rows)
+                if "intervals" in kinds:
+                    _interval(name, number, component, slots, start, rows)
+        if "effects" in kinds:
+            for number, effect in enumerate(profile.effects):
+                _effect(number, effect, handle, slots, start, rows)
+        if "damping_ratio" in kinds:
+            slots.append(Slot("damping_ratio"))
+            start.append(0.0)
+        if "inertia" in kinds:
+            slots.append(Slot("inertia"))
+            start.append(0.0)
+        if "gravity" in kinds:
+            # a slide's weight is one number, a hinge's a cosine and a sine
+            count = 2 if profile.joint.type == "hinge" else 1
+            slots += [Slot("gravity", index=k) for k in range(count)]
+            start += [0.0] * count
+        self.slots = tuple(slots)
+        self.start = np.array(start)
+        self.scales = np.array([_scale(profile, slot, gravity) for slot in slots])
+        self.doubt = np.array([DOUBT[slot.kind] for slot in slots])
+        G = np.zeros((len(rows), len(slots)))
+        for row, (terms, _) in enumerate(rows):
+            for column, factor in terms.items():
+                G[row, column] = factor
+        self.constraints = Inequalities(G, np.array([least for _, least in rows]))
+
+    def written(self, theta: Array, *, exact: bool = False) -> Profile:
+        """The profile with these numbers, to six digits unless `exact`."""
+        content = self.profile.model_dump()
+        for slot, value in zip(self.slots, theta * self.scales, strict=True):
+            if slot.kind == "effects":
+                effect, number = content["effects"][slot.component], float(value)
+                number = number if exact else rounded(number)
+                if slot.key == "y":
+                    y = list(effect["y"])
+                    y[slot.index] = max(number, 0.0)
+                    effect["y"] = y
+                else:
+                    effect[slot.key] = number
+            if slot.kind not in ("values", "intervals", "strengths"):
+                continue
+            components = content["channels"][slot.channel]["components"]
+            if slot.kind == "values":
+                y = list(components[slot.component]["y"])
+                y[slot.index] = value
+                components[slot.component]["y"] = y
+            elif slot.kind == "intervals":
+                ends = list(components[slot.component]["interval"])
+                end = min(max(float(value), 0.0), 1.0)
+                ends[slot.index] = end if exact else round(end, 6)
+                components[slot.component]["interval"] = ends
+        for slot, value in zip(self.slots, theta, strict=True):
+            if slot.kind == "strengths":
+                for component in content["channels"][slot.channel]["components"]:
+                    component["y"] = [value * y for y in component["y"]]
+        for name in CHANNELS:
+            for component in content["channels"][name]["components"]:
+                floor = -np.inf if name == "conservative" else 0.0
+                kept = [max(y, floor) for y in component["y"]]
+                component["y"] = kept if exact else [rounded(y) for y in kept]
+        return Profile.model_validate(content)
+
+
+Rows = list[tuple[dict[int, float], float]]
+
+
+def gravity_scale(context: Context, profile: Profile) -> float:
+    """The unit of a gravity offset, N·m or N: gravity's largest force, or the profile's."""
+    components = profile.channels.conservative.components
+    return max(context.gravity_scale, *(abs(y) for c in components for y in c.y), 1e-9)
+
+
+def _scale(profile: Profile, slot: Slot, gravity: float) -> float:
+    if slot.kind == "effects":
+        return _effect_scale(profile.effects[slot.component], slot.key)
+    if slot.kind != "values":
+        return gravity if slot.kind == "gravity" else 1.0
+    component = getattr(profile.channels, slot.channel).components[slot.component]
+    return max(map(abs, component.y)) or 1.0
+
+
+def _values(
+    channel: str,
+    number: int,
+    component: Component,
+    keep_shape: bool,
+    slots: list[Slot],
+    start: list[float],
+    rows: Rows,
+) -> None:
+    """A component's control points; where shapes are kept, those that are zero stay so."""
+    y = np.array(component.y)
+    scale = float(np.abs(y).max()) or 1.0
+    at: dict[int, int] = {}
+    for index, value in enumerate(y):
+        sign = float(np.sign(value))
+        if keep_shape and sign == 0:
+            continue
+        at[index] = len(slots)
+        if keep_shape or channel != "conservative":
+            rows.append(({at[index]: sign or 1.0}, 0.0))
+        slots.append(Slot("values", channel, number, index))
+        start.append(value / scale)
+    for index, rise in enumerate(np.diff(y)):
+        if keep_shape and rise:
+            ends = ((index, -np.sign(rise)), (index + 1, np.sign(rise)))
+            rows.append(({at[k]: float(sign) for k, sign in ends if k in at}, 0.0))
+
+
+def _effect_scale(effect: Effect, key: str) -> float:
+    value = getattr(effect, key)
+    return float(max(map(abs, value)) if isinstance(value, tuple) else abs(value))
+
+
+def _effect(
+    number: int,
+    effect: Effect,
+    handle: float,
+    slots: list[Slot],
+    start: list[float],
+    rows: Rows,
+) -> None:
+    """An effect's numbers that are not zero, each in units of its own size."""
+    largest = LARGEST | ({"inertia": handle} if effect.effect == "backlash" else {})
+    for key in (*effect.parameters(), "y"):
+        value = getattr(effect, key, None)
+        if not isinstance(value, float | tuple) or not _effect_scale(effect, key):
+            continue
+        for index, one in enumerate(value if isinstance(value, tuple) else (value,)):
+            if key not in SIGNED:
+                least = 0.0 if key == "y" else LEAST_LEFT
+                rows.append(({len(slots): 1.0}, least))
+            if (most := largest.get(key, np.inf)) < np.inf:
+                rows.append(({len(slots): -1.0}, -most / _effect_scale(effect, key)))
+            slots.append(Slot("effects", component=number, index=index, key=key))
+            start.append(one / _effect_scale(effect, key))
+
+
+def _interval(
+    channel: str,
+    number: int,
+    component: Component,
+    slots: list[Slot],
+    start: list[float],
+    rows: Rows,
+) -> None:
+    """A component's interval; ends at the ends of the range stay there."""
+    a, b = component.interval
+    at: dict[int, int] = {}
+    for index, (end, stays) in enumerate(((a, a <= 0), (b, b >= 1))):
+        if stays:
+            continue
+        at[index] = len(slots)
+        slots.append(Slot("intervals", channel, number, index))
+        start.append(end)
+        rows.append(({at[index]: 1.0}, 0.0))
+        rows.append(({at[index]: -1.0}, -1.0))
+    width = {at[1]: 1.0} if 1 in at else {}
+    if 0 in at:
+        width[at[0]] = -1.0
+    if width:
+        fixed = (0.0 if 1 in at else b) - (0.0 if 0 in at else a)
+        rows.append((width, NARROWEST - fixed))

@@ -1,0 +1,99 @@
+"""One joint of a model by itself in C++: its profile is given each time, all else is fixed."""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import mujoco
+
+from joda._context import Context
+from joda._core import Solo
+from joda.effects import EndStopRestitution
+from joda.joints.rig import gravity_factors
+from joda.profile import CHANNELS, Profile
+from joda.scenes.limits import limit_parameters
+
+if TYPE_CHECKING:
+    from joda.joints import solo
+
+ONLY_SLIDES = 2
+"""In `mjModel.body_simple`."""
+
+
+@dataclass(frozen=True)
+class Single:
+    """A joint of a model but for its profile.
+
+    Attributes:
+        inertia: without added inertia, kg·m² or kg.
+        row_inertia: what MuJoCo's rows take for it where the body only slides; 0: all of it.
+        weight: hinge: factors of cos q and sin q of gravity's torque, N·m; slide: force, N, and 0.
+        hinge: whether it is a hinge.
+        solref, solimp: of the ends of the range.
+    """
+
+    inertia: float
+    row_inertia: float
+    weight: tuple[float, float]
+    hinge: bool
+    solref: tuple[float, ...]
+    solimp: tuple[float, ...]
+
+    def solo(self, profile: Profile, h: float) -> Solo:
+        """The joint with a profile, for steps of h (s)."""
+        texts = []
+        for name in CHANNELS:
+            channel = getattr(profile.channels, name)
+            texts += [channel.text(), channel.combine]
+        texts.append("; ".join(effect.text() for effect in profile.effects))
+        solref, solimp = self.limits(profile, h)
+        lo, hi = profile.joint.range
+        fixed = self.inertia, self.row_inertia, self.weight, self.hinge
+        return Solo(lo, hi, texts, *fixed, solref, solimp)
+
+    def without_weight(self) -> "Single":
+        """The same joint where there is no gravity."""
+        return replace(self, weight=(0.0, 0.0))
+
+    def limits(self, profile: Profile, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Solver parameters of the ends of the range, solref and solimp, for steps of h (s)."""
+        for effect in profile.effects:
+            if isinstance(effect, EndStopRestitution):
+                words = limit_parameters(round(effect.restitution, 3), h)
+                solref, solimp = (tuple(map(float, text.split())) for text in words)
+                return solref, (*solimp, *self.solimp[len(solimp) :])
+        return self.solref, self.solimp
+
+
+def single(context: Context, profile: Profile, model: mujoco.MjModel, joint: int) -> Single:
+    """A joint of a compiled model.
+
+    Args:
+        context: of the joint, which may carry the profile.
+        profile: that it carries.
+        model: its scene.
+        joint: its id there.
+    """
+    hinge = context.joint.type == "hinge"
+    slides = model.body_simple[model.jnt_bodyid[joint]] == ONLY_SLIDES
+    weight = gravity_factors(context) if hinge else (context.gravity_force[0], 0.0)
+    return Single(
+        inertia=context.equivalent_inertia - profile.added_inertia,
+        row_inertia=float(1 / model.dof_invweight0[model.jnt_dofadr[joint]]) if slides else 0.0,
+        weight=(float(weight[0]), float(weight[1])),
+        hinge=hinge,
+        solref=tuple(map(float, model.jnt_solref[joint])),
+        solimp=tuple(map(float, model.jnt_solimp[joint])),
+    )
+
+
+def of_solo(joint: "solo.Solo") -> Single:
+    """The same joint as one in JAX, without its profile."""
+    first, second = map(float, joint.gravity)
+    return Single(
+        inertia=float(joint.inertia),
+        row_inertia=0.0 if joint.seen is None else float(joint.seen),
+        weight=(first, second),
+        hinge=joint.hinge,
+        solref=tuple(map(float, joint.solref)),
+        solimp=tuple(map(float, joint.solimp)),
+    )

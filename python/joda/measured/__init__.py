@@ -1,0 +1,1 @@
+"""Measured runs and curves: read, checked, and compared with a model."""

@@ -1,0 +1,234 @@
+"""Quasi-static curves: the force that slowly moves a joint, measured by hand and by the model.
+
+Nothing moves fast, so that neither inertia nor damping matters. What both directions of travel have
+in common is force by position (conservative, gravity); half of what they differ by is friction.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._context import Context
+from joda.effects import GravityOffset, LoadDependentFriction
+from joda.errors import JodaError
+from joda.field.reference import evaluate
+from joda.joints.resistance import friction_bounds
+from joda.joints.rig import gravity_factors
+from joda.measured import smoothing
+from joda.measured.runs import QuasiStatic
+from joda.profile import Profile
+
+Array = NDArray[np.float64]
+
+BACK = 8.0
+"""So many noises a joint must come back to have turned: slow travel is full of small returns."""
+BACK_MOST = 0.25
+"""And at most this share of what was visited."""
+TURN = 4.0
+"""Within so many noises of a turn the direction is not known."""
+SLOW = 0.8
+"""Noise of at least so many usual steps between samples blurs a turn."""
+LEAST = 5
+"""Fewest samples in one direction that tell the noise."""
+
+
+@dataclass(frozen=True)
+class Gauged:
+    """A measured curve and the model's; arrays of shape (n,).
+
+    Attributes:
+        curve: measured.
+        direction: of travel, 1 or -1; 0 where it is not known.
+        force: the model's in that direction, N·m or N; NaN where the direction is not known.
+        sigma: noise of the measured force, N·m or N.
+        doubt: of the difference: that noise, and what the position's noise makes of the model's.
+    """
+
+    curve: QuasiStatic
+    direction: Array
+    force: Array
+    sigma: float
+    doubt: Array
+
+    @property
+    def excess(self) -> Array:
+        """Force towards +q that the model has too much where the direction is known, N·m or N."""
+        known = self.direction != 0
+        return np.asarray(self.curve.force[known] - self.force[known])
+
+
+def static_force(
+    profile: Profile, context: Context, position: Array, direction: Array | float
+) -> Array:
+    """The force from outside that slowly moves the joint, N·m or N.
+
+    Against all that depends on the position, and the friction at the lowest speed (Stribeck's
+    included); where friction grows with the load, this force is itself part of the load.
+
+    Args:
+        profile: all that acts on the joint but gravity (`joda.scenes.native`).
+        context: the joint, with its gravity.
+        position: rad or m, shape (n,).
+        direction: of travel, 1 or -1, shape (n,) or one for all.
+
+    Returns:
+        shape (n,).
+
+    Raises:
+        JodaError: friction grows with the load as fast as the load or faster.
+    """
+    lo, hi = profile.joint.range
+    s = (position - lo) / (hi - lo)
+    weight, growth = _gravity(context, position), 0.0
+    own = evaluate(profile.channels.conservative, s)[0]
+    for effect in profile.effects:
+        if isinstance(effect, GravityOffset):
+            own = own + effect.sin * np.sin(position) + effect.cos * np.cos(position) + effect.force
+        elif isinstance(effect, LoadDependentFriction):
+            growth = effect.coefficient
+    if growth >= 1:
+        raise JodaError(
+            f"joint '{profile.joint.name}': load_dependent_friction with coefficient {growth:g} "
+            "holds against any force; give one below 1."
+        )
+    up, down = friction_bounds(profile, s)
+    unloaded = np.where(np.asarray(direction) > 0, up, -down) - own
+    # The load is `unloaded` + direction * growth * |load|, of the same sign.
+    load = unloaded / (1 - growth * np.sign(unloaded) * direction)
+    return np.asarray(load - weight)
+
+
+def _gravity(context: Context, position: Array) -> Array:
+    """Gravity's force, as on the rig; N·m or N."""
+    if context.joint.type == "slide":
+        return np.full(len(position), context.gravity_force[0])
+    cos, sin = gravity_factors(context)
+    return np.asarray(cos * np.cos(position) + sin * np.sin(position))
+
+
+# --- what a curve tells of itself
+def position_noise(position: Array) -> float:
+    """Noise of positions in the order measured, rad or m; uneven steps count as noise too."""
+    return smoothing.noise(np.arange(float(len(position))), position)
+
+
+def force_noise(position: Array, force: Array, direction: Array) -> float:
+    """Noise of the force, N·m or N, from its differences over position in either direction.
+
+    The smaller one of what second and fourth differences tell: curves' corners are in more fourth
+    differences, what bends all along is in second ones.
+
+    Args:
+        position: rad or m, shape (n,).
+        force: N·m or N, shape (n,).
+        direction: of travel, 1 or -1, shape (n,).
+
+    Returns:
+        its standard deviation, of a gauge with coarse steps at least theirs; else 0 for fewer than
+        5 samples in either direction.
+    """
+    squares, samples = np.zeros(2), 0
+    apart = 1e-9 * float(np.ptp(position))  # what was measured twice at a place still differs
+    for way in (1, -1):
+        there = np.flatnonzero(direction == way)
+        there = there[np.argsort(position[there], kind="stable")]
+        if len(there) >= LEAST:
+            x, y = position[there] + apart * np.arange(len(there)), force[there]
+            noises = np.array([_second_differences(x, y), smoothing.noise(x, y)])
+            squares, samples = squares + len(there) * noises**2, samples + len(there)
+    white = float(np.sqrt(squares.min() / max(samples, 1)))
+    return max(white, smoothing.resolution(force) / 12**0.5)
+
+
+def _second_differences(x: Array, y: Array) -> float:
+    """As `smoothing.noise`, which takes fourth ones."""
+    a, b = x[1:-1] - x[:-2], x[2:] - x[1:-1]
+    weights = np.stack([b, -a - b, a])
+    weights /= np.sqrt((weights**2).sum(axis=0))
+    bent = (weights * np.stack([y[:-2], y[1:-1], y[2:]])).sum(axis=0)
+    return smoothing.deviation(bent)
+
+
+def directions(position: Array, noise: float) -> Array:
+    """Directions of travel, from the order measured.
+
+    Args:
+        position: rad or m, shape (n,).
+        noise: of it, rad or m. The joint turns only where it comes back by several noises.
+
+    Returns:
+        1 or -1, shape (n,); 0 where it is not known: at a turn, within the noise of it, and where
+        the joint never moved.
+    """
+    heading, turns = _turns(position, min(BACK * noise, BACK_MOST * float(np.ptp(position))))
+    begins, ends = [0, *(last for _, last in turns)], [*(first for first, _ in turns), -1]
+    usual = float(np.median(np.abs(np.diff(position))))
+    blurred = TURN * noise if noise > SLOW * usual else 0.0
+    out = np.zeros(len(position))
+    for k, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        stroke = slice(begin, end + 1 or None)
+        out[stroke] = heading * (-1) ** k
+        for turn, _ in turns[max(k - 1, 0) : k + 1]:
+            out[stroke][np.abs(position[stroke] - position[turn]) < blurred] = 0
+    out[[first for first, last in turns if first == last]] = 0
+    return out
+
+
+def _turns(position: Array, back: float) -> tuple[int, list[tuple[int, int]]]:
+    """The first direction, and where it turns: the first and the last sample at that place."""
+    first, heading, low, high = 0, 0, 0, 0
+    turns: list[int] = []
+    for k, here in enumerate(position):
+        low = k if here < position[low] else low
+        high = k if here > position[high] else high
+        if heading >= 0 and position[high] - here > back:
+            turns += [high] if heading else []
+            heading, low = -1, k
+        elif heading <= 0 and here - position[low] > back:
+            turns += [low] if heading else []
+            heading, high = 1, k
+        first = first or heading
+    return first, [(turn, _last_there(position, turn)) for turn in turns]
+
+
+def _last_there(position: Array, first: int) -> int:
+    moved = np.flatnonzero(position[first:] != position[first])
+    return first + int(moved[0]) - 1
+
+
+# --- against a model
+def gauged(curve: QuasiStatic, profile: Profile, context: Context) -> tuple[Gauged, list[str]]:
+    """A curve beside the model's, and notes on what it cannot tell.
+
+    Raises:
+        JodaError: the curve tells nothing.
+    """
+    unit = context.joint.force_unit
+    if not curve.force.any():
+        raise JodaError(
+            f"{curve.name}: the force is zero everywhere; record the force ({unit}) that slowly "
+            "moves the joint."
+        )
+    position, blur = curve.position, position_noise(curve.position)
+    direction = directions(position, blur)
+    up, down = int((direction > 0).sum()), int((direction < 0).sum())
+    if max(up, down) < LEAST:
+        raise JodaError(
+            f"{curve.name}: {up} samples towards +q and {down} towards \N{MINUS SIGN}q are too few "
+            f"to tell anything; record at least {LEAST} in one direction, better 20 in both."
+        )
+    notes = []
+    if not up or not down:
+        way = "+q" if up else "\N{MINUS SIGN}q"
+        notes.append(
+            f"{curve.name}: the joint travels towards {way} only, so friction and forces by "
+            "position cannot be told apart; measure the way back too."
+        )
+    noise = force_noise(position, curve.force, direction)
+    sigma = max(noise, 1e-6 * float(np.abs(curve.force).max()))
+    low, force, high = (
+        static_force(profile, context, position + off, direction) for off in (-blur, 0.0, blur)
+    )
+    known = np.where(direction == 0, np.nan, force)
+    return Gauged(curve, direction, known, sigma, np.hypot(sigma, (high - low) / 2)), notes

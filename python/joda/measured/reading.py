@@ -1,0 +1,114 @@
+"""A joint of a model with what was measured of it, read from files and checked."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._context import Context, context
+from joda.errors import JodaError
+from joda.joints.single import Single, single
+from joda.measured import smoothing
+from joda.measured.gauge import Gauged, gauged
+from joda.measured.replay import Replayer
+from joda.measured.runs import QuasiStatic, Run, read_measurement
+from joda.measured.suspicions import suspicions
+from joda.profile import Profile
+from joda.scenes.model import describe_joint, find_joint, joint_name, load
+from joda.scenes.native import whole_profile
+from joda.scenes.scene import profiles_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A joint of a model with measured runs and quasi-static curves.
+
+    Attributes:
+        context: of the joint.
+        profile: all that acts on it (`joda.scenes.native`).
+        single: all of the joint but its profile.
+        timestep: of the model, s.
+        replayer: of that profile.
+        runs: measured.
+        sigma: noise of each run's position, rad or m.
+        curves: measured, each beside the model's.
+        notes: what is suspicious about them.
+    """
+
+    context: Context
+    profile: Profile
+    single: Single
+    timestep: float
+    replayer: Replayer
+    runs: tuple[Run, ...]
+    sigma: tuple[float, ...]
+    curves: tuple[Gauged, ...]
+    notes: tuple[str, ...]
+
+    def changed(
+        self, profile: Profile | None = None, runs: Sequence[int] | None = None
+    ) -> "Measured":
+        """The same joint with another profile, or with some of its runs only."""
+        numbers = range(len(self.runs)) if runs is None else runs
+        new = self.profile if profile is None else profile
+        return replace(
+            self,
+            profile=new,
+            replayer=self.replayer
+            if profile is None
+            else Replayer(self.context, new, self.single, self.timestep),
+            runs=tuple(self.runs[k] for k in numbers),
+            sigma=tuple(self.sigma[k] for k in numbers),
+        )
+
+    def paths(self) -> list[Array]:
+        """Predicted positions of all runs, rad or m; NaN from where the force is not known."""
+        pairs = zip(self.runs, self.sigma, strict=True)
+        return [self.replayer.whole(run, sigma) for run, sigma in pairs]
+
+    def with_runs(self, runs: tuple[Run, ...]) -> "Measured":
+        """The same joint with parts of its runs, one of each."""
+        return replace(self, runs=runs)
+
+
+def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
+    """Reads a joint and what was measured; raises JodaError, also for what cannot be of it."""
+    if not runs:
+        raise JodaError("no runs; give at least one CSV file with time and position.")
+    source = Path(model)
+    spec, compiled = load(source)
+    number = find_joint(compiled, joint)
+    name = joint_name(compiled, number)
+    found = context(source, name)
+    bare = Profile(joint=describe_joint(compiled, number))
+    profile = whole_profile(compiled, number, profiles_of(spec, compiled).get(name, bare))
+    read = [read_measurement(path) for path in runs]
+    doubts = [doubt for run in read for doubt in suspicions(run, found)]
+    for doubt in doubts:
+        if doubt.fatal:
+            raise JodaError(doubt.sentence)
+    notes = [doubt.sentence for doubt in doubts]
+    curves = []
+    for curve in read:
+        if isinstance(curve, QuasiStatic):
+            beside, more = gauged(curve, profile, found)
+            curves.append(beside)
+            notes += more
+    timed = tuple(run for run in read if isinstance(run, Run))
+    least = 1e-6 * float(np.ptp(profile.joint.range))
+    own, step = single(found, profile, compiled, number), float(compiled.opt.timestep)
+    return Measured(
+        context=found,
+        profile=profile,
+        single=own,
+        timestep=step,
+        replayer=Replayer(found, profile, own, step),
+        runs=timed,
+        sigma=tuple(max(smoothing.noise(run.time, run.position), least) for run in timed),
+        curves=tuple(curves),
+        notes=tuple(notes),
+    )

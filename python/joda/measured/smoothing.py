@@ -1,0 +1,158 @@
+"""Position, velocity and noise from a measured position: the one smoother there is.
+
+Around each time a parabola is fitted by least squares to the samples near it (Savitzky and Golay's
+smoother, for uneven sampling too), in the widest of a few windows whose velocity agrees with those
+of all narrower ones: the rule of intersecting confidence intervals (Goldenshluger and Nemirovski,
+1997). What the parabola bends is told by a cubic in the same window.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+WINDOWS = (0.02, 0.03, 0.045, 0.07)
+"""Half widths (s) that are tried, from the narrowest on."""
+LEAST = 7
+"""Fewest samples in a window."""
+REST = 2.0
+CONFIDENCE = 1.0
+"""Half width of the intervals, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """Smoothed samples; arrays of shape (n,).
+
+    Attributes:
+        position: rad or m.
+        velocity: rad/s or m/s.
+        position_error, velocity_error: their standard deviations, twice what the noise makes, as
+            the widest window may bend the motion by as much; to the velocity's is added, as squares
+            add, by how much a cubic's velocity differs.
+    """
+
+    position: Array
+    velocity: Array
+    position_error: Array
+    velocity_error: Array
+
+
+def rests(velocity: float, error: float) -> bool:
+    """Whether a joint at the beginning of a run counts as at rest: within twice the error."""
+    return abs(velocity) < REST * error
+
+
+def noise(time: Array, position: Array) -> float:
+    """Standard deviation of the noise in a position, from what a local cubic cannot follow.
+
+    Fourth divided differences, scaled to that of white noise; their median, so that knocks and
+    stops hardly count. Of a quantised position at least the steps' own, a twelfth of their square.
+
+    Args:
+        time: s, shape (n,).
+        position: shape (n,).
+
+    Returns:
+        in the position's unit; 0 for fewer than 5 samples.
+    """
+    if len(time) < 5:
+        return 0.0
+    white = deviation(departures(time, position))
+    return max(white, resolution(position) / 12**0.5)
+
+
+def deviation(values: Array) -> float:
+    """Standard deviation of noise about zero, from the median, which outliers hardly move."""
+    # Median of |x| of a normal distribution is 0.6745 of its standard deviation.
+    return float(np.median(np.abs(values)) / 0.6745)
+
+
+def departures(time: Array, position: Array) -> Array:
+    """Fourth divided differences of a position, scaled to white noise's standard deviation.
+
+    Args:
+        time: s, shape (n,), at least 5.
+        position: shape (n,).
+
+    Returns:
+        about the samples from the third to the last but two, in their unit; shape (n - 4,).
+    """
+    n = len(time)
+    t = np.stack([time[k : n - 4 + k] for k in range(5)], axis=1)
+    y = np.stack([position[k : n - 4 + k] for k in range(5)], axis=1)
+    gaps = t[:, :, None] - t[:, None, :]
+    np.einsum("nkk->nk", gaps)[:] = 1.0
+    weights = 1 / gaps.prod(axis=2)
+    weights /= np.sqrt((weights**2).sum(axis=1, keepdims=True))
+    return np.asarray((weights * y).sum(axis=1))
+
+
+def resolution(position: Array) -> float:
+    """Smallest step of a quantised signal, in its unit; 0 where it is not seen to be quantised."""
+    values = np.unique(position)
+    steps = np.diff(values)
+    steps = steps[steps > 1e-6 * (values[-1] - values[0])]  # smaller ones are rounding
+    if len(steps) < 3:
+        return 0.0
+    for parts in (1, 2, 3):  # the smallest difference that occurs may be a few steps
+        step = steps.min() / parts
+        near = steps[steps < 10 * step * parts]
+        counts = np.round(near / step)
+        if 2 * len(near) > len(steps) and np.mean(np.abs(near / step - counts) < 0.15) > 0.95:
+            return float(near.sum() / counts.sum())
+    return 0.0
+
+
+def smooth(time: Array, position: Array, at: Array, sigma: float) -> Smooth:
+    """Position and velocity at some times.
+
+    Args:
+        time: s, increasing, shape (n,).
+        position: shape (n,).
+        at: times, shape (m,).
+        sigma: noise of the position.
+
+    Returns:
+        arrays of shape (m,).
+    """
+    return Smooth(*np.array([_local(time, position, t0, sigma) for t0 in at]).T)
+
+
+def _local(time: Array, position: Array, t0: float, sigma: float) -> tuple[float, ...]:
+    """Position, velocity and their errors at one time."""
+    near = _window(time, position, t0, sigma)
+    t, y = time[near] - t0, position[near]
+    value, slope, value_error, slope_error = _polynomial(t, y, sigma, 2)
+    bent = _polynomial(t, y, sigma, 3)[1] - slope
+    return value, slope, 2 * value_error, float(np.hypot(2 * slope_error, bent))
+
+
+def _window(time: Array, position: Array, t0: float, sigma: float) -> NDArray[np.intp]:
+    """The widest window, as indices, whose velocity agrees with those of all narrower ones."""
+    away = np.abs(time - t0)
+    widest = np.sort(np.argsort(away, kind="stable")[: min(LEAST, len(time))])
+    least = len(widest)
+    low, high = -np.inf, np.inf
+    for half in WINDOWS:
+        near = np.flatnonzero(away <= half)
+        if len(near) < least:
+            continue
+        _, slope, _, error = _polynomial(time[near] - t0, position[near], sigma, 2)
+        low, high = max(low, slope - CONFIDENCE * error), min(high, slope + CONFIDENCE * error)
+        if low > high:
+            break
+        widest = near
+    return widest
+
+
+def _polynomial(t: Array, y: Array, sigma: float, degree: int) -> tuple[float, float, float, float]:
+    """Value and slope at t = 0, and their standard deviations."""
+    scale = np.abs(t).max()
+    A = np.vander(t / scale, min(degree + 1, len(t)), increasing=True)
+    covariance = np.linalg.inv(A.T @ A)
+    fit = covariance @ A.T @ y
+    errors = sigma * np.sqrt(np.diag(covariance))
+    return fit[0], fit[1] / scale, errors[0], errors[1] / scale

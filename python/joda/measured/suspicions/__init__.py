@@ -1,0 +1,52 @@
+"""What looks wrong in a measurement, each as a sentence for a person, before anything is fitted.
+
+A check speaks only when it is sure: what good measurements do too (knocks, latches, noise, coarse
+encoders, slow pulls) is no suspicion.
+"""
+
+from joda._context import Context
+from joda.measured.runs import QuasiStatic, Run
+from joda.measured.smoothing import resolution
+from joda.measured.suspicions.base import Kind, Suspicion, suspect
+from joda.measured.suspicions.force import balance_of_curve, balance_of_run, wrong_sign
+from joda.measured.suspicions.position import coarse, hardly_moved, noise, placed
+from joda.measured.suspicions.timing import gapped, repeated, slowly_sampled, uneven
+from joda.measured.suspicions.velocity import wrong_velocity
+
+LEAST_RUN, LEAST_CURVE = 20, 5
+"""Fewest samples of which anything can be told."""
+
+
+def suspicions(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
+    """What looks wrong in a measurement of a joint.
+
+    Args:
+        run: a timed run or a quasi-static curve.
+        context: of the joint; its range, inertia and gravity are compared with the measurement.
+
+    Returns:
+        the suspicions; none where nothing looks wrong.
+    """
+    timed, unit = isinstance(run, Run), context.joint.unit
+    n, least = len(run.position), LEAST_RUN if timed else LEAST_CURVE
+    if n < least:
+        told = f"{n} samples are too few to tell anything; record at least {least}"
+        return [suspect(run, "short", told)]
+    found, position = placed(run, context)
+    step, sigma = resolution(position), noise(run, position)
+    sentences: dict[Kind, str] = {}
+    if still := hardly_moved(position, context, step, sigma):
+        sentences = {"still": still}
+    elif isinstance(run, Run):
+        sentences = {
+            "resolution": coarse(position, step, sigma, unit),
+            "uneven_time": uneven(run),
+            "gap": gapped(run),
+            "stale": repeated(run, position, step),
+            "slow_sampling": slowly_sampled(run, position, step, unit),
+            "velocity": wrong_velocity(run, position, unit),
+            "force_sign": wrong_sign(balance_of_run(run, position, sigma, context)),
+        }
+    else:
+        sentences = {"force_sign": wrong_sign(balance_of_curve(run, position))}
+    return found + [suspect(run, kind, told) for kind, told in sentences.items() if told]

@@ -1,0 +1,45 @@
+"""What a check says: a suspicion of one kind, as a sentence."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from joda.measured.runs import QuasiStatic, Run
+
+Kind = Literal[
+    "short",
+    "still",
+    "degrees",
+    "millimetres",
+    "sign",
+    "zero",
+    "outside",
+    "resolution",
+    "uneven_time",
+    "gap",
+    "stale",
+    "slow_sampling",
+    "velocity",
+    "force_sign",
+]
+
+FATAL = {"short", "degrees", "millimetres", "sign", "zero"}
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """Something that looks wrong.
+
+    Attributes:
+        kind: in one word.
+        sentence: names the file, says what is wrong, with numbers and units, and what to do.
+        fatal: the data cannot be used as they are.
+    """
+
+    kind: Kind
+    sentence: str
+    fatal: bool
+
+
+def suspect(run: Run | QuasiStatic, kind: Kind, told: str) -> Suspicion:
+    """A suspicion of a file; fatal by its kind."""
+    return Suspicion(kind, f"{run.name}: {told}.", kind in FATAL)

@@ -1,0 +1,137 @@
+"""Where the joint was: unit, sign, zero and range of its positions, and how fine they are."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._context import Context
+from joda.measured import smoothing
+from joda.measured.runs import QuasiStatic, Run
+from joda.measured.suspicions.base import Kind, Suspicion, suspect
+
+Array = NDArray[np.float64]
+
+STILL = 2e-3
+"""Share of the range; a joint that moved less hardly moved."""
+ROOM, SOFTNESS, MOST_ROOM = 0.02, 0.015, 0.1
+"""How far beyond its range a joint may be: a share of the range, and as far as it goes in so many
+seconds at its highest speed, for a soft stop; as a share of the range, at most."""
+FEW = 0.02
+"""Share of samples, beyond the range, that may be single wrong values."""
+STEPS = 40
+"""An encoder with fewer steps over what the joint visited is coarse."""
+
+
+def noise(run: Run | QuasiStatic, position: Array) -> float:
+    """Noise of the positions, rad or m; of a curve none is known."""
+    return smoothing.noise(run.time, position) if isinstance(run, Run) else 0.0
+
+
+def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], Array]:
+    """What is wrong with unit, sign, zero and range; and the positions without it."""
+    glitches, position = _outside(run, run.position, context)
+    if 0 < np.sum(position != run.position) <= max(FEW * len(position), 3):
+        return glitches, position
+    found, position = _unit(run, context)
+    if _fits(run, position, context):
+        return found, position
+    lo, hi = context.joint.range
+    unit, at = context.joint.unit, _range(context)
+    visited = f"positions {_from_to(position)} {unit}"
+    if _fits(run, -position, context):
+        told = (
+            f"{visited} lie in minus {at}; turn their sign, or if only their zero is elsewhere, "
+            f"add {lo - position.min():.4g} {unit} or more"
+        )
+        return [*found, suspect(run, "sign", told)], -position
+    if np.ptp(position) <= hi - lo + _room(run, position, context):
+        shift = hi - position.max() if position.max() > hi else lo - position.min()
+        told = (
+            f"{visited} fit into {at} only if shifted by {shift:.4g} {unit} or more; measure them "
+            "from the joint's zero, or correct the model's range"
+        )
+        return [*found, suspect(run, "zero", told)], position + shift
+    return [*found, *_outside(run, position, context)[0]], position
+
+
+def _unit(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], Array]:
+    """Whether the unit is wrong; and the positions in the right one."""
+    hinge, (lo, hi) = context.joint.type == "hinge", context.joint.range
+    far, many = (3.0, 180 / np.pi) if hinge else (10.0, 1000.0)
+    position = run.position / many
+    fits = np.ptp(position) <= hi - lo + 2 * _room(run, position, context)
+    if np.ptp(run.position) < far * (hi - lo) or not fits:
+        return [], run.position
+    kind: Kind = "degrees" if hinge else "millimetres"
+    told = (
+        f"positions {_from_to(run.position)} are far beyond {_range(context)} and look like "
+        f"{kind}; {'multiply them by π/180' if hinge else 'divide them by 1000'}"
+    )
+    return [suspect(run, kind, told)], position
+
+
+def _outside(
+    run: Run | QuasiStatic, position: Array, context: Context
+) -> tuple[list[Suspicion], Array]:
+    """Whether some samples lie outside the range; and the positions with these filled in."""
+    lo, hi = context.joint.range
+    beyond = np.maximum(lo - position, position - hi)
+    wrong = beyond > _room(run, position, context)
+    if not wrong.any():
+        return [], position
+    told = (
+        f"{run.name}: {wrong.sum()} of {len(position)} samples lie outside {_range(context)}, by "
+        f"up to {beyond.max():.3g} {context.joint.unit}; remove wrong samples, or correct the "
+        "model's range."
+    )
+    fatal = bool(beyond.max() > MOST_ROOM * (hi - lo))
+    suspicion = Suspicion("outside", told, fatal)
+    if wrong.all():
+        return [suspicion], position
+    before = position[~wrong][np.maximum(np.cumsum(~wrong) - 1, 0)]
+    return [suspicion], np.where(wrong, before, position)
+
+
+def _fits(run: Run | QuasiStatic, position: Array, context: Context) -> bool:
+    (lo, hi), room = context.joint.range, _room(run, position, context)
+    return bool(position.min() >= lo - room and position.max() <= hi + room)
+
+
+def _room(run: Run | QuasiStatic, position: Array, context: Context) -> float:
+    """How far beyond its range the joint may seem to be; rad or m."""
+    span = context.joint.range[1] - context.joint.range[0]
+    room = ROOM * span
+    if isinstance(run, Run):
+        m = min(max(round(0.02 / np.median(np.diff(run.time))), 1), len(position) - 1)
+        travel = np.abs(position[m:] - position[:-m]) / (run.time[m:] - run.time[:-m])
+        room += 5 * noise(run, position) + SOFTNESS * travel.max()
+    return float(min(room, MOST_ROOM * span))
+
+
+def hardly_moved(position: Array, context: Context, step: float, sigma: float) -> str:
+    """Speaks where the joint hardly moved."""
+    moved, (lo, hi) = float(np.ptp(position)), context.joint.range
+    # What is sampled too slowly seems to be noise; hence the bound.
+    if moved > max(STILL * (hi - lo), min(10 * sigma, 0.03 * (hi - lo)), 2 * step):
+        return ""
+    told = f"the joint hardly moved, {moved:.2g} {context.joint.unit} of {hi - lo:.3g}"
+    return f"{told}; record a run in which it moves"
+
+
+def coarse(position: Array, step: float, sigma: float, unit: str) -> str:
+    """Speaks where the encoder is coarse."""
+    if step < np.ptp(position) / STEPS or step < 1.7 * sigma:
+        return ""
+    return (
+        f"positions come in steps of {step:.2g} {unit}, only "
+        f"{np.ptp(position) / step:.0f} over what the joint visited, so slow motion is hardly "
+        "seen; use a finer encoder if you can"
+    )
+
+
+def _range(context: Context) -> str:
+    lo, hi = context.joint.range
+    return f"the range {lo:.4g} to {hi:.4g} {context.joint.unit}"
+
+
+def _from_to(position: Array) -> str:
+    return f"{position.min():.4g} to {position.max():.4g}"

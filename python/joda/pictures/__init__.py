@@ -1,0 +1,1 @@
+"""What is shown: figures, pages, pictures and films of scenes."""

@@ -1,0 +1,77 @@
+"""What was proposed and what came of it, round by round: `history.json`."""
+
+from typing import Literal
+
+from joda.component import Frozen
+from joda.interaction.behaviour import Behaviour
+from joda.profile import File
+from joda.proposal import Proposal
+from joda.propose import Usage, total
+
+
+class Round(Frozen):
+    """A round.
+
+    Attributes:
+        number: from 1.
+        proposer: who proposed.
+        complaint: what the user had said before it; empty if nothing.
+        proposal: what was proposed.
+        behaviour: how the joint then behaved in simulation.
+        facts: the same in a few lines.
+        unmet: what was wished for and did not come, a sentence each.
+        notes: what the proposer had to say besides.
+        usage: what it cost.
+    """
+
+    number: int
+    proposer: str
+    complaint: str = ""
+    proposal: Proposal
+    behaviour: Behaviour
+    facts: str
+    unmet: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    usage: Usage = Usage()
+
+
+class Failure(Frozen):
+    """A request that gave no proposal, and what it cost all the same."""
+
+    reason: str
+    usage: Usage = Usage()
+
+
+class History(File):
+    """The content of `history.json`.
+
+    Attributes:
+        model: path of the MJCF or URDF file, relative to the folder that the history is in.
+        joint: its name or address in it.
+        description: what the user wants of the joint, in words.
+        templates: further folders of templates, relative as the model.
+        key: with which proposals are compiled.
+        pictures: names of the joint's pictures in `pictures/`; none where nothing could render.
+        complete: whether the proposer had nothing to change any more.
+        rounds: oldest first.
+        failures: requests that gave nothing.
+        composed: SHA-256 of the `composed.json` that the last round left.
+    """
+
+    schema_version: Literal[1] = 1
+    model: str
+    joint: str
+    description: str = ""
+    templates: tuple[str, ...] = ()
+    key: str = ""
+    pictures: tuple[str, ...] | None = None
+    complete: bool = False
+    rounds: tuple[Round, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    composed: str = ""
+
+    @property
+    def usage(self) -> Usage:
+        """What all rounds and failures cost together."""
+        spent = [item.usage for item in self.rounds] + [item.usage for item in self.failures]
+        return total(spent)

@@ -1,0 +1,219 @@
+"""What people say of a joint, and whether a simulated joint does it.
+
+A wish is a behaviour with a sentence that states it. Sentences are read out of descriptions, the
+user's or a proposer's, and checked against the facts. Positions are shares of the way from the
+closed end (0) to the other end (1).
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from joda._context import Context
+from joda.interaction.behaviour import Behaviour
+from joda.propose import checks
+from joda.propose.checks import Seen
+
+Check = Callable[[Seen], str]
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A behaviour that can be wished for.
+
+    Attributes:
+        says: the sentence that states it; {number} where it needs one.
+        phrases: regular expression of the ways to say it; a group `number` where it needs one.
+        check: empty if the joint does it, else what it does instead.
+        denies: whether it is said with a "not", which the phrases leave out.
+    """
+
+    says: str
+    phrases: str
+    check: Check
+    denies: bool = False
+
+
+_CLOSE = r"(?:clos|shut)\w*"
+_SELF = r"\b(?:itself|its own|automatically)"
+_NEAR = r"\b(?:when|once|if|from|for|over|in|within|near\w*|almost|last|final)\b"
+_MIDDLE = r"(?:to|towards|into) (?:the |its )?(?:middle|cent\w+|neutral)"
+_COUNTS = (
+    *("", "", "two", "three", "four", "five", "six"),
+    *("seven", "eight", "nine", "ten", "eleven", "twelve"),
+)
+_COUNT = rf"\d+|{'|'.join(_COUNTS[2:])}"
+WISHES: dict[str, Wish] = {
+    "moves": Wish("can be opened and closed by hand", r"(?!)", checks.moves),
+    "closes_near": Wish(
+        "closes by itself when nearly closed",
+        rf"(?:{_CLOSE}|pull\w* (?:itself |it |the \w+ )?(?:in|shut|closed)|self-?clos\w*|"
+        r"snaps? (?:in|shut))[^.;]*\b(?:when|once|from|if|for|over|in|within)"
+        r"[^.;]*\b(?:near|almost|last|few|final|slightly|little)",
+        checks.closes_near,
+    ),
+    "closes_from": Wish(
+        "closes by itself from {number} degrees on",
+        rf"(?:{_CLOSE}|pull\w* (?:itself |it |the \w+ )?(?:in|shut|closed)|self-?clos\w*)[^.;]*?"
+        rf"\b(?:from|within|over|below|under)\b[^.;]*?\b(?P<number>\d+) ?(?:degrees|deg\b|°)",
+        checks.closes_from,
+    ),
+    "closes_anywhere": Wish(
+        "goes back by itself from anywhere",
+        rf"^(?!.*\b{_MIDDLE}).*(?:"
+        r"(?:go(?:es)?|spring\w*|return\w*|com(?:es?|ing)|swing\w*|clos\w*|shuts?|fall\w*|pull\w*)"
+        r"[^.;]*\bfrom (?:any\w*|every\w*)|spring\w* back|"
+        rf"(?:clos\w*|shuts?)(?![^.;]*{_NEAR})[^.;]*{_SELF}|self[- ]?clos\w*(?![^.;]*{_NEAR})|"
+        rf"automatically clos\w*(?![^.;]*{_NEAR}))",
+        checks.closes_anywhere,
+    ),
+    "left_open": Wish(
+        "does not close by itself",
+        rf"(?:clos|shut|swing|fall)(?![^.;]*\bfrom\b)[^.;]*{_SELF}|self[- ]?clos\w*",
+        checks.left_open,
+        denies=True,
+    ),
+    "opens_past": Wish(
+        "opens by itself from half-way on",
+        r"(?:falls?|opens?|swings?|drops?)\b[^.;]*\b(?:itself|own|open)\b[^.;]*"
+        r"\b(?:half|past|beyond|middle)|falls open",
+        checks.opens_past,
+    ),
+    "held_shut": Wish(
+        "stays shut until it is pulled",
+        r"(?:stays?|held|holds?|kept|keeps?|remains?)\b[^.;]*\b(?:shut|closed)\b",
+        checks.held_shut,
+    ),
+    "caught": Wish(
+        "is caught shut and gives way to a pull",
+        r"\bcaught (?:shut|closed)|"
+        r"^(?!.*magnet)(?=.*\b(?:shut|closed|gives? way)\b).*\bcatch(?:es)?\b",
+        checks.caught,
+    ),
+    "latched": Wish(
+        "latches shut and needs a push to latch",
+        r"\blatch(?:es|ing)\b|\b(?:not|n't|to|must|should|never) latch\b|"
+        r"needs? (?:a|an extra) push to",
+        checks.latched,
+    ),
+    "stays_put": Wish(
+        "stays wherever it is left",
+        r"^(?!.*\b(?:beyond|past|farther|further)\b).*"
+        r"(?:stays?|holds?|remains?|rests?)\b[^.;]*\b(?:wherever|anywhere|any (?:angle|position|"
+        r"place)|where (?:it is|it was|you|left))|free-?stop",
+        checks.stays_put,
+    ),
+    "stays_half": Wish(
+        "holds half-way open",
+        r"(?:stays?|holds?|held|rests?|remains?)\b[^.;]*\b(?:half|middle|mid-|intermediate)",
+        checks.stays_half,
+    ),
+    "stays_open": Wish(
+        "stays fully open",
+        r"(?:stays?|holds?|held|rests?|remains?)\b[^.;]*\b(?:fully|wide|completely) open|"
+        r"stays? open(?![^.;]*\b(?:half|middle|mid-|intermediate))",
+        checks.stays_open,
+    ),
+    "clicks": Wish(
+        "clicks into {number} positions",
+        rf"(?:clicks?|detents?|snaps?|settles?|indexes)\b[^.;]*?\b(?P<number>{_COUNT})\s+"
+        rf"(?:\w+\s+)?(?:positions?|places|detents|stops|steps)|"
+        rf"\b(?P<number2>{_COUNT})\s+(?:detents|clicks?|notches|positions|settings)\b|"
+        r"\b(?:has|have|with|no|without) (?:any |many |distinct )?(?:detents|notches|clicks)\b|"
+        r"(?:not|n't|never) click\b",
+        checks.clicks,
+    ),
+    "two_sides": Wish(
+        "has two stable sides and flips over between them",
+        r"(?<!from )either side|bi-?stable|flips? over|two stable",
+        checks.two_sides,
+    ),
+    "returns_to_middle": Wish(
+        "returns to the middle when let go",
+        rf"(?:returns?|springs?|comes?|goes)\b[^.;]*\b{_MIDDLE}",
+        checks.returns_to_middle,
+    ),
+    "snaps": Wish(
+        "snaps through on the way in",
+        r"snaps? through|snap-?through|pops? (?:in|back)|over-?cent\w+",
+        checks.snaps,
+    ),
+    "free": Wish(
+        "moves on with hardly any resistance",
+        r"\b(?:moves?|turns?|slides?|swings?|opens?|goes)\b[^.;]*\b"
+        r"(?:(?:hardly|barely|scarcely) any|(?:very )?little) (?:resistance|friction)|"
+        r"\b(?:moves?|turns?|slides?|swings?) (?:on )?(?:freely|lightly|easily)\b",
+        checks.free,
+    ),
+    "soft": Wish(
+        "closes softly",
+        r"(?:clos|shut)\w*\b[^.;]*\b(?:soft|gentl|quiet|slow)\w*|soft[- ]?clos\w*|"
+        r"(?:soft|gentl|quiet|slow)ly\b[^.;]*\b(?:clos|shut)",
+        checks.soft,
+    ),
+}
+
+_VERBS = r"stays|holds|closes|shuts|returns|springs|clicks|latches|snaps|goes|falls|opens|remains"
+_AND = re.compile(
+    r"[.!](?:\s|$)|[;\n]|, (?:and|but)\b|\bbut\b|"
+    rf"\band (?=(?:it |then |otherwise )?(?:{_VERBS})\b)"
+)
+_SLAM = re.compile(r"(?:without|never|not|n't) (?:\w+ )?slam\w*")
+NOT = re.compile(r"\b(?:not|never|no|without|cannot|nor|neither)\b|n't\b")
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A wish, with its number if it has one."""
+
+    name: str
+    number: int = 0
+
+    @property
+    def sentence(self) -> str:
+        """What it says."""
+        return WISHES[self.name].says.format(number=self.number)
+
+
+def read_wishes(text: str, *, refused: bool = False) -> list[Wanted]:
+    """The wishes that a description states.
+
+    Args:
+        text: in English.
+        refused: those that it denies instead ("does not close by itself").
+    """
+    found: dict[str, Wanted] = {}
+    for clause in _AND.split(_SLAM.sub("closes softly", text.lower())):
+        denied = bool(NOT.search(clause))
+        for name, wish in WISHES.items():
+            if denied != (refused or wish.denies) or (refused and wish.denies):
+                continue
+            if match := re.search(wish.phrases, clause):
+                groups = match.groupdict()
+                number = groups.get("number") or groups.get("number2") or "0"
+                count = _COUNTS.index(number) if number in _COUNTS else int(number)
+                found.setdefault(name, Wanted(name, count))
+    return list(found.values())
+
+
+def state(wanted: Sequence[Wanted]) -> str:
+    """A description that states these wishes, and is read back as them."""
+    return "; ".join(f"it {wish.sentence}" for wish in wanted).capitalize() + "." if wanted else ""
+
+
+def unmet(wanted: Sequence[Wanted], behaviour: Behaviour, context: Context) -> dict[str, str]:
+    """The wishes that the joint does not fulfil, and that it can be moved at all.
+
+    Args:
+        wanted: the wishes.
+        behaviour: what it does.
+        context: the joint.
+
+    Returns:
+        wish name to a sentence that says what it does instead.
+    """
+    out = {}
+    for wish in (Wanted("moves"), *wanted):
+        if instead := WISHES[wish.name].check(Seen(behaviour, context, wish.number)):
+            out[wish.name] = f"It {wish.sentence}: no, {instead}."
+    return out

@@ -1,0 +1,1 @@
+"""Profiles bent until the simulation moves as was measured."""

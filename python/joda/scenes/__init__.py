@@ -1,0 +1,1 @@
+"""MJCF scenes: read, written, and moved."""

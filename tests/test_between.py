@@ -1,0 +1,126 @@
+"""Fits between the jumps of a force: against planted profiles, and the same joint in JAX."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from refine_table import MODELS, NOISE, STEP, cabinet_profile, errors, planted, quiet_rig
+
+from joda import context
+from joda.joints import single
+from joda.joints.parameters import KINDS, Parameters
+from joda.refining.between import Between
+
+
+def between(case, kinds=("values", "intervals"), profile=None, **changed) -> Between:
+    """A planted case; `changed` is what of the joint is wrong."""
+    model = quiet_rig(case.found, case.true)
+    joint = replace(single.single(case.found, case.true, model, 0), **changed)
+    span = float(np.ptp(case.found.joint.range))
+    return Between(joint, Parameters(profile or case.start, kinds), case.runs, NOISE * span, STEP)
+
+
+def truth(case, parameters: Parameters):
+    """The true numbers in the parameters' units."""
+    true = Parameters(case.true, ("values", "intervals"))
+    return true.start * true.scales / parameters.scales
+
+
+def quiet(theta, misfit) -> None:
+    pass
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        planted("constant_negative_conservative_hinge", 4),
+        planted("constant_friction_hinge", 4),
+        planted("constant_damping_hinge", 13),
+    ],
+    ids=["conservative", "friction", "damping"],
+)
+def test_numbers_are_recovered_although_jumps_are_off(case):
+    joint = between(case)
+    begin = joint.parameters.start.copy()  # strengths off by up to two times
+    jumps = joint._ends(begin)
+    begin[jumps] = truth(case, joint.parameters)[jumps] + [0.008, -0.008]
+    found = joint.fit(begin, 12, quiet)
+    before, after = (errors(case, joint.parameters.written(x)) for x in (begin, found))
+    assert max(rms for rms, _ in before.values()) > 0.1
+    assert max(rms for rms, _ in after.values()) < 0.03
+
+
+def test_jumps_are_moved_to_where_they_are():
+    case = planted("constant_damping_hinge", 13)
+    joint = between(case)
+    true = truth(case, joint.parameters)
+    jumps = joint._ends(true)
+    begin = true.copy()
+    begin[jumps] += [0.012, -0.02]
+    assert joint.fit(begin, 12, quiet)[jumps] == pytest.approx(true[jumps], abs=0.003)
+
+
+def test_windows_between_the_jumps_cross_none():
+    case = planted("constant_positive_conservative_hinge", 1)
+    joint = between(case)
+    judge = joint._clear(truth(case, joint.parameters))
+    assert 0.2 < judge.counts.mean() < 0.9
+    span = float(np.ptp(case.found.joint.range))
+    (component,) = case.true.channels.conservative.components
+    for row in judge.windows.rows[judge.counts]:
+        s = judge.windows.position[row[row >= 0]] / span
+        for end in component.interval:
+            assert s.min() > end or s.max() < end
+
+
+def test_a_curve_that_begins_at_zero_does_not_jump():
+    joint = between(planted("detent_internal", 0))
+    assert not joint._ends(joint.parameters.start)
+    assert joint._clear(joint.parameters.start).counts.all()
+
+
+def test_a_wrong_inertia_is_found():
+    case = planted("constant_friction_hinge", 0)
+    right = case.found.equivalent_inertia
+    joint = between(case, ("inertia",), case.true, inertia=0.8 * right)
+    (found,) = joint.fit(np.zeros(1), 12, quiet)
+    assert np.exp(found) == pytest.approx(1 / 0.8, rel=0.01)
+
+
+def test_what_misses_the_windows_is_worse():
+    case = planted("constant_positive_conservative_hinge", 1)
+    joint = between(case)
+    true = truth(case, joint.parameters)
+    values = np.array([slot.kind == "values" for slot in joint.parameters.slots])
+    assert joint.worse(np.where(values, 1.05 * true, true), true)
+    assert not joint.worse(joint.fit(true, 4, quiet), true)
+
+
+@pytest.mark.parametrize("iterations", [1, 2, 7, 12])
+def test_it_does_not_take_more_iterations_than_it_may(iterations):
+    joint = between(planted("constant_damping_hinge", 0))
+    heard = []
+    joint.fit(joint.parameters.start, iterations, lambda theta, misfit: heard.append(misfit))
+    assert 0 < len(heard) <= iterations
+
+
+def test_every_kind_of_number_does_what_it_does_in_jax():
+    jax_solo = pytest.importorskip("joda.joints.solo")
+    import jax.numpy as jnp
+
+    found = context(MODELS + "/cabinet.xml", "door")
+    profile = cabinet_profile(found, 2.5, 0.4)
+    parameters = Parameters(profile, KINDS)
+    first = jax_solo.from_context(found, profile, quiet_rig(found, profile), 0)
+    joint = Between(single.of_solo(first), parameters, [], 1e-3, STEP)
+    theta = parameters.start + 0.05 * np.random.default_rng(0).uniform(size=len(parameters.start))
+    force = 8 * np.sin(6 * STEP * np.arange(600))
+    start = np.array([[0.3, 0.5]])
+    begin = np.zeros(1, int), start, np.array([True])
+    path = joint.solo(theta).replay(force, *begin, STEP)[1]
+    other = jax_solo.changed(first, parameters.slots, jnp.array(theta * parameters.scales))
+    state = jax_solo.State(*jnp.array([*start[0], 0.0]))
+    np.testing.assert_allclose(
+        path, jax_solo.rollout(other, state, jnp.array(force), STEP)[1:], atol=1e-5
+    )
+    assert np.ptp(path) > 0.5

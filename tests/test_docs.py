@@ -1,0 +1,133 @@
+"""The site is built without a warning, and what its tutorial and how-to pages show runs."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import Stores, get_typestore
+from test_readme import shell
+
+from joda.measured.runs import read_run
+from joda.profile import ATTRIBUTES
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+BLOCK = r"```(\w+)\n(.*?)^```$"
+FLAGS = re.MULTILINE | re.DOTALL
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """The page's blocks of that language, in their order."""
+    found = re.findall(f"^{BLOCK}", (DOCS / page).read_text("utf-8"), FLAGS)
+    return [text for of, text in found if of == language]
+
+
+def write_files(page: str, folder: Path) -> None:
+    """Writes the files that the page shows; the paragraph before ends with their names."""
+    shown = re.findall(
+        rf"^([^\n]+(?:\n[^\n]+)*)\n\n{BLOCK}", (DOCS / page).read_text("utf-8"), FLAGS
+    )
+    for before, language, text in shown:
+        if language in ("xml", "json", "python"):
+            path = folder / re.findall(r"`([\w/]+\.(?:xml|json|py))`", before)[-1]
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text, "utf-8")
+
+
+def run(command: str, folder: Path) -> str:
+    """What the command prints; it must succeed and have nothing to complain about."""
+    result = shell(command, folder)
+    assert (result.returncode, result.stderr) == (0, ""), result
+    return result.stdout
+
+
+def masked(text: str) -> set[str]:
+    """The lines without their numbers: other machines round otherwise."""
+    return {re.sub(r"-?\d[\d.e]*", "#", re.sub(" +", " ", line)) for line in text.splitlines()}
+
+
+@pytest.fixture(scope="module")
+def my_door(tmp_path_factory):
+    """The tutorial's folder after all its commands, and what they printed."""
+    folder = tmp_path_factory.mktemp("my_door")
+    write_files("my_door.md", folder)
+    commands = "".join(blocks("my_door.md", "sh")).splitlines()
+    return folder, [run(command, folder) for command in commands]
+
+
+def test_the_tutorial_finds_the_closer_and_mends_the_model(my_door):
+    _, told = my_door
+    assert masked("".join(blocks("my_door.md", "text"))) <= masked("\n".join(told))
+    found = re.search(r"direction_dependent_damping: .*? ([\d.]+) ± ", "\n".join(told))
+    assert float(found[1]) == pytest.approx(3, rel=0.05)  # as the page's real.json has it
+    assert "By direction" in told[-2]
+    assert "these runs show no fault of the model" in told[-1]
+
+
+def test_a_log_of_mujoco_becomes_a_run(my_door):
+    folder, _ = my_door
+    write_files("howto/logs.md", folder)
+    run("python log.py", folder)
+    done = read_run(folder / "log.csv")
+    assert np.gradient(done.position, done.time) == pytest.approx(done.velocity, abs=0.01)
+    assert "the measurement's noise" in run("joda compare door.xml log.csv --joint hinge", folder)
+
+
+def test_a_ros_bag_becomes_a_run(tmp_path):
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    names = "sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
+    state, header, time = (store.types[name] for name in names)
+    at = np.arange(0, 3, 0.01)
+    with Writer(tmp_path / "recording", version=9) as bag:
+        topic = bag.add_connection("/joint_states", names[0], typestore=store)
+        for t in at:
+            numbers = [np.array([0, value]) for value in (np.sin(t), np.cos(t), 0.1 * t)]
+            stamp = time(sec=7 + int(t), nanosec=round(1e9 * (t % 1)))
+            message = state(header(stamp, ""), ["lamp", "hinge"], *numbers)
+            bag.write(topic, round(1e9 * (t + 9)), store.serialize_cdr(message, names[0]))
+    write_files("howto/logs.md", tmp_path)
+    run("python from_bag.py", tmp_path)
+    done = read_run(tmp_path / "run.csv")
+    assert done.time == pytest.approx(at, abs=1e-6)
+    assert done.position == pytest.approx(np.sin(at))
+    assert done.force == pytest.approx(0.1 * at)
+
+
+def test_templates_effects_and_proposers_of_ones_own(my_door):
+    folder, _ = my_door
+    for page in ("templates", "effect", "proposer"):
+        write_files(f"howto/{page}.md", folder)
+    told = [run(command, folder) for command in blocks("howto/templates.md", "sh")[0].splitlines()]
+    assert "soft_stop" in told[0]
+    (folder / "real.json").rename(folder / "composed.json")
+    run("python stribeck.py", folder)
+    assert "stribeck_friction velocity=0.05" in (folder / "stribeck.xml").read_text()
+    run("joda generate door.xml --joint hinge --proposer offline --rounds 1 -o offline", folder)
+    (folder / "offline" / "proposal.json").rename(folder / "proposal.json")
+    run("python mine.py", folder)
+    assert (folder / "generated" / "scene.xml").exists()
+
+
+def test_a_host_in_cpp(my_door):
+    folder, _ = my_door
+    (folder / "cpp").symlink_to(ROOT / "cpp")
+    (folder / "better.xml").rename(folder / "scene.xml")
+    assert re.match(
+        r"time 5\.\d+\nhinge -?0\.\d+\n", run(blocks("howto/cpp_host.md", "sh")[0], folder)
+    )
+
+
+def test_the_plugin_has_the_attributes_of_the_reference():
+    keys = re.search(r"kKeys[^{]*\{(.*?)\}", (ROOT / "cpp" / "config.cc").read_text(), re.DOTALL)[1]
+    assert sorted(re.findall(r'"(\w+)"', keys)) == sorted(ATTRIBUTES)
+
+
+def test_the_site_is_built_without_a_warning(tmp_path):
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "docs", tmp_path]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "joda simulate" in (tmp_path / "reference" / "commands.html").read_text("utf-8")

@@ -1,0 +1,124 @@
+"""`joda doctor` says what works; here things are broken for it, in processes of their own."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import pytest
+
+import joda
+from joda import _doctor
+
+
+def python(code, *arguments, **environment):
+    """Runs the code; environment variables that are "" are not set."""
+    environment = {**os.environ, "ANTHROPIC_API_KEY": "", **environment}
+    return subprocess.run(
+        [sys.executable, "-P", "-c", code, *arguments],
+        capture_output=True,
+        text=True,
+        env={name: value for name, value in environment.items() if value},
+    )
+
+
+def checks(*parts, **environment):
+    """What these parts of it find, by name."""
+    calls = ", ".join(f"*_doctor._{part}" for part in parts)
+    code = f"""
+import json, sys
+from joda import _doctor
+json.dump([{{**vars(check), "fatal": check.fatal}} for check in [{calls}]], sys.stdout)"""
+    result = python(code, **environment)
+    assert (result.returncode, result.stderr) == (0, "")
+    return {check["what"]: check for check in json.loads(result.stdout)}
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A copy of the package that Python finds before the installed one."""
+    source = Path(joda.__file__).parent
+    shutil.copytree(source, tmp_path / "joda", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path / "joda"
+
+
+def test_all_that_is_needed_works_here():
+    command = "from joda.cli import main; main()"
+    result = python(command, "doctor", ANTHROPIC_API_KEY="sk-not-to-be-seen")
+    assert (result.returncode, result.stderr) == (0, "")
+    lines = [line.rstrip() for line in result.stdout.splitlines()]
+    assert any("gives the right force" in line for line in lines if line.startswith("ok"))
+    assert any(line.startswith("ok") and "extra: mjx" in line for line in lines)
+    assert "ANTHROPIC_API_KEY is set" in result.stdout
+    assert "not-to-be-seen" not in result.stdout
+    assert lines[-1] == "All that joda needs works."
+
+
+def test_another_mujoco_and_no_library_of_the_plugin(package):
+    """With the whole command: it works although joda itself does not."""
+    build = package / "_build.py"
+    build.write_text(build.read_text().replace(mujoco.__version__, "3.17.0"))
+    (package / joda.plugin_path().name).unlink()
+    command = "from joda.cli import main; main()"
+    result = python(command, "doctor", "--json", PYTHONPATH=str(package.parent))
+    assert (result.returncode, result.stderr) == (1, "")
+    told = json.loads(result.stdout)
+    assert not told["ok"]
+    found = {check["what"]: check for check in told["checks"]}
+    assert (found["MuJoCo"]["state"], found["plugin"]["state"]) == ("broken", "missing")
+    assert found["MuJoCo"]["remedy"] == f"run: {sys.executable} -m pip install mujoco==3.17.0"
+    assert "libjoda_plugin is missing" in found["plugin"]["found"]
+    assert found["plugin"]["remedy"].endswith("pip install --force-reinstall --no-deps .")
+
+
+def test_a_plugin_that_is_no_library(package):
+    (package / joda.plugin_path().name).write_text("not a library")
+    plugin = checks("plugin()", PYTHONPATH=str(package.parent))["plugin"]
+    assert (plugin["state"], plugin["fatal"]) == ("broken", True)
+    assert "does not load" in plugin["found"]
+
+
+def test_a_plugin_with_a_wrong_answer(monkeypatch):
+    monkeypatch.setattr(_doctor, "FORCE", 1.4)
+    [plugin] = _doctor._plugin()
+    assert plugin.state == "broken"
+    assert "gives a force of 1.3 N·m where 1.4 is right" in plugin.found
+
+
+def test_modules_that_are_missing_and_broken(tmp_path):
+    missing = "raise ModuleNotFoundError(\"No module named 'anthropic'\")"
+    (tmp_path / "anthropic.py").write_text(missing)
+    for name in ("jax", "scipy"):
+        (tmp_path / f"{name}.py").write_text(f"raise ImportError('{name} is torn')")
+    found = checks("libraries()", "extras()", "key()", PYTHONPATH=str(tmp_path))
+    vlm, mjx, libraries = found["extra: vlm"], found["extra: mjx"], found["libraries"]
+    assert (vlm["state"], mjx["state"], libraries["state"]) == ("missing", "broken", "broken")
+    assert (vlm["fatal"], mjx["fatal"], libraries["fatal"]) == (False, False, True)
+    assert "only if you want it, run: " in vlm["remedy"]
+    assert "pip install 'anthropic>=" in vlm["remedy"]
+    assert "jax is torn" in mjx["found"]
+    assert "'scipy>=" in libraries["remedy"]
+    assert found["key: Claude"]["state"] == "missing"
+
+
+def test_a_hidden_renderer():
+    found = checks("renderers()", __EGL_VENDOR_LIBRARY_FILENAMES="/dev/null", DISPLAY="")
+    egl, osmesa = found["pictures: EGL"], found["pictures: OSMesa"]
+    assert egl["state"] == "broken"
+    assert egl["fatal"] == (osmesa["state"] != "ok")
+    assert ("apt-get install libegl1" in egl["remedy"]) == egl["fatal"]
+    assert found["window: GLX"]["found"] == "no display (DISPLAY is not set)"
+
+
+def test_renderers_that_are_asked_for_and_do_not_work():
+    pictures = checks("renderers()", MUJOCO_GL="disabled")["pictures: MUJOCO_GL=disabled"]
+    assert (pictures["state"], pictures["fatal"]) == ("broken", True)
+    assert "unset MUJOCO_GL" in pictures["remedy"]
+    unknown = checks("versions()", MUJOCO_GL="nonsense")["MuJoCo"]
+    assert (unknown["state"], unknown["remedy"]) == (
+        "broken",
+        "unset MUJOCO_GL, which is 'nonsense'",
+    )
