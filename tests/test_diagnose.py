@@ -129,7 +129,7 @@ def test_the_page_needs_nothing_else(hidden):
     told = json.loads((hidden.folder / "d.json").read_text())
     assert page.index(told["summary"]) < page.index("<img") < page.index("<table")
     assert "data:image/png;base64," in page
-    assert "http" not in page
+    assert "://" not in page
     assert (hidden.folder / "d.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
@@ -180,7 +180,7 @@ def test_the_stairs_never_rise(hidden, monkeypatch):
     assert output.with_suffix(".png").exists()
     text = page.read_text()
     assert f"<td>+ {result.steps[1].effect}</td>" in text
-    assert "http" not in text
+    assert "://" not in text
 
 
 def test_a_true_model_is_adequate_and_nothing_is_added(tmp_path):

@@ -51,7 +51,7 @@ def curve_windows(measured: Measured) -> CurveWindows:
         window = np.minimum(np.arange(len(known)) // SAMPLES, pieces - 1) + count
         curve = gauged.curve.position[known], gauged.curve.force[known]
         own = np.full(len(known), number)
-        parts.append((*curve, gauged.direction[known], gauged.doubt[known], window, own))
+        parts.append((*curve, gauged.direction[known], gauged.cautious, window, own))
         count += pieces
     at, force, direction, doubt, window, run = (np.concatenate(x) for x in zip(*parts, strict=True))
     rows = rows_of(window, count)

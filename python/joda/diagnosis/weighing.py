@@ -72,7 +72,8 @@ def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
     likely = weights / (weights.sum() + (remains * own + LITTLE) ** -SHARPNESS)
     gain = ranking.asked.fit.loss - first.fit.loss - first.cost
     if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and likely[0] < HARDLY):
-        noise = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
+        level = min(max(ranking.level, 1.0), WORST)  # few windows' calm ones are calmer than noise
+        noise = judge.loss(ranking.asked.fit.squares, level=level)
         said: Verdict = "adequate" if excess(noise, samples) < MUCH else "unexplained"
     elif left[0] > max(remains * own, LEFT) or likely[0] < 1 - likely.sum():
         said = "unexplained"

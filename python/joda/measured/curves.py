@@ -10,8 +10,6 @@ from joda.measured.gauge import Gauged
 from joda.measured.places import BINS, places
 from joda.profile import Joint
 
-CAUTION = 2.0
-"""How far the noise may be underestimated: one plus this, divided by the root of the samples."""
 SAID = 0.1
 """What is less than this share of the larger one is not said."""
 MOST = 6
@@ -77,8 +75,7 @@ def failing_force(curves: Sequence[Gauged], joint: Joint) -> list[FailingForce]:
     place = np.concatenate([c.curve.position[c.direction != 0] for c in curves])
     way = np.concatenate([c.direction[c.direction != 0] for c in curves])
     excess = np.concatenate([c.excess for c in curves])
-    doubts = [c.doubt[c.direction != 0] * (1 + CAUTION / np.sqrt(len(c.excess))) for c in curves]
-    squares = (excess / np.concatenate(doubts)) ** 2
+    squares = (excess / np.concatenate([c.cautious for c in curves])) ** 2
     found = np.stack([np.abs(excess), np.ones_like(excess), squares], axis=1)
     beyond = np.maximum(found[:, 2] - 1, 0.0)
     out = []

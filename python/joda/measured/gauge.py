@@ -31,6 +31,8 @@ SLOW = 0.8
 """Noise of at least so many usual steps between samples blurs a turn."""
 LEAST = 5
 """Fewest samples in one direction that tell the noise."""
+CAUTION = 2.0
+"""How far the noise may be underestimated: one plus this, divided by the root of the samples."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,12 @@ class Gauged:
         """Force towards +q that the model has too much where the direction is known, N·m or N."""
         known = self.direction != 0
         return np.asarray(self.curve.force[known] - self.force[known])
+
+    @property
+    def cautious(self) -> Array:
+        """The doubt of each excess, where the noise is more than it was estimated."""
+        doubt = self.doubt[self.direction != 0]
+        return np.asarray(doubt * (1 + CAUTION / np.sqrt(len(doubt))))
 
 
 def static_force(
