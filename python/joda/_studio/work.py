@@ -82,9 +82,14 @@ class Work:
         """What a child of its own answers."""
         pipe = asyncio.subprocess.PIPE
         command = (sys.executable, "-m", "joda._studio.work")
-        # in a session of its own: Ctrl-C is for the studio, which stops it
+        # In a session of its own: Ctrl-C is for the studio, which stops it. And without OpenGL,
+        # for which MuJoCo starts yet another process, which complains when this one is stopped.
         process = await asyncio.create_subprocess_exec(
-            *command, stdin=pipe, stdout=pipe, start_new_session=True
+            *command,
+            stdin=pipe,
+            stdout=pipe,
+            start_new_session=True,
+            env=os.environ | {"MUJOCO_GL": "disable"},
         )
         self._process = process
         try:
