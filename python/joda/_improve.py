@@ -156,11 +156,7 @@ def _step(step: Step) -> str:
 
 def _explanations(result: Improved) -> list[str]:
     """Why each effect was added."""
-    out = []
-    for before, step in zip(result.steps, result.steps[1:], strict=False):
-        found = before.diagnosis.effects if before.diagnosis else ()
-        out += [one.explanation for one in found if one.effect == step.effect]
-    return out
+    return [step.added.explanation for step in result.steps if step.added]
 
 
 def _page(result: Improved, drawn: bytes) -> str:

@@ -1,13 +1,13 @@
 """Diagnoses and mends a model until the data support nothing more."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from joda.diagnosis.findings import Diagnosis
-from joda.diagnosis.mending import Error, Mended, error, mend, parted
+from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.mending import Error, error, mend, parted
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.reading import Measured
-from joda.profile import Profile
+from joda.profile import CHANNELS, Channels, Profile
 
 MOST = 5
 """Effects that are added at most."""
@@ -19,6 +19,12 @@ NOTHING_HELPS = "No likely effect lowers the error on the runs that were held ou
 WORTH, MUCH = 0.95, 0.8
 """Part of the error before, on runs held out, to which an effect must bring it: one that explains
 what is missing; one that explains only a part, where perhaps several are missing."""
+AS_GOOD = 1.05
+"""Part of the error with an effect up to which one that is likelier may take its place."""
+
+Parts = tuple[Measured, Measured]
+"""The runs to fit, and those held out."""
+Told = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -26,21 +32,24 @@ class Step:
     """A stair of the falling error.
 
     Attributes:
-        effect: that was added; None at the beginning.
+        added: what was found missing and added; None at the beginning.
         profile: with all effects so far.
         error: on runs held out of every fit.
         diagnosis: of the model with this profile; None if it was not made.
     """
 
-    effect: str | None
+    added: Finding | None
     profile: Profile
     error: Error
-    diagnosis: Diagnosis | None
+    diagnosis: Diagnosis | None = None
+
+    @property
+    def effect(self) -> str | None:
+        """Name of what was added."""
+        return self.added.effect if self.added else None
 
 
-def improved(
-    measured: Measured, told: Callable[[str], None] = lambda what: None
-) -> tuple[tuple[Step, ...], str]:
+def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[Step, ...], str]:
     """Adds effects while the data support them.
 
     Args:
@@ -50,29 +59,26 @@ def improved(
     Returns:
         the stairs, the first one the model as it was; and why there are no more, a sentence.
     """
-    train, held = parted(measured)
-    steps = [Step(None, measured.profile, error(held), None)]
+    parts = parted(measured)
+    steps = [Step(None, measured.profile, error(parts[1]))]
     why = f"{MOST} effects were added; that is as many as are tried."
     try:
-        for _ in range(MOST):
+        while len(steps) <= MOST:
             told("diagnose")
-            diagnosis, _ = diagnosed(train)
+            diagnosis, _ = diagnosed(_with(parts, steps[-1].profile)[0])
             steps[-1] = replace(steps[-1], diagnosis=diagnosis)
-            mended = _added(train, held, diagnosis, told)
-            if mended is None:
+            if (step := _next(parts, steps[-1].profile, diagnosis, told)) is None:
                 known = diagnosis.verdict == "missing_effect"
                 why = NOTHING_HELPS if known else diagnosis.summary
                 break
-            train, held = (part.changed(mended.profile) for part in (train, held))
-            steps.append(Step(mended.effect, mended.profile, mended.after, None))
+            steps.append(step)
+            steps = _named_anew(parts, steps, told)
     except KeyboardInterrupt:
         why = "Interrupted; what was found until then is kept."
     return tuple(steps), why
 
 
-def _added(
-    train: Measured, held: Measured, diagnosis: Diagnosis, told: Callable[[str], None]
-) -> Mended | None:
+def _next(parts: Parts, profile: Profile, diagnosis: Diagnosis, told: Told) -> Step | None:
     """The first effect of the diagnosis that clearly lowers the error held out; None if none does.
 
     Where no effect explains what is missing, perhaps several are: then one that explains a good
@@ -82,12 +88,73 @@ def _added(
     for number, finding in enumerate(diagnosis.effects[:TRIED]):
         if known and number and finding.probability < LIKELY:
             return None
-        told(f"add {finding.effect}")
-        found = finding.effect, finding.direction, finding.interval
-        mended = mend(train, held, *found, told)
-        if (
-            mended.effect
-            and mended.after.window < (WORTH if known else MUCH) * mended.before.window
-        ):
-            return mended
+        if step := _added(parts, profile, finding, WORTH if known else MUCH, told):
+            return step
     return None
+
+
+def _added(
+    parts: Parts, profile: Profile, finding: Finding, most: float, told: Told
+) -> Step | None:
+    """The profile with what was found, if that brings the error held out to a part of it."""
+    told(f"add {finding.effect}")
+    train, held = _with(parts, profile)
+    mended = mend(train, held, finding.effect, finding.direction, finding.interval, told)
+    if mended.effect and mended.after.window < most * mended.before.window:
+        return Step(finding, mended.profile, mended.after)
+    return None
+
+
+def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
+    """The stairs, with another effect in the place of one that stood in for it.
+
+    Each but the last was named while the others were missing. Beside them it is asked for again.
+    """
+    begin, *added = steps
+    for k, step in enumerate(added[:-1]):
+        told(f"asking again what {step.effect} is")
+        others = [one.added for one in added if one is not step]
+        without = _without(added[-1].profile, step.effect or "", begin.profile)
+        found, _ = diagnosed(_with(parts, without)[0])
+        if found.verdict != "missing_effect" or found.effects[0].effect in _names(added):
+            continue
+        instead = found.effects[0]
+        for order in ([*others[:k], instead, *others[k:]], [*others, instead]):
+            stairs = _stairs(parts, begin, order, told)
+            if stairs and stairs[-1].error.window < AS_GOOD * added[-1].error.window:
+                return stairs
+    return steps
+
+
+def _stairs(
+    parts: Parts, begin: Step, findings: Sequence[Finding | None], told: Told
+) -> list[Step] | None:
+    """What was found, added one after the other; None if one of them does not lower the error."""
+    steps = [begin]
+    for finding in findings:
+        if not finding or not (step := _added(parts, steps[-1].profile, finding, WORTH, told)):
+            return None
+        steps.append(step)
+    return steps
+
+
+def _with(parts: Parts, profile: Profile) -> Parts:
+    train, held = parts
+    return train.changed(profile), held.changed(profile)
+
+
+def _names(steps: Sequence[Step]) -> set[str | None]:
+    return {step.effect for step in steps}
+
+
+def _without(profile: Profile, effect: str, begin: Profile) -> Profile:
+    """The profile without an effect, but for what of it was there at the beginning."""
+    channels = {}
+    for name in CHANNELS:
+        channel, before = (getattr(one.channels, name) for one in (profile, begin))
+        there = len(before.components)
+        kept = [c for k, c in enumerate(channel.components) if k < there or c.label != effect]
+        channels[name] = channel.model_copy(update={"components": tuple(kept)})
+    keys = {one.key for one in begin.effects}
+    effects = tuple(one for one in profile.effects if one.effect != effect or one.key in keys)
+    return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})
