@@ -17,8 +17,9 @@ LEAST_GAIN = 60.0
 """Least gain in loss of an effect that is more than chance."""
 NOTICEABLE = 0.02
 """The same, per sample."""
-LEFT = 0.25
-"""Excess per sample that any true effect may leave: noise is not known better."""
+WEAK, LEFT = 0.15, 0.25
+"""Part of its excess that any true effect may leave, up to so much per sample: noise is not known
+better."""
 LITTLE = 0.05
 """Excess per sample that is never worth a word."""
 HARDLY = 0.1
@@ -67,15 +68,15 @@ def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
 
     own = excess(judge.loss(ranking.asked.fit.squares, level=ranking.level), samples)
     left = np.array([excess(guess.score, ranking.told) for guess in guesses])
-    remains = strictness * first.hypothesis.remains
+    unknown = strictness * max(first.hypothesis.remains * own, min(WEAK * own, LEFT))
     weights = (left + LITTLE) ** -SHARPNESS
-    likely = weights / (weights.sum() + (remains * own + LITTLE) ** -SHARPNESS)
+    likely = weights / (weights.sum() + (unknown + LITTLE) ** -SHARPNESS)
     gain = ranking.asked.fit.loss - first.fit.loss - first.cost
     if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and likely[0] < HARDLY):
         level = min(max(ranking.level, 1.0), WORST)  # few windows' calm ones are calmer than noise
         noise = judge.loss(ranking.asked.fit.squares, level=level)
         said: Verdict = "adequate" if excess(noise, samples) < MUCH else "unexplained"
-    elif left[0] > max(remains * own, LEFT) or likely[0] < 1 - likely.sum():
+    elif likely[0] < 1 - likely.sum():
         said = "unexplained"
     else:
         said = "missing_effect"
