@@ -174,21 +174,15 @@ class Judge:
         self, make: Make, unknowns: Unknowns, x: Array, start: Array, bend: float = BEND
     ) -> Linear:
         """The model about a point."""
-        windows = self.windows
-        r, squares = self.squares(make(x), start)
-        J = np.zeros((*r.shape, len(x)))
-        for k, step in enumerate(unknowns.step):
-            up, down = x.copy(), x.copy()
-            up[k] = min(x[k] + step, unknowns.high[k])
-            down[k] = max(x[k] - step, unknowns.low[k])
-            ends = (windows.residuals(windows.misfit(make(y), start)) for y in (up, down))
-            J[:, :, k] = (next(ends) - next(ends)) / (up[k] - down[k])
-        S = np.zeros((*r.shape, 2))
-        solo = make(x)
-        for k in range(2):
-            moved = start.copy()
-            moved[:, k] += NUDGE * windows.doubt[:, k]
-            S[:, :, k] = (windows.residuals(windows.misfit(solo, moved)) - r) / NUDGE
+        windows, k = self.windows, len(x)
+        solo, off = make(x), np.diag(unknowns.step)
+        up, down = np.minimum(x + off, unknowns.high), np.maximum(x - off, unknowns.low)
+        misfits = [windows.misfit(make(y), start) for y in (*up, *down)]
+        misfits += [windows.misfit(solo, start + NUDGE * windows.doubt * way) for way in np.eye(2)]
+        found = windows.residuals(np.stack(misfits, axis=1))
+        r, squares = self.squares(solo, start)
+        J = (found[:, :, :k] - found[:, :, k : 2 * k]) / np.diag(up - down)
+        S = (found[:, :, 2 * k :] - r[:, :, None]) / NUDGE
         room = bend * np.maximum(windows.count, 1)
         weight = np.where(self.counts, 1 / (1 + squares / room), 0.0)
         z = (start - windows.start) / windows.doubt

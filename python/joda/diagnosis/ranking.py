@@ -15,8 +15,8 @@ from joda.diagnosis.judge import BEND, Fit, Judge, Linear
 from joda.diagnosis.knocks import knock_guess
 from joda.measured.reading import Measured
 
-POLISHED = 4
-"""Of how many effects the numbers are tried elsewhere."""
+POLISHED, NEAR = 4, 3.0
+"""Of how many effects the numbers are tried elsewhere, and up to which part of the least loss."""
 CALM = 0.3
 """Part of the windows, the better ones, that tell the noise."""
 WORST = 1.5
@@ -127,7 +127,11 @@ def rank(
     with ThreadPoolExecutor(cpu_count()) as pool:
         guesses = heard(pool.map(begun.tell, tried))
         best = _best(guesses)[:POLISHED]
-        guesses += heard(pool.map(begun.moved, best))
+        guesses += heard(map(begun.moved, best[:1]))
+        least = min((one.fit.loss for one in guesses), default=0.0)
+        near = [one for one in best[1:] if one.fit.loss < NEAR * least]
+        done = total - len(near)
+        guesses += heard(pool.map(begun.moved, near))
     there = [one for one in (*guesses, *known) if not one.vanished]
     return Ranking(begun, *_levelled(begun.judge, there))
 

@@ -74,10 +74,18 @@ class Windows:
         return np.asarray(here + self.share * (after[self.step] - here) - self.position)
 
     def residuals(self, misfit: Array) -> Array:
-        """Of variance 1 where the model is true; filling is 0. Shape (m, most samples)."""
-        padded = np.where(self.rows >= 0, misfit[self.rows], 0.0)
-        out = np.matmul(self.whitener, padded[:, :, None])[:, :, 0]
-        return np.asarray(np.nan_to_num(np.clip(out, -HUGE, HUGE), nan=HUGE))
+        """Of variance 1 where the model is true; filling is 0.
+
+        Args:
+            misfit: one, shape (n,), or several, shape (n, k).
+
+        Returns:
+            shape (m, most samples) or (m, most samples, k).
+        """
+        each = misfit.reshape(len(misfit), -1)
+        padded = np.where((self.rows >= 0)[:, :, None], each[self.rows], 0.0)
+        out = np.nan_to_num(np.clip(np.matmul(self.whitener, padded), -HUGE, HUGE), nan=HUGE)
+        return np.asarray(out.reshape(*self.rows.shape, *misfit.shape[1:]))
 
     def of_runs(self, runs: Sequence[int]) -> NDArray[np.bool_]:
         """Which windows are of these runs."""
