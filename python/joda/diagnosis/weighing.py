@@ -17,6 +17,8 @@ LEAST_GAIN = 60.0
 """Least gain in loss of an effect that is more than chance."""
 NOTICEABLE = 0.02
 """The same, per sample."""
+CRUDE = 0.12
+"""Part of its excess that any true effect may leave where more than noise is left of all."""
 WEAK, LEFT = 0.15, 0.25
 """Part of its excess that any true effect may leave, up to so much per sample: noise is not known
 better."""
@@ -68,7 +70,8 @@ def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
 
     own = excess(judge.loss(ranking.asked.fit.squares, level=ranking.level), samples)
     left = np.array([excess(guess.score, ranking.told) for guess in guesses])
-    unknown = strictness * max(first.hypothesis.remains * own, min(WEAK * own, LEFT))
+    part = max(first.hypothesis.remains, CRUDE if ranking.level > WORST else 0.0)
+    unknown = strictness * max(part * own, min(WEAK * own, LEFT))
     weights = (left + LITTLE) ** -SHARPNESS
     likely = weights / (weights.sum() + (unknown + LITTLE) ** -SHARPNESS)
     gain = ranking.asked.fit.loss - first.fit.loss - first.cost
