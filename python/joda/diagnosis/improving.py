@@ -17,8 +17,8 @@ LIKELY = 0.1
 """Least probability of an effect, besides the first, that is tried."""
 NOTHING_HELPS = "No likely effect lowers the error on the runs that were held out."
 WORTH, MUCH = 0.95, 0.8
-"""Part of the error before, on runs held out, to which an effect must bring it: one that explains
-what is missing; one that explains only a part, where perhaps several are missing."""
+"""Part of the error before, on runs held out, to which an effect must bring it: a likely one; one
+that is tried because nothing is likely and the first did not."""
 AS_GOOD = 1.05
 """Part of the error with an effect up to which one that is likelier may take its place."""
 
@@ -81,14 +81,15 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
 def _next(parts: Parts, profile: Profile, diagnosis: Diagnosis, told: Told) -> Step | None:
     """The first effect of the diagnosis that clearly lowers the error held out; None if none does.
 
-    Where no effect explains what is missing, perhaps several are: then one that explains a good
-    part is taken.
+    Where no effect explains what is missing, perhaps several are: then one that explains a part is
+    taken.
     """
     known = diagnosis.verdict == "missing_effect"
     for number, finding in enumerate(diagnosis.effects[:TRIED]):
         if known and number and finding.probability < LIKELY:
             return None
-        if step := _added(parts, profile, finding, WORTH if known else MUCH, told):
+        most = WORTH if known or not number else MUCH
+        if step := _added(parts, profile, finding, most, told):
             return step
     return None
 
