@@ -21,11 +21,20 @@ def read_text(path: Path) -> str:
 
 
 def check_target(path: Path, force: bool) -> None:
-    """Raises JodaError if `path` exists and `force` is off, or its folder is missing."""
+    """Raises JodaError if `path` exists and `force` is off, or no file can be made there.
+
+    A full disk shows only when the file is written.
+    """
+    if path.exists() and not path.is_file():
+        raise JodaError(f"{path}: cannot be written (a folder or a device, no file).")
     if path.exists() and not force:
         raise JodaError(f"{path}: exists already; choose another name or add --force.")
     if not path.parent.is_dir():
         raise JodaError(f"{path}: the folder {path.parent} does not exist; create it first.")
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise JodaError(f"{path}: cannot be written ({error.strerror}).") from None
 
 
 def occupied(folder: Path) -> bool:
