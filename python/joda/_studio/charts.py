@@ -27,7 +27,7 @@ SHOWN = 500
 """Most points of a line in a chart."""
 KNOCK = 0.005
 """So near an end of the range, as a part of it, a force may leave the frame."""
-ROOM = 0.1
+ROOM = 0.05
 """Above and below what is shown, as a part of its height."""
 
 
@@ -156,8 +156,7 @@ def hand(now: Motion | None, before: Motion | None, joint: Joint) -> dict[str, A
     axes = f"position ({joint.unit})", f"hand's force ({prefix}{unit(joint, 'friction')})"
     chart = _chart(*axes, lines, {"min": joint.range[0], "max": joint.range[1]})
     forces = [factor * m.force[_off_the_stops(m, joint)] for m, _ in shown]
-    low, high = _round_limits(np.concatenate(forces)) if forces else (None, None)
-    chart["yAxis"] |= {"min": low, "max": high}
+    chart["yAxis"] |= _scale(np.concatenate(forces or [np.zeros(0)]))
     return chart
 
 
@@ -167,15 +166,16 @@ def _off_the_stops(motion: Motion, joint: Joint) -> NDArray[np.bool_]:
     return np.abs(motion.position - (lo + hi) / 2) < (0.5 - KNOCK) * (hi - lo)
 
 
-def _round_limits(values: Array) -> tuple[float | None, float | None]:
-    """Ends of an axis on which the values have some room, round numbers; None where all are one."""
+def _scale(values: Array) -> dict[str, float | None]:
+    """An axis' ends and the interval of its marks, such that these values fill it."""
     span = float(np.ptp(values)) if len(values) else 0.0
     if span == 0:
-        return None, None
-    step = 10 ** math.floor(math.log10(span)) / 5
+        return {"min": None, "max": None, "interval": None}
+    power = 10.0 ** math.floor(math.log10(span / 4))
+    step = next(k * power for k in (1, 2, 5, 10) if k * power >= span / 4)
     low = math.floor((values.min() - ROOM * span) / step)
     high = math.ceil((values.max() + ROOM * span) / step)
-    return float(f"{low * step:.6g}"), float(f"{high * step:.6g}")
+    return {"min": round(low * step, 12), "max": round(high * step, 12), "interval": step}
 
 
 def run(now: Replayed, before: Replayed | None, number: int) -> dict[str, Any]:
