@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from importlib import metadata
@@ -15,6 +16,7 @@ from joda import JodaError, Profile, bench, demo, plot
 from joda._bench import _without_plugin, hinges
 from joda._refine import Refined
 from joda.cli import app
+from joda.cli.tell import tell_viewer
 
 MODELS = Path(__file__).parents[1] / "models"
 LATCH = Path(__file__).parent / "microwave.latch.json"
@@ -89,6 +91,20 @@ def test_attach_then_plot(folder):
     result = joda("plot", "scene.xml", cwd=folder)
     assert result.stdout == "scene.png\n"
     assert (folder / "scene.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_viewer_is_started_by_the_python_that_has_joda(tmp_path, monkeypatch, capsys):
+    other = tmp_path / "python"  # the same file, but not the environment's
+    other.symlink_to(sys.executable)
+    options = "-m mujoco.viewer '--mjcf=my oven/scene.xml'\n"
+    for folder, python in ((Path(sys.executable).parent, "python"), (tmp_path, sys.executable)):
+        monkeypatch.setenv("PATH", str(folder))
+        tell_viewer(Path("my oven/scene.xml"))
+        assert capsys.readouterr().out == f"See it move: {python} {options}"
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "a folder" / "python"))
+    tell_viewer(Path("scene.xml"))
+    told = shlex.split(capsys.readouterr().out.removeprefix("See it move: "))
+    assert told == [sys.executable, "-m", "mujoco.viewer", "--mjcf=scene.xml"]
 
 
 def test_context_is_printed_and_written(folder):

@@ -110,11 +110,3 @@ def test_pictures_have_no_room(closed, full):
     for folder, reason in ((closed, "Permission denied"), (full, "No space left on device")):
         before = contents(folder)
         check_refusal(alone(RENDER, folder), folder, before, reason)
-
-
-def test_what_is_printed_has_no_room():
-    with open("/dev/full", "w") as output:
-        words = [sys.executable, "-P", "-m", "joda", "schema", "proposal"]
-        done = subprocess.run(words, stdout=output, stderr=subprocess.PIPE, text=True)
-    told = "joda: what is printed: cannot be written or read (No space left on device).\n"
-    assert (done.returncode, done.stderr) == (2, told)
