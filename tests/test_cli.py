@@ -12,7 +12,7 @@ import jsonschema
 import mujoco
 import pytest
 
-from joda import JodaError, Profile, bench, demo, plot
+from joda import COMMANDS, JodaError, Profile, bench, demo, plot
 from joda._bench import _without_plugin, hinges
 from joda._refine import Refined
 from joda.cli import app
@@ -53,6 +53,12 @@ def folder(tmp_path):
 def test_without_arguments_it_shows_its_help():
     assert joda().stdout == joda("--help").stdout
     assert joda().returncode == 0
+
+
+def test_the_commands_are_told_in_one_line_each_on_a_narrow_terminal():
+    lines = joda("--help", COLUMNS="80").stdout.partition("Commands:\n")[2].splitlines()
+    assert sorted(line.split()[0] for line in lines) == sorted(COMMANDS)
+    assert not [line for line in lines if "..." in line or not line.endswith(".")]
 
 
 def test_it_says_which_version_it_is():

@@ -8,6 +8,11 @@ from pathlib import Path
 from joda.errors import JodaError
 
 
+def cache_folder() -> Path:
+    """What joda keeps from call to call for this user; it is all that an uninstallation leaves."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "joda"
+
+
 def read_text(path: Path) -> str:
     """Text of a UTF-8 file; raises JodaError if it is missing, unreadable or not text."""
     if path.is_char_device():  # it may never end
