@@ -106,6 +106,22 @@ def test_a_full_disk(command, full, forked):
     check_refusal(ended, full, before, "No space left on device")
 
 
+ALL_OR_NONE = [
+    "add scene.xml run.csv run2.csv --joint door --diagnosis diagnosis.json -o new.xml",
+    "compare scene.xml run.csv --joint door --json new.json --report new.html -o new.png",
+    "refine scene.xml curve.csv --joint door -o new.xml",
+    "simulate scene.xml --joint door --release 0.1 -o new.csv --duration 0.1",
+]
+
+
+@pytest.mark.parametrize("command", ALL_OR_NONE)
+def test_there_is_room_for_some_of_the_files_only(command, forked, tmp_path):
+    fill(tmp_path)
+    before = contents(tmp_path)
+    ended = forked.run(command.split(), tmp_path, PATIENCE, largest=20_000)
+    check_refusal(ended, tmp_path, before, "File too large")
+
+
 def test_pictures_have_no_room(closed, full):
     for folder, reason in ((closed, "Permission denied"), (full, "No space left on device")):
         before = contents(folder)

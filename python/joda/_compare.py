@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.files import check_target, write_bytes, write_text
+from joda.files import check_target, write_together
 from joda.measured.comparison import (
     Comparison,
     RunError,
@@ -90,14 +90,16 @@ def compare(
         failing_force=tuple(failing_force(measured.curves, described)),
         notes=(*measured.notes, *([note] if note else [])),
     )
+    files: dict[Path, bytes | str] = {}
     if json:
-        write_text(Path(json), comparison.to_json())
+        files[Path(json)] = comparison.to_json()
     if report or picture:
         drawn = png(_picture(measured, paths, short))
         if picture:
-            write_bytes(Path(picture), drawn)
+            files[Path(picture)] = drawn
         if report:
-            write_text(Path(report), _page(comparison, drawn))
+            files[Path(report)] = _page(comparison, drawn)
+    write_together(files)
     return comparison
 
 

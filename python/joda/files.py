@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from collections.abc import Mapping
 from itertools import count
 from pathlib import Path
 
@@ -39,7 +40,7 @@ def check_target(path: Path, force: bool) -> None:
     try:
         tempfile.TemporaryFile(dir=path.parent).close()
     except OSError as error:
-        raise JodaError(f"{path}: cannot be written ({error.strerror}).") from None
+        raise _unwritable(path, error) from None
 
 
 def occupied(folder: Path) -> bool:
@@ -61,26 +62,40 @@ def make_folder(path: Path) -> None:
         raise JodaError(f"{path}: cannot be made ({error.strerror}).") from None
 
 
+def write_together(contents: Mapping[Path, bytes | str]) -> None:
+    """Writes these files, all of them whole, or none; raises JodaError if a folder forbids it.
+
+    All is on the disk under other names before the first file gets its own.
+    """
+    written: dict[Path, Path] = {}
+    path = Path()
+    try:
+        for path, content in contents.items():
+            descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+            written[path] = Path(name)
+            with os.fdopen(descriptor, "wb") as file:
+                file.write(content.encode("utf-8") if isinstance(content, str) else content)
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(name, 0o666 & ~umask)
+        for path, temporary in written.items():
+            temporary.replace(path)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    finally:
+        for temporary in written.values():
+            temporary.unlink(missing_ok=True)
+
+
 def write_bytes(path: Path, content: bytes) -> None:
     """Writes the whole file or nothing; raises JodaError if the folder does not allow it."""
-    try:
-        descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    except OSError as error:
-        raise JodaError(f"{path}: cannot be written ({error.strerror}).") from None
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, path)
-    except BaseException as error:
-        Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise JodaError(f"{path}: cannot be written ({error.strerror}).") from None
-        raise
+    write_together({path: content})
 
 
 def write_text(path: Path, text: str) -> None:
     """As write_bytes, for UTF-8 text."""
-    write_bytes(path, text.encode("utf-8"))
+    write_together({path: text})
+
+
+def _unwritable(path: Path, error: OSError) -> JodaError:
+    return JodaError(f"{path}: cannot be written ({error.strerror}).")
