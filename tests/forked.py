@@ -28,8 +28,13 @@ class Ended:
 class Forked:
     """A process that runs commands on demand."""
 
-    def __init__(self, cache):
-        """Starts it; what it compiles is kept in the folder `cache`, and nothing can render."""
+    def __init__(self, cache, prefix=()):
+        """Starts it; nothing can render.
+
+        Args:
+            cache: folder in which is kept what it compiles.
+            prefix: command that it is started with, and its arguments.
+        """
         environment = {
             "XDG_CACHE_HOME": str(cache),
             "MUJOCO_GL": "disabled",
@@ -37,7 +42,7 @@ class Forked:
             "ANTHROPIC_API_KEY": "",
         }
         self._process = subprocess.Popen(
-            [sys.executable, "-P", __file__],
+            [*prefix, sys.executable, "-P", __file__],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from importlib import metadata
@@ -11,10 +12,11 @@ import jsonschema
 import mujoco
 import pytest
 
-from joda import JodaError, Profile, bench, demo, plot
+from joda import COMMANDS, JodaError, Profile, bench, demo, plot
 from joda._bench import _without_plugin, hinges
 from joda._refine import Refined
 from joda.cli import app
+from joda.cli.tell import tell_viewer
 
 MODELS = Path(__file__).parents[1] / "models"
 LATCH = Path(__file__).parent / "microwave.latch.json"
@@ -53,6 +55,12 @@ def test_without_arguments_it_shows_its_help():
     assert joda().returncode == 0
 
 
+def test_the_commands_are_told_in_one_line_each_on_a_narrow_terminal():
+    lines = joda("--help", COLUMNS="80").stdout.partition("Commands:\n")[2].splitlines()
+    assert sorted(line.split()[0] for line in lines) == sorted(COMMANDS)
+    assert not [line for line in lines if "..." in line or not line.endswith(".")]
+
+
 def test_it_says_which_version_it_is():
     version = f"joda {metadata.version('joda')} for MuJoCo {mujoco.__version__}\n"
     assert joda("--version").stdout == version
@@ -89,6 +97,20 @@ def test_attach_then_plot(folder):
     result = joda("plot", "scene.xml", cwd=folder)
     assert result.stdout == "scene.png\n"
     assert (folder / "scene.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_viewer_is_started_by_the_python_that_has_joda(tmp_path, monkeypatch, capsys):
+    other = tmp_path / "python"  # the same file, but not the environment's
+    other.symlink_to(sys.executable)
+    options = "-m mujoco.viewer '--mjcf=my oven/scene.xml'\n"
+    for folder, python in ((Path(sys.executable).parent, "python"), (tmp_path, sys.executable)):
+        monkeypatch.setenv("PATH", str(folder))
+        tell_viewer(Path("my oven/scene.xml"))
+        assert capsys.readouterr().out == f"See it move: {python} {options}"
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "a folder" / "python"))
+    tell_viewer(Path("scene.xml"))
+    told = shlex.split(capsys.readouterr().out.removeprefix("See it move: "))
+    assert told == [sys.executable, "-m", "mujoco.viewer", "--mjcf=scene.xml"]
 
 
 def test_context_is_printed_and_written(folder):

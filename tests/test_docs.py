@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from rosbags.rosbag2 import Writer
@@ -110,6 +111,26 @@ def test_templates_effects_and_proposers_of_ones_own(my_door):
     (folder / "offline" / "proposal.json").rename(folder / "proposal.json")
     run("python mine.py", folder)
     assert (folder / "generated" / "scene.xml").exists()
+
+
+def test_steps_in_mjx(tmp_path):
+    """What the page shows, for fewer steps, ends where MuJoCo does; gravity blows the door open."""
+    for page in ("my_door.md", "howto/training.md"):
+        write_files(page, tmp_path)
+    for name, of, other in (
+        ("door.xml", "<worldbody>", '<option timestep="0.01" gravity="0 9 0"/><worldbody>'),
+        ("steps.py", "STEPS = 1000", "STEPS = 30"),
+    ):
+        text = (tmp_path / name).read_text()
+        assert of in text
+        (tmp_path / name).write_text(text.replace(of, other))
+    run("joda attach door.xml real.json -o scene.xml", tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 30)
+    assert data.qpos[0] > 0.1
+    told = run("python steps.py", tmp_path).splitlines()[-1]  # MJX says what it lacks before
+    assert float(told.strip("[]")) == pytest.approx(data.qpos[0], 1e-3)
 
 
 def test_a_host_in_cpp(my_door):

@@ -104,6 +104,18 @@ def test_modules_that_are_missing_and_broken(tmp_path):
     assert found["key: Claude"]["state"] == "missing"
 
 
+def test_what_is_left_in_the_cache(tmp_path):
+    asked = {"XDG_CACHE_HOME": str(tmp_path / "my cache")}
+    assert checks("cache()", **asked)["cache"]["found"].startswith("empty, ")
+    folder = tmp_path / "my cache" / "joda"
+    (folder / "jax").mkdir(parents=True)
+    (folder / "jax" / "compiled").write_bytes(bytes(1_500_000))
+    found = checks("cache()", **asked)["cache"]
+    assert found["found"] == f"1.5 MB in {folder}, which an uninstallation leaves"
+    assert found["remedy"] == f"to empty it, run: rm -r '{folder}'"
+    assert not found["fatal"]
+
+
 def test_a_hidden_renderer():
     found = checks("renderers()", __EGL_VENDOR_LIBRARY_FILENAMES="/dev/null", DISPLAY="")
     egl, osmesa = found["pictures: EGL"], found["pictures: OSMesa"]

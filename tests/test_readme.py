@@ -20,6 +20,7 @@ from joda.cli import app
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "README.md").read_text("utf-8")
 README = re.findall(r"^\| [^|]+ \| `((?:joda|python) .+?)` \|$", TEXT, re.MULTILINE)
+FIGURES = re.findall(r"^\| ([^|]+) \| ([^|`]+) \| (`[^|]+`) \|$", TEXT, re.MULTILINE)
 HELP = {
     name: re.findall(
         r"^ {4,}(joda .+)$", CliRunner().invoke(app, [name, "-h"]).stdout, re.MULTILINE
@@ -119,6 +120,16 @@ def test_the_xml_example_is_a_profile():
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert data.qfrc_passive[0] == pytest.approx(-2)
+
+
+@pytest.mark.parametrize("row", FIGURES, ids=[row[0][:30] for row in FIGURES])
+def test_the_figures_are_those_of_the_pages(row):
+    what, figure, commands = row
+    page = (ROOT / re.search(r"\((docs/\w+\.md)\)", what)[1]).read_text("utf-8")
+    assert all(number in page for number in re.findall(r"\d[\d.]*", figure))
+    for command in re.findall("`([^`]+)`", commands):
+        program, name, *_ = command.split()
+        assert name in joda.COMMANDS if program == "joda" else (ROOT / name).exists()
 
 
 def test_python_names_exist(folder):

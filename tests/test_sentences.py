@@ -13,7 +13,7 @@ import pytest
 import joda
 from joda import JodaError
 from joda.diagnosis.findings import read_diagnosis
-from joda.files import make_folder, read_text, write_text
+from joda.files import check_target, make_folder, read_text, write_text
 from joda.measured.runs import read_run
 from joda.propose.replies import parse
 from joda.template import Template
@@ -80,6 +80,9 @@ def test_files(tmp_path):
         write_text(tmp_path / "no" / "x", "")
     with pytest.raises(JodaError, match=r"cannot be written \(Is a directory\)\.$"):
         write_text(tmp_path, "")
+    for taken in (tmp_path, Path("/dev/null")):
+        with pytest.raises(JodaError, match=r"cannot be written \(a folder or a device, no file\)"):
+            check_target(taken, force=True)
     assert os.listdir(tmp_path) == ["file"]
 
 

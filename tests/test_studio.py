@@ -27,6 +27,8 @@ from joda.component import Component
 from joda.effects import AddedInertia
 from joda.field import evaluate
 from joda.measured.runs import write_run
+from joda.profile import Joint
+from joda.scenes.motion import Motion
 
 LID = """\
 <mujoco>
@@ -411,6 +413,27 @@ def test_an_editor_shows_values_in_a_fitting_unit(desk):
     view = charts.editor(changed, desk.opened, "damping", 0)
     assert [line["kind"] for line in view["lines"]] == ["ghost", "sum"]
     json.dumps(view, allow_nan=False)
+
+
+def hand_shown(*samples):
+    """Ends of the vertical axis of a hand's chart, given positions (rad) and forces (N·m)."""
+    position, force = np.array(samples, float).T
+    motion = Motion(np.arange(len(force)), position, np.zeros(len(force)), force)
+    chart = charts.hand(motion, None, Joint(name="lid", type="hinge", range=(0, 2), unit="rad"))
+    json.dumps(chart, allow_nan=False)
+    if chart["yAxis"]["min"] is None:
+        return None
+    return chart["yAxis"]["min"], chart["yAxis"]["max"]
+
+
+def test_a_knock_at_the_end_leaves_the_frame_of_the_hands_chart():
+    way = [(q, 3) for q in np.linspace(0.1, 1.9, 50)] + [(1.0, -4), (0.02, 7)]
+    low, high = hand_shown(*way)
+    assert (low, high) == (-5, 10)
+    assert hand_shown(*way, (1.995, -90), (2.001, -200), (-0.001, 80)) == (low, high)
+    assert hand_shown(*way, (1.98, -90))[0] < -90
+    assert hand_shown((1, 0), (1.5, 0)) is None
+    assert hand_shown((0, 5), (2, -5)) is None
 
 
 # --- who may ask, and what is answered

@@ -16,14 +16,15 @@ from joda.diagnosis.outcome import (
     mended_picture,
     parting,
     read_timed,
+    scene_files,
     told_errors,
-    write_scene,
 )
 from joda.diagnosis.phrases import named
 from joda.errors import JodaError
+from joda.files import write_together
 from joda.measured.comparison import rms
 from joda.pictures.changes import changes
-from joda.pictures.style import write_png
+from joda.pictures.style import png
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,8 @@ def add(
     train, held = parted(measured)
     mended = mend(train, held, name, direction, near, progress)
     progress("drawing")
-    notes = write_scene(Path(model), mended.profile, target, composed)
-    write_png(mended_picture(held, mended.profile), picture, force=True)
+    files, notes = scene_files(Path(model), mended.profile, target, composed)
+    write_together(files | {picture: png(mended_picture(held, mended.profile))})
     return Added(
         scene=target,
         composed=composed,

@@ -59,12 +59,28 @@ def attach(
     Raises:
         JodaError: a file cannot be read or written, a joint does not exist or does not fit.
     """
-    model, output = Path(model), Path(output)
+    output = Path(output)
+    check_target(output, force)
+    content, notes = attached(model, profiles, output, joint=joint, native=native, also=also)
+    write_bytes(output, content)
+    return notes
+
+
+def attached(
+    model: str | Path,
+    profiles: str | Path | Profile | Sequence[str | Path | Profile],
+    output: Path,
+    *,
+    joint: str | None = None,
+    native: Literal["replace", "keep"] = "replace",
+    also: Mapping[str, str] = MappingProxyType({}),
+) -> tuple[bytes, list[str]]:
+    """The scene that `attach`, with the same arguments, writes to `output`, and what it tells."""
+    model = Path(model)
     items = [profiles] if isinstance(profiles, str | Path | Profile) else list(profiles)
     loaded = [item if isinstance(item, Profile) else Profile.read(item) for item in items]
     if joint is not None and len(loaded) != 1:
         raise JodaError("--joint goes with exactly one profile; each profile names its own joint.")
-    check_target(output, force)
     spec, compiled = load(model)
     targets = [find_joint(compiled, joint or profile.joint.name) for profile in loaded]
     for target in targets:
@@ -76,8 +92,7 @@ def attach(
         scene.add(target, profile, native, also)
     content = scene.finish(output.parent)
     _verify(output, content, compiled, scene.heavier or "armature" in also)
-    write_bytes(output, content)
-    return scene.notes
+    return content, scene.notes
 
 
 def _verify(output: Path, content: bytes, before: mujoco.MjModel, heavier: bool) -> None:

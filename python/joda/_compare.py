@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.files import check_target, write_bytes, write_text
+from joda.files import check_target, write_together
 from joda.measured.comparison import (
     Comparison,
-    RunError,
     failing,
-    joined,
-    rms,
     sentences,
     window_rows,
 )
 from joda.measured.curves import curve_error, failing_force
+from joda.measured.errors import errors
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
 from joda.measured.reading import Measured, read_measured
 from joda.measured.stepping import timestep_note
@@ -64,40 +62,32 @@ def compare(
     for path in targets:
         check_target(path, force)
     measured = read_measured(model, joint, runs)
-    rows, wholes, windows, paths = [], [], [], []
-    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        progress(run.name)
-        paths.append(measured.replayer.whole(run, sigma))
-        whole = paths[-1] - run.position
-        whole = whole[~np.isnan(whole)]
-        left = joined(measured.replayer.windows(run, sigma))
-        rows.append(RunError(run.name, rms(whole), rms(left), sigma))
-        wholes.append(whole)
-        windows.append(left)
+    found = errors(measured, begin=progress)
     short = window_rows(measured)
     described = measured.profile.joint
-    missed = rms(np.concatenate(windows)) if rows else None
-    note = timestep_note(measured, missed) if missed is not None else None
+    note = timestep_note(measured, found.window) if found.runs else None
     comparison = Comparison(
         joint=described.name,
         unit=described.unit,
-        runs=tuple(rows),
-        rmse=rms(np.concatenate(wholes)) if rows else None,
-        rmse_window=missed,
-        noise_floor=rms(np.array(measured.sigma)) if rows else None,
+        runs=found.runs,
+        rmse=found.whole if found.runs else None,
+        rmse_window=found.window if found.runs else None,
+        noise_floor=found.noise if found.runs else None,
         failing=tuple(failing(short)),
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
         failing_force=tuple(failing_force(measured.curves, described)),
         notes=(*measured.notes, *([note] if note else [])),
     )
+    files: dict[Path, bytes | str] = {}
     if json:
-        write_text(Path(json), comparison.to_json())
+        files[Path(json)] = comparison.to_json()
     if report or picture:
-        drawn = png(_picture(measured, paths, short))
+        drawn = png(_picture(measured, found.paths, short))
         if picture:
-            write_bytes(Path(picture), drawn)
+            files[Path(picture)] = drawn
         if report:
-            write_text(Path(report), _page(comparison, drawn))
+            files[Path(report)] = _page(comparison, drawn)
+    write_together(files)
     return comparison
 
 

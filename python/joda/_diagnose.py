@@ -9,7 +9,7 @@ from joda.diagnosis.outcome import read_runs
 from joda.diagnosis.phrases import NAMES, named
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
-from joda.files import check_target, write_bytes, write_text
+from joda.files import check_target, write_together
 from joda.measured.maps import SHOWN, draw_curves, draw_maps, draw_runs, replayed
 from joda.measured.reading import Measured
 from joda.pictures.page import page, paragraph, table
@@ -59,14 +59,16 @@ def diagnose(
         check_effect(name)
     measured = read_runs(model, joint, runs)
     diagnosis, profile = diagnosed(measured, exclude, progress)
+    files: dict[Path, bytes | str] = {}
     if json:
-        write_text(Path(json), diagnosis.to_json())
+        files[Path(json)] = diagnosis.to_json()
     if report or picture:
         drawn = png(_picture(measured, profile, diagnosis))
         if picture:
-            write_bytes(Path(picture), drawn)
+            files[Path(picture)] = drawn
         if report:
-            write_text(Path(report), _page(diagnosis, drawn))
+            files[Path(report)] = _page(diagnosis, drawn)
+    write_together(files)
     return diagnosis
 
 

@@ -20,6 +20,7 @@ from typing import Literal
 
 from joda._build import MUJOCO_VERSION
 from joda.errors import JodaError
+from joda.files import cache_folder
 from joda.plugin import PLUGIN, plugin_path
 
 State = Literal["ok", "missing", "broken"]
@@ -99,7 +100,7 @@ REINSTALL = f"in a clone of joda, {_pip('--force-reinstall', '--no-deps', '.')}"
 
 def doctor() -> list[Check]:
     """Looks at everything that joda uses; takes some seconds."""
-    parts = _versions, _plugin, _libraries, _renderers, _extras, _key
+    parts = _versions, _plugin, _libraries, _renderers, _extras, _key, _cache
     with ThreadPoolExecutor() as pool:
         return [check for checks in pool.map(lambda part: part(), parts) for check in checks]
 
@@ -208,6 +209,17 @@ def _key() -> list[Check]:
         return [Check(what, "ok", "ANTHROPIC_API_KEY is set")]
     told = "ANTHROPIC_API_KEY is not set, so joda generate works by rules"
     return [Check(what, "missing", told, "only if you want it, run: export ANTHROPIC_API_KEY=...")]
+
+
+def _cache() -> list[Check]:
+    folder = cache_folder()
+    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    if not size:
+        return [Check("cache", "ok", f"empty, {folder}")]
+    told = f"{size / 1e6:.1f} MB in {folder}, which an uninstallation leaves"
+    return [
+        Check("cache", "ok", told, f"to empty it, run: {shlex.join(['rm', '-r', str(folder)])}")
+    ]
 
 
 def _required(extra: str = "") -> list[str]:

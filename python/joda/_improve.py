@@ -9,9 +9,9 @@ import numpy as np
 
 from joda.diagnosis.improving import Step, improved
 from joda.diagnosis.mending import parted
-from joda.diagnosis.outcome import beside, draw_mended, held_out, read_timed, write_scene
+from joda.diagnosis.outcome import beside, draw_mended, held_out, read_timed, scene_files
 from joda.diagnosis.phrases import named
-from joda.files import check_target, write_bytes, write_text
+from joda.files import check_target, write_together
 from joda.measured.comparison import rms
 from joda.measured.maps import draw_maps, replayed
 from joda.measured.reading import Measured
@@ -89,7 +89,7 @@ def improve(
     steps, why = improved(measured, progress)
     progress("drawing")
     last, (_, held) = steps[-1].profile, parted(measured)
-    notes = write_scene(Path(model), last, target, composed)
+    files, notes = scene_files(Path(model), last, target, composed)
     result = Improved(
         scene=target,
         composed=composed,
@@ -104,9 +104,10 @@ def improve(
         notes=(*measured.notes, *notes),
     )
     drawn = png(_picture(result, measured, held))
-    write_bytes(picture, drawn)
+    files[picture] = drawn
     if report:
-        write_text(Path(report), _page(result, drawn))
+        files[Path(report)] = _page(result, drawn)
+    write_together(files)
     return result
 
 

@@ -9,15 +9,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._attach import attach
+from joda._attach import attached
 from joda._context import Context, context
 from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
-from joda.files import check_target, write_text
+from joda.files import check_target, write_together
 from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
 from joda.measured.runs import QuasiStatic, Run, read_measurement
 from joda.pictures.changes import changes
-from joda.pictures.style import write_png
+from joda.pictures.style import png
 from joda.refining.curvefit import CurveProblem
 from joda.refining.refinement import history, picture, unseen
 from joda.scenes.model import find_joint, joint_name, load
@@ -155,13 +155,18 @@ def refine(
         checked = other.rms(parameters.start), other.rms(result.theta)
     hidden = unseen(begin, parameters, result.covariance)
     also, said = _beyond(parameters, result.theta, compiled, number, found)
-    notes = attach(source, after, target, joint=name, also=also, force=True) + said
-    notes += problem.notes
-    write_text(beside["composed.json"], after.to_json())
+    scene, notes = attached(source, after, target, joint=name, also=also)
+    notes += [*said, *problem.notes]
     balance = np.array(found.positions), -np.array(found.gravity_force)
     figure = picture(before, after, balance, problem, result, hidden)
-    write_png(figure, beside["png"], force=True)
-    write_text(beside["history.json"], history(result, errors, problem.sigma, checked, hidden))
+    write_together(
+        {
+            target: scene,
+            beside["composed.json"]: after.to_json(),
+            beside["png"]: png(figure),
+            beside["history.json"]: history(result, errors, problem.sigma, checked, hidden),
+        }
+    )
     if windows and errors[1] > PARTED * max(windows[1], problem.sigma):
         notes.append(
             "Whole runs still part from the measured ones although windows of 0.4 s do not: near "

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from joda._context import Context, context
 from joda.errors import JodaError
-from joda.files import check_target
+from joda.files import check_target, write_together
 from joda.interaction.script import Describe, interaction, perform
 from joda.interaction.traces import FORCE, draw_force, draw_position, shade
-from joda.measured.runs import Run, write_run
+from joda.measured.runs import Run, run_text
 from joda.pictures.film import frames, write_film
-from joda.pictures.style import house_style, write_png
+from joda.pictures.style import house_style, png
 from joda.scenes.model import find_joint, joint_name, load_model, moves_with
 from joda.scenes.motion import FAST, Motion, fast, usual_speed
 
@@ -148,9 +148,10 @@ def simulate(
     usual = done.speed or usual_speed(motion)
     quick, than = fast(motion, usual), "the hand's speed" if done.speed else "its mean speed"
     run = Run(csv.name, motion.time, motion.position, motion.velocity, motion.force, forced=True)
-    write_run(csv, run, f"joint {found.joint.name} of {source.name}: {done.says}")
+    text = run_text(run, f"joint {found.joint.name} of {source.name}: {done.says}")
     words = Describe(found)
-    write_png(_picture(motion, quick, found, done.says, than), picture, force=True)
+    drawn = png(_picture(motion, quick, found, done.says, than))
+    write_together({csv: text, picture: drawn})
     if film:
         progress("rendering")
         _write_film(source, motion, poses, words, film)

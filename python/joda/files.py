@@ -2,10 +2,16 @@
 
 import os
 import tempfile
+from collections.abc import Mapping
 from itertools import count
 from pathlib import Path
 
 from joda.errors import JodaError
+
+
+def cache_folder() -> Path:
+    """What joda keeps from call to call for this user; it is all that an uninstallation leaves."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "joda"
 
 
 def read_text(path: Path) -> str:
@@ -21,11 +27,20 @@ def read_text(path: Path) -> str:
 
 
 def check_target(path: Path, force: bool) -> None:
-    """Raises JodaError if `path` exists and `force` is off, or its folder is missing."""
+    """Raises JodaError if `path` exists and `force` is off, or no file can be made there.
+
+    A full disk shows only when the file is written.
+    """
+    if path.exists() and not path.is_file():
+        raise JodaError(f"{path}: cannot be written (a folder or a device, no file).")
     if path.exists() and not force:
         raise JodaError(f"{path}: exists already; choose another name or add --force.")
     if not path.parent.is_dir():
         raise JodaError(f"{path}: the folder {path.parent} does not exist; create it first.")
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise _unwritable(path, error) from None
 
 
 def occupied(folder: Path) -> bool:
@@ -47,26 +62,40 @@ def make_folder(path: Path) -> None:
         raise JodaError(f"{path}: cannot be made ({error.strerror}).") from None
 
 
+def write_together(contents: Mapping[Path, bytes | str]) -> None:
+    """Writes these files, all of them whole, or none; raises JodaError if a folder forbids it.
+
+    All is on the disk under other names before the first file gets its own.
+    """
+    written: dict[Path, Path] = {}
+    path = Path()
+    try:
+        for path, content in contents.items():
+            descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+            written[path] = Path(name)
+            with os.fdopen(descriptor, "wb") as file:
+                file.write(content.encode("utf-8") if isinstance(content, str) else content)
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(name, 0o666 & ~umask)
+        for path, temporary in written.items():
+            temporary.replace(path)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    finally:
+        for temporary in written.values():
+            temporary.unlink(missing_ok=True)
+
+
 def write_bytes(path: Path, content: bytes) -> None:
     """Writes the whole file or nothing; raises JodaError if the folder does not allow it."""
-    try:
-        descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    except OSError as error:
-        raise JodaError(f"{path}: cannot be written ({error.strerror}).") from None
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, path)
-    except BaseException as error:
-        Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise JodaError(f"{path}: cannot be written ({error.strerror}).") from None
-        raise
+    write_together({path: content})
 
 
 def write_text(path: Path, text: str) -> None:
     """As write_bytes, for UTF-8 text."""
-    write_bytes(path, text.encode("utf-8"))
+    write_together({path: text})
+
+
+def _unwritable(path: Path, error: OSError) -> JodaError:
+    return JodaError(f"{path}: cannot be written ({error.strerror}).")

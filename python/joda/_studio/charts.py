@@ -25,6 +25,10 @@ LINE = "path://M0,3 H30 V7 H0 Z"
 """The legend's sign for a line."""
 SHOWN = 500
 """Most points of a line in a chart."""
+KNOCK = 0.005
+"""So near an end of the range, as a part of it, a force may leave the frame."""
+ROOM = 0.05
+"""Above and below what is shown, as a part of its height."""
 
 
 def unit(joint: Joint, channel: str) -> str:
@@ -142,12 +146,36 @@ def release(now: Motion | None, before: Motion | None, joint: Joint) -> dict[str
 
 
 def hand(now: Motion | None, before: Motion | None, joint: Joint) -> dict[str, Any]:
-    """The chart of a hand that opens and shuts a joint: its force over position."""
+    """The chart of a hand that opens and shuts a joint: its force over position.
+
+    A knock at an end of the range leaves the frame, else it would squeeze all the rest.
+    """
     shown = _both(now, before)
     factor, prefix = _prefix([{"y": m.force} for m, _ in shown] or [{"y": [0.0]}])
     lines = [_series(m.position, factor * m.force, *of) for m, of in shown]
     axes = f"position ({joint.unit})", f"hand's force ({prefix}{unit(joint, 'friction')})"
-    return _chart(*axes, lines, {"min": joint.range[0], "max": joint.range[1]})
+    chart = _chart(*axes, lines, {"min": joint.range[0], "max": joint.range[1]})
+    forces = [factor * m.force[_off_the_stops(m, joint)] for m, _ in shown]
+    chart["yAxis"] |= _scale(np.concatenate(forces or [np.zeros(0)]))
+    return chart
+
+
+def _off_the_stops(motion: Motion, joint: Joint) -> NDArray[np.bool_]:
+    """Where the joint is off the ends of its range by more than what a stop yields in a knock."""
+    lo, hi = joint.range
+    return np.abs(motion.position - (lo + hi) / 2) < (0.5 - KNOCK) * (hi - lo)
+
+
+def _scale(values: Array) -> dict[str, float | None]:
+    """An axis' ends and the interval of its marks, such that these values fill it."""
+    span = float(np.ptp(values)) if len(values) else 0.0
+    if span == 0:
+        return {"min": None, "max": None, "interval": None}
+    power = 10.0 ** math.floor(math.log10(span / 4))
+    step = next(k * power for k in (1, 2, 5, 10) if k * power >= span / 4)
+    low = math.floor((values.min() - ROOM * span) / step)
+    high = math.ceil((values.max() + ROOM * span) / step)
+    return {"min": round(low * step, 12), "max": round(high * step, 12), "interval": step}
 
 
 def run(now: Replayed, before: Replayed | None, number: int) -> dict[str, Any]:

@@ -15,9 +15,9 @@ from joda._context import context
 from joda._studio import edits
 from joda._studio.folder import Folder
 from joda._studio.timeline import Timeline
-from joda.diagnosis.outcome import write_scene
+from joda.diagnosis.outcome import scene_files
 from joda.errors import JodaError
-from joda.files import check_target, make_folder, write_bytes
+from joda.files import check_target, make_folder, write_bytes, write_together
 from joda.measured.reading import read_measured
 from joda.profile import Profile
 from joda.scenes.model import describe_joint, find_joint, joint_name, joint_type, load
@@ -190,7 +190,8 @@ class Desk:
         for path in (scene, composed):
             check_target(path, force)
         profile = self.timeline.present
-        notes = write_scene(self.scene, profile, scene, composed)
+        files, notes = scene_files(self.scene, profile, scene, composed)
+        write_together(files)
         self.kept.append(profile)
         return notes
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from joda._context import context
 from joda.interaction.script import interaction, perform
-from joda.measured.comparison import RunError, joined, rms
+from joda.measured.comparison import RunError
+from joda.measured.errors import errors
 from joda.measured.reading import Measured, read_measured
 from joda.scenes.model import find_joint, load_model
 from joda.scenes.motion import Motion
@@ -91,28 +92,22 @@ def replayed(
         Outdated: a newer profile waits.
     """
     measured = read_measured(scene, joint, runs)
-    paths, missed, left, rows = [], [], [], []
-    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+
+    def begin(name: str) -> None:
         if stale():
             raise Outdated
-        paths.append(measured.replayer.whole(run, sigma))
-        off = paths[-1] - run.position
-        missed.append(off[~np.isnan(off)])
-        if windows:
-            left.append(joined(measured.replayer.windows(run, sigma)))
-        error = rms(left[-1]) if windows else float("nan")
-        rows.append(RunError(run.name, rms(missed[-1]), error, sigma))
+
+    found = errors(measured, windows=windows, begin=begin)
     curves = tuple(
         f"{one.curve.name}: a quasi-static curve, which is not replayed; see joda compare."
         for one in measured.curves
     )
-    empty = float("nan")
     return Replayed(
         measured=measured,
-        paths=tuple(paths),
-        runs=tuple(rows),
-        rmse=rms(np.concatenate(missed)) if rows else empty,
-        rmse_window=rms(np.concatenate(left)) if left else empty,
-        noise_floor=rms(np.array(measured.sigma)) if rows else empty,
+        paths=found.paths,
+        runs=found.runs,
+        rmse=found.whole,
+        rmse_window=found.window,
+        noise_floor=found.noise,
         notes=(*measured.notes, *curves),
     )

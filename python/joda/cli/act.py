@@ -75,11 +75,11 @@ def simulate(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Let a joint go, push it, or take it by a virtual hand, in its scene: a run and its picture.
+    """Let a joint go, push it, or take it by a hand, in its scene.
 
-    Exactly one of --release, --push, --impulse, --hand, --open and --robot. The run holds time,
-    position, velocity and the force on the joint from outside, as joda compare and joda diagnose
-    read it. Example:
+    Exactly one of --release, --push, --impulse, --hand, --open and --robot. Leaves a picture and a
+    run, which holds time, position, velocity and the force on the joint from outside, as joda
+    compare and joda diagnose read it. Example:
 
         joda simulate oven/scene.xml --joint door --release 0.09 -o shuts.csv
 
@@ -118,10 +118,11 @@ def experiments(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Run the paper's cases against both its baselines: a table, and a gallery of pictures.
+    """Run the paper's cases against both its baselines.
 
-    Each case has a number that says what its object does; a profile and the baselines fitted to it
-    are parted where the numbers of all seeds are. Example:
+    Leaves a table, and a gallery of pictures. Each case has a number that says what its object
+    does; a profile and the baselines fitted to it are parted where the numbers of all seeds are.
+    Example:
 
         joda experiments switch --seeds 2 -o experiments
     """

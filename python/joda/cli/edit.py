@@ -28,7 +28,7 @@ def studio(
     ] = None,
     browser: Annotated[bool, typer.Option(help="Whether to open it in a browser.")] = True,
 ) -> None:
-    """Look at a joint in the browser, drag its curves, see it move, diagnose, and save.
+    """Look at a joint in the browser, drag its curves, and save.
 
     The page is served on this machine only. Ctrl-C ends it. Example:
 

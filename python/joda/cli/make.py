@@ -48,7 +48,7 @@ def demo(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Give an oven door its behaviour, and compare it with the same door without.
+    """Give an oven door its behaviour, beside the door without.
 
     Or simulate a joint with an effect that its model lacks, find it from measured runs, add it,
     and open the seal. Needs no key and no network. Example:
@@ -125,10 +125,11 @@ def generate(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Give a joint the behaviour of the object: propose, compile, simulate, revise.
+    """Give a joint the behaviour of its object.
 
-    Leaves context.json, pictures, proposal.json, composed.json, profile.png, scene.xml and
-    history.json. A folder of models is done joint by joint. Example:
+    Effects are proposed, compiled, simulated and revised. Leaves context.json, pictures,
+    proposal.json, composed.json, profile.png, scene.xml and history.json. A folder of models is
+    done joint by joint. Example:
 
         joda generate out/oven.xml --joint door -o stays --describe "it stays wherever it is left"
     """
@@ -173,7 +174,7 @@ def revise(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Change a generated profile in words; what is not complained about stays.
+    """Change a generated profile in words; the rest stays.
 
     Example:
 
@@ -208,7 +209,7 @@ def compile(
     key: Key = "",
     force: Force = False,
 ) -> None:
-    """Compile a proposal's words (weak, medium, strong...) to physical curves.
+    """Compile a proposal's words to physical curves.
 
     The same proposal and key give the same bytes. Example:
 
@@ -241,7 +242,7 @@ def attach(
     ] = "replace",
     force: Force = False,
 ) -> None:
-    """Write profiles into an existing scene; everything else in the file stays.
+    """Write profiles into a scene; all else in the file stays.
 
     The scene loads in plain MuJoCo wherever joda is installed. Example:
 

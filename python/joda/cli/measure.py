@@ -17,6 +17,7 @@ from joda.cli.tell import (
     tell_ratios,
     with_text_paths,
 )
+from joda.files import cache_folder
 
 
 def refine(
@@ -49,7 +50,7 @@ def refine(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Bend a joint's profile until simulation matches measured motions.
+    """Bend a joint's profile until it moves as was measured.
 
     Leaves, beside the scene, its .composed.json, .png and .history.json. Example:
 
@@ -59,9 +60,8 @@ def refine(
     from joda import refine as run
 
     # what JAX compiles takes longer than the fit itself, so it is kept for the next call
-    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     warnings.filterwarnings("ignore", "Error .* persistent compilation cache")  # a full disk
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(caches / "joda" / "jax"))
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache_folder() / "jax"))
     with loss_bar() as bar:
         result = run(
             model, joint, runs, output, check=check or (), iterations=iterations, method=method,
@@ -94,7 +94,7 @@ def compare(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Replay measured runs in the model: how far off it is, and where it fails.
+    """Replay measured runs: how far off the model is, and where.
 
     Example:
 
@@ -120,7 +120,7 @@ def bench(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure what profiles cost per step, as ratios within one run.
+    """Measure what profiles cost per step, as ratios.
 
     Example:
 

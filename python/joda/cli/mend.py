@@ -28,7 +28,7 @@ def diagnose(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Tell which physical effect a model lacks, where, and how much of it.
+    """Tell which effect a model lacks, where, and how much of it.
 
     Example:
 
@@ -62,9 +62,10 @@ def add(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Add the effect that a diagnosis names, if that lowers the error on runs held out.
+    """Add the effect that a diagnosis names, if that helps.
 
-    Leaves, beside the scene, its .composed.json and .png. Example:
+    It helps if it lowers the error on runs held out. Leaves, beside the scene, its .composed.json
+    and .png. Example:
 
         joda add hidden/model.xml hidden/run?.csv --joint joint --diagnosis diagnosis.json -o new.xml
     """  # noqa: E501
@@ -92,7 +93,7 @@ def improve(
     report: Report = None,
     force: Force = False,
 ) -> None:
-    """Diagnose and add, again and again, until the data support nothing more.
+    """Diagnose and add until the data support nothing more.
 
     Leaves, beside the scene, its .composed.json and .png. Example:
 

@@ -17,9 +17,9 @@ def context(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Tell what the model knows of a joint: axes, range, inertia, gravity, which end is up.
+    """Tell what the model knows of a joint: axes, range, inertia.
 
-    Example:
+    Also what gravity does to it, and which end is up. Example:
 
         joda context out/oven.xml --joint door
     """
@@ -43,9 +43,9 @@ def render(
     count: Annotated[int, typer.Option(min=2, help="How many positions.")] = 5,
     force: Force = False,
 ) -> None:
-    """Picture a joint at several positions: what it moves, its axis, which way is +q.
+    """Picture a joint at several positions.
 
-    Example:
+    They show what it moves, its axis, and which way is +q. Example:
 
         joda render out/oven.xml --joint door -o pictures
     """
@@ -67,7 +67,7 @@ def plot(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Draw a profile: force with its friction band, gravity's equilibrium, damping, components.
+    """Draw a profile: its components, gravity's equilibrium.
 
     Gravity is drawn for a scene. Example:
 

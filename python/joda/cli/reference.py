@@ -23,7 +23,7 @@ def templates(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """List the effect templates that a proposal can name, or picture their curves.
+    """List the effect templates, or picture their curves.
 
     Example:
 
@@ -57,9 +57,10 @@ def schema(
 
 
 def doctor(as_json: Json = False) -> None:
-    """Say what is installed, whether plugin and renderers work, and what to do if not.
+    """Say whether all works here, and what to do if not.
 
-    Ends with status 1 if something that joda needs does not work. Example:
+    Looks at what is installed, at the plugin, the renderers and joda's cache. Ends with status 1 if
+    something that joda needs does not work. Example:
 
         joda doctor
     """

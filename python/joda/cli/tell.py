@@ -1,6 +1,8 @@
 """Results as text or JSON on stdout."""
 
 import json
+import os
+import shlex
 import shutil
 import sys
 import textwrap
@@ -54,7 +56,16 @@ def tell_files(folder: Path, names: Iterable[str]) -> None:
 
 def tell_viewer(scene: Path) -> None:
     """How to look at a scene."""
-    print(f"See it move: python -m mujoco.viewer --mjcf={scene}")
+    command = shlex.join([_python(), "-m", "mujoco.viewer", f"--mjcf={scene}"])
+    print(f"See it move: {command}")
+
+
+def _python() -> str:
+    """How one types this Python: "python" where that is the one, as within an environment."""
+    found, own = shutil.which("python"), sys.executable
+    if found and os.path.dirname(found) == os.path.dirname(own) and os.path.samefile(found, own):
+        return "python"
+    return own
 
 
 def tell_round(round: "Round") -> None:

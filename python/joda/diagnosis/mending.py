@@ -12,7 +12,7 @@ import numpy as np
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.ranking import asked
 from joda.diagnosis.reshaping import Likelihood, checked, reshaped
-from joda.measured.comparison import joined, rms
+from joda.measured.errors import errors
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.profile import Profile
@@ -74,13 +74,8 @@ def _cut(run: Run, part: slice) -> Run:
 
 def error(measured: Measured, profile: Profile | None = None) -> Error:
     """How far the model, or another profile, is off in MuJoCo with the plugin."""
-    one = measured if profile is None else measured.changed(profile)
-    wholes, windows = [], []
-    for run, sigma in zip(one.runs, one.sigma, strict=True):
-        path = one.replayer.whole(run, sigma) - run.position
-        wholes.append(path[~np.isnan(path)])
-        windows.append(joined(one.replayer.windows(run, sigma)))
-    return Error(rms(np.concatenate(wholes)), rms(np.concatenate(windows)))
+    found = errors(measured if profile is None else measured.changed(profile))
+    return Error(found.whole, found.window)
 
 
 def mend(

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from joda._attach import attach
+from joda._attach import attached
 from joda.diagnosis.mending import Error
 from joda.errors import JodaError
-from joda.files import check_target, write_text
+from joda.files import check_target
 from joda.measured.maps import draw_runs
 from joda.measured.reading import Measured, read_measured
 from joda.pictures.changes import draw_channels
@@ -55,15 +55,16 @@ def beside(scene: Path, force: bool) -> tuple[Path, Path]:
     return composed, picture
 
 
-def write_scene(model: Path, profile: Profile, scene: Path, composed: Path) -> list[str]:
-    """Writes a scene with a whole profile (`joda.scenes.native`), and the profile.
+def scene_files(
+    model: Path, profile: Profile, scene: Path, composed: Path
+) -> tuple[dict[Path, bytes | str], list[str]]:
+    """What a scene with a whole profile (`joda.scenes.native`) and the profile's file hold.
 
     Returns:
-        what was done, a sentence each.
+        contents by path, and what is done there, a sentence each.
     """
-    notes = attach(model, profile, scene, joint=profile.joint.name, force=True)
-    write_text(composed, profile.to_json())
-    return notes
+    content, notes = attached(model, profile, scene, joint=profile.joint.name)
+    return {scene: content, composed: profile.to_json()}, notes
 
 
 def parting(after: Error, noise: float) -> list[str]:

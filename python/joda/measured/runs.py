@@ -140,8 +140,13 @@ def known(run: Run) -> list[NDArray[np.intp]]:
     return [group for group in groups if len(group) >= smoothing.LEAST]
 
 
-def write_run(path: Path, run: Run, comment: str = "") -> None:
-    """Writes a run as `read_run` reads it, with comments: the given one, and the units."""
+def write_run(path: Path, run: Run) -> None:
+    """Writes a run as `read_run` reads it."""
+    write_text(path, run_text(run))
+
+
+def run_text(run: Run, comment: str = "") -> str:
+    """A run's file, with comments: the given one, and the units."""
     columns = {"time": run.time, "position": run.position}
     if run.velocity is not None:
         columns["velocity"] = run.velocity
@@ -151,7 +156,7 @@ def write_run(path: Path, run: Run, comment: str = "") -> None:
     lines = [",".join("" if np.isnan(x) else f"{x:.9g}" for x in row) for row in rows]
     header = "".join(f"# {line}\n" for line in comment.splitlines())
     header += "# s, rad or m, rad/s or m/s, N·m or N"
-    write_text(path, "\n".join([header, ",".join(columns), *lines]) + "\n")
+    return "\n".join([header, ",".join(columns), *lines]) + "\n"
 
 
 def _table(path: Path) -> tuple[list[int], dict[str, Array]]:
