@@ -309,7 +309,7 @@ def examined(job: Job) -> dict:
 def said(train: Measured, exclude: tuple[str, ...] = ()) -> dict:
     """The diagnosis, in short."""
     begun = time.perf_counter()
-    diagnosis, _ = diagnosed(train, exclude)
+    diagnosis = diagnosed(train, exclude).diagnosis
     keys = ("effect", "probability", "interval", "direction", "indistinguishable_from")
     return {
         "seconds": time.perf_counter() - begun,

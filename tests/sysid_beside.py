@@ -198,7 +198,7 @@ def theirs(case: Case, train: Measured, folder: Path) -> tuple[float, str]:
 # --- ours
 def ours(train: Measured, held_out: Measured, before: float) -> tuple[float, str]:
     """Held-out error after adding what is named first, rad or m, and what is said."""
-    found, _ = diagnosed(train)
+    found = diagnosed(train).diagnosis
     if not found.effects:
         return before, found.verdict
     first = found.effects[0]

@@ -30,7 +30,7 @@ def said(folder: Path, law, ways=(1, -1), noise=0.02) -> Diagnosis:
     rows = "\n".join(f"{a:.5f},{b:.4f}" for a, b in zip(q, force, strict=True))
     (folder / "curve.csv").write_text("position,force\n" + rows + "\n")
     (folder / "model.xml").write_text(MODEL)
-    return diagnosed(read_measured(folder / "model.xml", "door", [folder / "curve.csv"]))[0]
+    return diagnosed(read_measured(folder / "model.xml", "door", [folder / "curve.csv"])).diagnosis
 
 
 def test_a_true_model_is_adequate(tmp_path):

@@ -74,7 +74,7 @@ def examined(folder, model, names):
     """A joint with its runs, and the diagnosis."""
     (folder / "model.xml").write_text(SCENE.format(**model))
     measured = read_measured(folder / "model.xml", "joint", [DATA / f"{n}.csv" for n in names])
-    found, _ = diagnosed(measured)
+    found = diagnosed(measured).diagnosis
     for one in found.effects:  # shown where a test fails
         print(f"{one.probability:.3f} {one.effect} {one.explanation} {one.indistinguishable_from}")
     return SimpleNamespace(measured=measured, told=found, first=found.effects[0])

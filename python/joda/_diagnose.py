@@ -58,7 +58,8 @@ def diagnose(
     for name in exclude:
         check_effect(name)
     measured = read_runs(model, joint, runs)
-    diagnosis, profile = diagnosed(measured, exclude, progress)
+    found = diagnosed(measured, exclude, progress)
+    diagnosis, profile = found.diagnosis, found.profile
     files: dict[Path, bytes | str] = {}
     if json:
         files[Path(json)] = diagnosis.to_json()

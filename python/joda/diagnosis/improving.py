@@ -3,9 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from joda.diagnosis.ahead import first_of_two
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.mending import Error, error, mend, parted
-from joda.diagnosis.verdict import diagnosed
+from joda.diagnosis.verdict import Diagnosed, diagnosed
 from joda.measured.reading import Measured
 from joda.profile import CHANNELS, Channels, Profile
 
@@ -65,11 +66,11 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
     try:
         while len(steps) <= MOST:
             told("diagnose")
-            diagnosis, _ = diagnosed(_with(parts, steps[-1].profile)[0])
-            steps[-1] = replace(steps[-1], diagnosis=diagnosis)
-            if (step := _next(parts, steps[-1].profile, diagnosis, told)) is None:
-                known = diagnosis.verdict == "missing_effect"
-                why = NOTHING_HELPS if known else diagnosis.summary
+            asked = diagnosed(_with(parts, steps[-1].profile)[0])
+            steps[-1] = replace(steps[-1], diagnosis=asked.diagnosis)
+            if (step := _next(parts, steps[-1].profile, asked, told)) is None:
+                known = asked.diagnosis.verdict == "missing_effect"
+                why = NOTHING_HELPS if known else asked.diagnosis.summary
                 break
             steps.append(step)
             steps = _named_anew(parts, steps, told)
@@ -78,14 +79,15 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
     return tuple(steps), why
 
 
-def _next(parts: Parts, profile: Profile, diagnosis: Diagnosis, told: Told) -> Step | None:
+def _next(parts: Parts, profile: Profile, asked: Diagnosed, told: Told) -> Step | None:
     """The first effect of the diagnosis that clearly lowers the error held out; None if none does.
 
-    Where no effect explains what is missing, perhaps several are: then one that explains a part is
-    taken.
+    Where no effect explains at once what is missing, perhaps two do.
     """
-    known = diagnosis.verdict == "missing_effect"
-    for number, finding in enumerate(diagnosis.effects[:TRIED]):
+    known, found = asked.diagnosis.verdict == "missing_effect", asked.diagnosis.effects
+    if not asked.at_once and asked.diagnosis.verdict != "adequate":
+        known, found = False, first_of_two(parts[0].changed(profile), told)
+    for number, finding in enumerate(found[:TRIED]):
         if known and number and finding.probability < LIKELY:
             return None
         most = WORTH if known or not number else MUCH
@@ -116,7 +118,7 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
         told(f"asking again what {step.effect} is")
         others = [one.added for one in added if one is not step]
         without = _without(added[-1].profile, step.effect or "", begin.profile)
-        found, _ = diagnosed(_with(parts, without)[0])
+        found = diagnosed(_with(parts, without)[0]).diagnosis
         if found.verdict != "missing_effect" or found.effects[0].effect in _names(added):
             continue
         instead = found.effects[0]

@@ -1,6 +1,7 @@
 """What a model lacks: the verdict on a ranking, with probabilities, sizes and sentences."""
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,27 +33,40 @@ NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, besides the first those of at least some probability."""
 
 
+@dataclass(frozen=True)
+class Diagnosed:
+    """What a model lacks.
+
+    Attributes:
+        diagnosis: for the user.
+        profile: with the likeliest effect; None if there is none.
+        at_once: whether the first look told; a doubtful answer took several.
+    """
+
+    diagnosis: Diagnosis
+    profile: Profile | None = None
+    at_once: bool = True
+
+
 def diagnosed(
     measured: Measured,
     exclude: Collection[str] = (),
     told: Told = lambda done, total, what: None,
-) -> tuple[Diagnosis, Profile | None]:
+) -> Diagnosed:
     """Finds what a model lacks.
 
     Args:
         measured: the joint and its runs.
         exclude: effects that are not considered.
         told: how much is done, of how much, and what.
-
-    Returns:
-        the diagnosis, and the profile with the likeliest effect; None if there is none.
     """
     if not usable(windows_for(measured)).any():
-        return _said(measured, "insufficient_data", TOO_SHORT, (), None), None
+        return Diagnosed(_said(measured, "insufficient_data", TOO_SHORT, (), None))
     ranking = rank(asked(measured), exclude, told)
     one_way = moved_one_way(measured)
     strictness = LOOSELY if one_way else 1.0
     weighed = weigh(ranking, strictness)
+    at_once = weighed.verdict != "unexplained"
     if weighed.verdict == "unexplained" and measured.runs:  # fits that stuck may be freed
         ranking = rank(ranking.asked.apart(), exclude, told, ranking.guesses)
         weighed = weigh(ranking, strictness)
@@ -63,17 +77,17 @@ def diagnosed(
         if again.verdict == "missing_effect" or again.share < weighed.share:
             ranking, weighed = longer, again
     if weighed.verdict == "adequate" and (why := too_little(measured)):
-        return _said(measured, "insufficient_data", why, (), None), None
+        return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if weighed.verdict == "adequate":
         summary = (
             f"The model is adequate: nothing beyond the noise ({_floor(measured):.2g} "
             f"{_unit(measured)}) that an effect would explain.{strengths_off(ranking)}"
         )
-        return _said(measured, "adequate", summary, (), None), None
+        return Diagnosed(_said(measured, "adequate", summary, (), None))
     held = Holdout(ranking.asked)
     named = range(min(NAMED, len(ranking.guesses)))
     findings = tuple(
-        _finding(
+        finding(
             measured, ranking, held, k, weighed, indistinguishable(ranking, weighed, k, one_way)
         )
         for k in named
@@ -82,7 +96,8 @@ def diagnosed(
     profile = ranking.guesses[0].written(ranking.asked.base)
     experiment = _next(measured, ranking, weighed, one_way)
     summary = summarised(findings[0], weighed, one_way)
-    return _said(measured, weighed.verdict, summary, findings, experiment), profile
+    said = _said(measured, weighed.verdict, summary, findings, experiment)
+    return Diagnosed(said, profile, at_once)
 
 
 def _said(
@@ -122,14 +137,24 @@ def _unit(measured: Measured) -> str:
     return joint.unit if measured.runs else joint.force_unit
 
 
-def _finding(
+def finding(
     measured: Measured,
     ranking: Ranking,
     held: Holdout,
     number: int,
     weighed: Weighed,
-    alike: tuple[str, ...],
+    alike: tuple[str, ...] = (),
 ) -> Finding:
+    """A guess of a ranking, told.
+
+    Args:
+        measured: the joint and its runs.
+        ranking: of what may be missing.
+        held: errors of windows held out.
+        number: of the guess.
+        weighed: the ranking's probabilities.
+        alike: effects that the data cannot tell from it.
+    """
     guess = ranking.guesses[number]
     hypothesis, x = guess.hypothesis, guess.x
     before, after = held.errors(guess)
