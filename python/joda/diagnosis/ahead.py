@@ -10,7 +10,7 @@ from joda.diagnosis.verdict import finding
 from joda.diagnosis.weighing import weigh
 from joda.measured.reading import Measured
 
-AHEAD = 5
+AHEAD = 4
 """Of how many effects it is seen what a second one adds."""
 
 
