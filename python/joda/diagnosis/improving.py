@@ -68,7 +68,7 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
             told("diagnose")
             asked = diagnosed(_with(parts, steps[-1].profile)[0])
             steps[-1] = replace(steps[-1], diagnosis=asked.diagnosis)
-            if (step := _next(parts, steps[-1].profile, asked, told)) is None:
+            if (step := _next(parts, steps[-1], asked, told)) is None:
                 known = asked.diagnosis.verdict == "missing_effect"
                 why = NOTHING_HELPS if known else asked.diagnosis.summary
                 break
@@ -79,19 +79,20 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
     return tuple(steps), why
 
 
-def _next(parts: Parts, profile: Profile, asked: Diagnosed, told: Told) -> Step | None:
+def _next(parts: Parts, last: Step, asked: Diagnosed, told: Told) -> Step | None:
     """The first effect of the diagnosis that clearly lowers the error held out; None if none does.
 
-    Where no effect explains at once what is missing, perhaps two do.
+    Where no effect explains at once what the model as it was lacks, perhaps two do: then the first
+    one of two is looked for.
     """
     known, found = asked.diagnosis.verdict == "missing_effect", asked.diagnosis.effects
-    if not asked.at_once and asked.diagnosis.verdict != "adequate":
-        known, found = False, first_of_two(parts[0].changed(profile), told)
+    if not (last.added or asked.at_once or asked.diagnosis.verdict == "adequate"):
+        known, found = False, first_of_two(parts[0].changed(last.profile), told)
     for number, finding in enumerate(found[:TRIED]):
         if known and number and finding.probability < LIKELY:
             return None
         most = WORTH if known or not number else MUCH
-        if step := _added(parts, profile, finding, most, told):
+        if step := _added(parts, last.profile, finding, most, told):
             return step
     return None
 
