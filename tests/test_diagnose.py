@@ -71,7 +71,7 @@ def hidden(tmp_path_factory):
         visible = case.visible
     print(effect, seed)  # shown where a test fails
     folder = tmp_path_factory.mktemp("hidden")
-    runs = write(case, folder)
+    runs = write(case, folder, count=8)
     names = [run.name for run in runs]
     told = joda(
         "diagnose", "model.xml", *names, "--joint", "joint", "--json", "d.json", "--report",
