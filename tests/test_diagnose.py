@@ -138,7 +138,7 @@ def test_adding_lowers_the_error_on_runs_that_nothing_has_seen(hidden):
     added = json.loads(hidden.added.stdout)
     assert added["added"], hidden.seed
     assert added["after"]["window"] < added["before"]["window"], hidden.seed
-    assert added["held_out"] == "run4.csv"
+    assert added["held_out"] == "run4.csv, run8.csv"
     before, after = (
         compare(hidden.folder / name, "joint", hidden.unseen) for name in ("model.xml", "new.xml")
     )
