@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.holdout import Holdout
-from joda.diagnosis.ranking import asked, rank
+from joda.diagnosis.ranking import Ranking, asked, rank
 from joda.diagnosis.reshaping import checked
 from joda.diagnosis.verdict import finding
 from joda.diagnosis.weighing import weigh
@@ -14,16 +14,18 @@ AHEAD = 4
 """Of how many effects it is seen what a second one adds."""
 
 
-def first_of_two(measured: Measured, told: Callable[[str], None]) -> tuple[Finding, ...]:
+def first_of_two(
+    measured: Measured, ranking: Ranking, told: Callable[[str], None]
+) -> tuple[Finding, ...]:
     """The likeliest effects; first the one beside which another one explains most.
 
     The one that explains most by itself often stands in for both.
 
     Args:
         measured: the joint and its runs.
+        ranking: of what may be missing.
         told: what is being done.
     """
-    ranking = rank(asked(measured))
     losses = []
     for guess in ranking.guesses[:AHEAD]:
         told(f"what is missing beside {guess.hypothesis.effect}")

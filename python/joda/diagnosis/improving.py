@@ -86,8 +86,9 @@ def _next(parts: Parts, last: Step, asked: Diagnosed, told: Told) -> Step | None
     one of two is looked for.
     """
     known, found = asked.diagnosis.verdict == "missing_effect", asked.diagnosis.effects
-    if not (last.added or asked.at_once or asked.diagnosis.verdict == "adequate"):
-        known, found = False, first_of_two(parts[0].changed(last.profile), told)
+    if asked.puzzling and not last.added:
+        train = parts[0].changed(last.profile)
+        known, found = False, first_of_two(train, asked.puzzling, told)
     for number, finding in enumerate(found[:TRIED]):
         if known and number and finding.probability < LIKELY:
             return None
@@ -120,7 +121,9 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
         others = [one.added for one in added if one is not step]
         without = _without(added[-1].profile, step.effect or "", begin.profile)
         found = diagnosed(_with(parts, without)[0]).diagnosis
-        if found.verdict != "missing_effect" or found.effects[0].effect in _names(added):
+        if found.verdict != "missing_effect" or found.effects[0].effect in [
+            one.effect for one in added
+        ]:
             continue
         instead = found.effects[0]
         for order in ([*others[:k], instead, *others[k:]], [*others, instead]):
@@ -145,10 +148,6 @@ def _stairs(
 def _with(parts: Parts, profile: Profile) -> Parts:
     train, held = parts
     return train.changed(profile), held.changed(profile)
-
-
-def _names(steps: Sequence[Step]) -> set[str | None]:
-    return {step.effect for step in steps}
 
 
 def _without(profile: Profile, effect: str, begin: Profile) -> Profile:

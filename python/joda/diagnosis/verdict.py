@@ -40,12 +40,12 @@ class Diagnosed:
     Attributes:
         diagnosis: for the user.
         profile: with the likeliest effect; None if there is none.
-        at_once: whether the first look told; a doubtful answer took several.
+        puzzling: the first look's ranking, where no effect explained it; else None.
     """
 
     diagnosis: Diagnosis
     profile: Profile | None = None
-    at_once: bool = True
+    puzzling: Ranking | None = None
 
 
 def diagnosed(
@@ -66,7 +66,7 @@ def diagnosed(
     one_way = moved_one_way(measured)
     strictness = LOOSELY if one_way else 1.0
     weighed = weigh(ranking, strictness)
-    at_once = weighed.verdict != "unexplained"
+    puzzling = ranking if weighed.verdict == "unexplained" else None
     if weighed.verdict == "unexplained" and measured.runs:  # fits that stuck may be freed
         ranking = rank(ranking.asked.apart(), exclude, told, ranking.guesses)
         weighed = weigh(ranking, strictness)
@@ -97,7 +97,7 @@ def diagnosed(
     experiment = _next(measured, ranking, weighed, one_way)
     summary = summarised(findings[0], weighed, one_way)
     said = _said(measured, weighed.verdict, summary, findings, experiment)
-    return Diagnosed(said, profile, at_once)
+    return Diagnosed(said, profile, puzzling)
 
 
 def _said(
