@@ -1,6 +1,6 @@
 """The model as it is, with the strengths of its components as numbers to be fitted again."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 
 BASE_DOUBT = 0.15
 """How far off (one standard deviation, relative) the model's own strengths may be."""
+SOFT = (0.02, 1.0)
+"""MuJoCo's own `solreflimit`: time constant (s) and damping ratio of the ends of a range."""
+BEYOND, STRAYS = 4.0, 3
+"""So many noises outside its range a joint is beyond it; at most so many samples are by chance."""
 LEAST = 4
 """Fewest samples of a window that counts."""
 
@@ -119,9 +123,26 @@ def windows_for(measured: Measured, length: float | None = None, fine: bool = Tr
     return windows_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine)
 
 
-def single_for(measured: Measured) -> Single:
-    """The joint, to be simulated where there are runs."""
-    return measured.single if measured.runs else Still(**vars(measured.single))
+def single_for(measured: Measured, h: float) -> Single:
+    """The joint, to be simulated in steps of h (s) where there are runs.
+
+    MuJoCo's own ends of a range yield by more than an encoder's noise to what presses on them. They
+    are hard here, unless somebody chose others or the measured ones yield too.
+    """
+    if not measured.runs:
+        return Still(**vars(measured.single))
+    if measured.single.solref != SOFT or _yields(measured):
+        return measured.single
+    return replace(measured.single, solref=(2 * h, 1.0))
+
+
+def _yields(measured: Measured) -> bool:
+    """Whether the joint was beyond its range by more than noise."""
+    beyond = (
+        np.abs(run.position - np.clip(run.position, *measured.profile.joint.range)) / sigma
+        for run, sigma in zip(measured.runs, measured.sigma, strict=True)
+    )
+    return sum(int(np.sum(noises > BEYOND)) for noises in beyond) > STRAYS
 
 
 def usable(windows: Windows) -> NDArray[np.bool_]:

@@ -23,6 +23,8 @@ STEPS = 300
 """Steps that a window has at least."""
 STOP = 0.004
 """How near an end of the range, in normalised position, counts as touching it."""
+HOP = 0.25
+"""How far a joint must fall back to an end to knock there, in units of that."""
 CLEAR = 1.5
 """How much larger the noise of fast samples must be to count as such."""
 
@@ -180,8 +182,10 @@ def _knocks(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
         near = STOP + 3 * noise[own]
         reach = near + np.where(travel > near, travel, 0.0)  # a knock may be between two samples
         touches = (s[own] < reach) | (s[own] > 1 - reach)
+        away = np.minimum(s[own], 1 - s[own])
+        fall = np.maximum.accumulate(away) - away  # hops at an end stay within `reach`
+        comes_back = (touches & (fall > HOP * STOP + 6 * noise[own])).any()
         moves = np.ptp(s[own]) > STOP + 6 * noise[own[0]]
-        arrives = touches[1:] & ~touches[:-1]
         rebounds = touches[0] and 2 * travel[0] > near[0]
-        out[k] = bool(moves and (arrives.any() or rebounds))
+        out[k] = bool(comes_back or (moves and rebounds))
     return out

@@ -17,12 +17,12 @@ from joda.measured.reading import Measured
 
 POLISHED, NEAR = 4, 3.0
 """Of how many effects the numbers are tried elsewhere, and up to which part of the least loss."""
+QUICK = 1200
+"""Samples up to which they are tried whatever their loss; of more, up to that part of the own."""
 CALM = 0.3
 """Part of the windows, the better ones, that tell the noise."""
 WORST = 1.5
 """Mean square residual that noise may make."""
-QUIET = 0.5
-"""The least: noise is not estimated better."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def asked(measured: Measured, length: float | None = None) -> Asked:
     """Fits the model's own strengths in windows of some length (s); None: by the joint's pace."""
     windows = windows_for(measured, length)
     judge = Judge(windows, usable(windows))
-    base = base_of(measured.profile, single_for(measured), windows.h)
+    base = base_of(measured.profile, single_for(measured, windows.h), windows.h)
     given = np.ones(len(base.places))
     starts = windows.start, judge.started(base.solo(given)).start
     fits = [judge.fit(base.solo, base.unknowns, given, start) for start in starts]
@@ -83,7 +83,7 @@ class Ranking:
     Attributes:
         asked: the model and its runs.
         guesses: the best one of each effect, the most likely first.
-        level: mean square residual that counts as noise.
+        level: mean square residual that counts as noise, 1 at least.
         told: how many samples count.
     """
 
@@ -129,7 +129,9 @@ def rank(
         best = _best(guesses)[:POLISHED]
         guesses += heard(map(begun.moved, best[:1]))
         least = min((one.fit.loss for one in guesses), default=0.0)
-        near = [one for one in best[1:] if one.fit.loss < NEAR * least]
+        part = min(QUICK / max(begun.judge.samples, 1.0), 1.0)
+        most = max(NEAR * least, part * begun.fit.loss)
+        near = [one for one in best[1:] if one.fit.loss < most]
         done = total - len(near)
         guesses += heard(pool.map(begun.moved, near))
     there = [one for one in (*guesses, *known) if not one.vanished]
@@ -160,11 +162,11 @@ def _levelled(judge: Judge, guesses: Sequence[Guess]) -> tuple[tuple[Guess, ...]
         return (), 1.0, samples
     best = min(guesses, key=lambda g: g.fit.loss + g.cost).fit.squares
     each = (best / np.maximum(judge.windows.count, 1))[judge.counts]
-    level = max(float(np.quantile(each, CALM)), QUIET)
+    level = max(float(np.quantile(each, CALM)), 1.0)
     told = float(judge.counts.sum()) if level > WORST else samples
 
     def scored(one: Guess) -> Guess:
-        beside = (one.fit.loss - judge.loss(one.fit.squares)) / max(level, 1.0)  # priors; knocks
+        beside = (one.fit.loss - judge.loss(one.fit.squares)) / level  # priors; knocks
         loss = (judge.loss(one.fit.squares, level=level) + beside) * told / samples
         cost = one.hypothesis.rarity + len(one.x) * np.log(max(told, 2.0))
         return replace(one, score=loss + cost)

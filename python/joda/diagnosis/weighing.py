@@ -66,19 +66,20 @@ def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
 
     def excess(loss: float, count: float) -> float:
         """Per sample, beyond what noise makes."""
-        return max(loss / count - BEND * float(np.log1p(1 / BEND)), 0.0)
+        return loss / count - BEND * float(np.log1p(1 / BEND))
 
     own = excess(judge.loss(ranking.asked.fit.squares, level=ranking.level), samples)
     left = np.array([excess(guess.score, ranking.told) for guess in guesses])
+    noise = min(left.min(), 0.0)  # less than it was taken for
+    own, left = max(own - noise, 0.0), left - noise
     part = max(first.hypothesis.remains, CRUDE if ranking.level > WORST else 0.0)
     unknown = strictness * max(part * own, min(WEAK * own, LEFT))
     weights = (left + LITTLE) ** -SHARPNESS
     likely = weights / (weights.sum() + (unknown + LITTLE) ** -SHARPNESS)
     gain = ranking.asked.fit.loss - first.fit.loss - first.cost
     if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and likely[0] < HARDLY):
-        level = min(max(ranking.level, 1.0), WORST)  # few windows' calm ones are calmer than noise
-        noise = judge.loss(ranking.asked.fit.squares, level=level)
-        said: Verdict = "adequate" if excess(noise, samples) < MUCH else "unexplained"
+        loss = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
+        said: Verdict = "adequate" if excess(loss, samples) < MUCH else "unexplained"
     elif likely[0] < 1 - likely.sum():
         said = "unexplained"
     else:
