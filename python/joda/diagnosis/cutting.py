@@ -68,7 +68,7 @@ def windows_of(
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST
             begun = smoothing.smooth(time, position, time[0] + h * begins, sigma)
             velocity, doubt = begun.velocity.copy(), begun.velocity_error.copy()
-            if smoothing.rests(velocity[0], doubt[0]):
+            if smoothing.begins_at_rest(time, position, sigma):
                 velocity[0], doubt[0] = 0.0, 0.1 * doubt[0] / LOOSE
             force = np.interp(time[0] + h * np.arange(steps), run.time, run.force)
             fresh = np.arange(many) == 0

@@ -21,7 +21,7 @@ FEW = 4
 ROUGH = 6
 """Iterations in which windows that are far off count in full."""
 BEST = 3
-"""How many trials of a hypothesis are fitted."""
+"""How many trials of a hypothesis with many are fitted."""
 APART = 0.06
 """How much these must differ in one of their numbers."""
 
@@ -89,6 +89,8 @@ def screened(
             hypothesis.unknowns.high[0],
         )
         out.append(first)
+    if len(out) <= BEST + 1:
+        return out
     order = np.argsort(gains)[::-1]
     chosen: list[int] = []
     for k in order:
@@ -112,7 +114,8 @@ def guess(judge: Judge, base: Base, fit: Fit, about: Linear, hypothesis: Hypothe
         for trial in screened(judge, base, fit, about, hypothesis)
     ]
     near = min(rough, key=lambda f: judge.loss(f.squares))
-    return guessed(judge, hypothesis, judge.fit(make, unknowns, near.x, near.start))
+    fit = judge.fit(make, unknowns, near.x, near.start)
+    return guessed(judge, hypothesis, judge.refit(make, unknowns, fit))
 
 
 def moved(judge: Judge, base: Base, found: Guess) -> Guess:
@@ -131,7 +134,7 @@ def moved(judge: Judge, base: Base, found: Guess) -> Guess:
             trial = judge.fit(make, unknowns, x, best.start, FEW)
             if trial.loss < best.loss - 1:
                 best = judge.fit(make, unknowns, trial.x, trial.start)
-    return guessed(judge, found.hypothesis, best)
+    return guessed(judge, found.hypothesis, judge.refit(make, unknowns, best))
 
 
 def guessed(judge: Judge, hypothesis: Hypothesis, fit: Fit) -> Guess:

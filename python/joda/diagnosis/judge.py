@@ -207,6 +207,16 @@ class Judge:
             damping = np.where(better, np.maximum(damping / 10, 1e-9), 10 * damping)
         return Fit(EMPTY, start, squares, self.loss(squares))
 
+    def refit(self, make: Make, unknowns: Unknowns, found: Fit, iterations: int = 12) -> Fit:
+        """A fit that goes on where some windows do better from a start that is sought anew."""
+        anew = self.started(solo := make(found.x))
+        better = (anew.squares < found.squares)[:, None]
+        start = np.where(better, anew.start, found.start)
+        loss = self.loss(self.squares(solo, start)[1]) + unknowns.penalty(found.x)
+        if loss > found.loss - SETTLED:
+            return found
+        return self.fit(make, unknowns, found.x, start, iterations)
+
     def fit(
         self,
         make: Make,

@@ -131,7 +131,9 @@ def rank(
         least = min((one.fit.loss for one in guesses), default=0.0)
         part = min(QUICK / max(begun.judge.samples, 1.0), 1.0)
         most = max(NEAR * least, part * begun.fit.loss)
-        near = [one for one in best[1:] if one.fit.loss < most]
+        names = {one.hypothesis.effect for one in best}
+        likely = [one for one in guesses if one.hypothesis.effect in names and one is not best[0]]
+        near = [one for one in likely if one.fit.loss < most]
         done = total - len(near)
         guesses += heard(pool.map(begun.moved, near))
     there = [one for one in (*guesses, *known) if not one.vanished]

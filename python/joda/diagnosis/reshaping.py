@@ -170,4 +170,4 @@ def refitted(train: Measured, profile: Profile, length: float, free: str | None 
     fit = judge.fit(make, unknowns, parameters.start, iterations=0)
     for bend in (BEND * usual(judge, fit), BEND):
         fit = judge.fit(make, unknowns, fit.x, fit.start, ROUNDS, bend)
-    return parameters.written(fit.x)
+    return parameters.written(judge.refit(make, unknowns, fit, ROUNDS).x)

@@ -68,7 +68,7 @@ class Replayer:
             return out
         known = slice(0, end)
         begun = smoothing.smooth(run.time[known], run.position[known], run.time[:1], sigma)
-        rests = smoothing.rests(begun.velocity[0], begun.velocity_error[0])
+        rests = smoothing.begins_at_rest(run.time[known], run.position[known], sigma)
         start = np.array([[begun.position[0], 0.0 if rests else begun.velocity[0]]])
         time = run.time[known] - run.time[0]
         steps = int(np.ceil(time[-1] / self.h)) + 1

@@ -18,6 +18,9 @@ WINDOWS = (0.02, 0.03, 0.045, 0.07)
 LEAST = 7
 """Fewest samples in a window."""
 REST = 2.0
+"""Errors within which a velocity counts as zero."""
+SOON = 0.8
+"""Part of the velocity soon after that a joint which begins at rest does not have at once."""
 CONFIDENCE = 1.0
 """Half width of the intervals, in standard deviations."""
 
@@ -38,11 +41,6 @@ class Smooth:
     velocity: Array
     position_error: Array
     velocity_error: Array
-
-
-def rests(velocity: float, error: float) -> bool:
-    """Whether a joint at the beginning of a run counts as at rest: within twice the error."""
-    return abs(velocity) < REST * error
 
 
 def noise(time: Array, position: Array) -> float:
@@ -119,6 +117,21 @@ def smooth(time: Array, position: Array, at: Array, sigma: float) -> Smooth:
         arrays of shape (m,).
     """
     return Smooth(*np.array([_local(time, position, t0, sigma) for t0 in at]).T)
+
+
+def begins_at_rest(time: Array, position: Array, sigma: float) -> bool:
+    """Whether a joint is at rest at the first sample: slow within the error, and no slowing down.
+
+    Args:
+        time: s, increasing, shape (n,).
+        position: shape (n,).
+        sigma: noise of the position.
+    """
+    soon = time[min(max(LEAST, int(np.searchsorted(time, time[0] + WINDOWS[0]))), len(time) - 1)]
+    found = smooth(time, position, np.array([time[0], soon]), sigma)
+    first, later = np.abs(found.velocity)
+    zero = REST * found.velocity_error
+    return bool(first < zero[0] and (later < zero[1] or first < SOON * later))
 
 
 def _local(time: Array, position: Array, t0: float, sigma: float) -> tuple[float, ...]:

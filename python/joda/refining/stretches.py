@@ -95,7 +95,7 @@ def cut(runs: Sequence[Run], h: float, sigma: float, window: float | None) -> St
                     continue
                 rows.append(_row(time - start, position, force, inside, h, round(length / h)))
                 velocity, doubt = begun.velocity[k], begun.velocity_error[k]
-                if k == 0 and smoothing.rests(velocity, doubt):
+                if k == 0 and smoothing.begins_at_rest(time, position, sigma):
                     velocity, doubt = 0.0, SURE * doubt
                 starts.append((begun.position[k], velocity))
                 doubts.append((begun.position_error[k], doubt))

@@ -132,7 +132,7 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         name,
         "both",
         unknowns_of(STRENGTH, CATCH, (0.004, 0.4, 0.002)),
-        np.array([(2 * TRIAL, 0.0, gap) for gap in (0.02, 0.04, 0.08, 0.16)]),
+        np.array(list(product((2 * TRIAL,), (0.0, 0.12), (0.02, 0.04, 0.08, 0.16)))),
         write,
         felt,
         lambda x: units.force * float(x[0]),
