@@ -148,6 +148,12 @@ def _best(guesses: Iterable[Guess]) -> list[Guess]:
     return list(best.values())
 
 
+def levelled(judge: Judge, fit: Fit, level: float) -> float:
+    """A fit's loss, with what its numbers lose by being off (and knocks), where noise is more."""
+    beside = fit.loss - judge.loss(fit.squares)
+    return judge.loss(fit.squares, level=level) + beside / level
+
+
 def _levelled(judge: Judge, guesses: Sequence[Guess]) -> tuple[tuple[Guess, ...], float, float]:
     """The best guesses, scored by what the best of them leaves in its better windows.
 
@@ -168,8 +174,7 @@ def _levelled(judge: Judge, guesses: Sequence[Guess]) -> tuple[tuple[Guess, ...]
     told = float(judge.counts.sum()) if level > WORST else samples
 
     def scored(one: Guess) -> Guess:
-        beside = (one.fit.loss - judge.loss(one.fit.squares)) / level  # priors; knocks
-        loss = (judge.loss(one.fit.squares, level=level) + beside) * told / samples
+        loss = levelled(judge, one.fit, level) * told / samples
         cost = one.hypothesis.rarity + len(one.x) * np.log(max(told, 2.0))
         return replace(one, score=loss + cost)
 

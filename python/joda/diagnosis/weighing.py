@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from joda.diagnosis.judge import BEND
-from joda.diagnosis.ranking import WORST, Ranking
+from joda.diagnosis.ranking import WORST, Ranking, levelled
 
 Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
 
@@ -24,6 +24,8 @@ WEAK, LEFT = 0.12, 0.5
 better."""
 LITTLE = 0.05
 """Excess per sample that is never worth a word."""
+CHANCE = 2.0
+"""So many standard deviations the noise may be more than it was taken for, or any amount less."""
 HARDLY = 0.1
 """Probability of the first effect below which a small excess is nothing that an effect explains."""
 MUCH = 0.5
@@ -68,9 +70,9 @@ def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
         """Per sample, beyond what noise makes."""
         return loss / count - BEND * float(np.log1p(1 / BEND))
 
-    own = excess(judge.loss(ranking.asked.fit.squares, level=ranking.level), samples)
+    own = excess(levelled(judge, ranking.asked.fit, ranking.level), samples)
     left = np.array([excess(guess.score, ranking.told) for guess in guesses])
-    noise = min(left.min(), 0.0)  # less than it was taken for
+    noise = min(left.min(), CHANCE * float(np.sqrt(2 / ranking.told)))  # not known better
     own, left = max(own - noise, 0.0), left - noise
     part = max(first.hypothesis.remains, CRUDE if ranking.level > WORST else 0.0)
     unknown = strictness * max(part * own, min(WEAK * own, LEFT))

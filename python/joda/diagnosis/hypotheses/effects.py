@@ -8,6 +8,7 @@ import numpy as np
 
 from joda.component import Component
 from joda.diagnosis.hypotheses.base import (
+    FREE_CURVE,
     KNOWN_LAW,
     KNOWN_SHAPE,
     STRENGTH,
@@ -70,6 +71,7 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
         everywhere,
         lambda x: unit * float(np.ptp(x)),
         unit_of(units, power),
+        remains=FREE_CURVE,
     )
 
 

@@ -29,6 +29,10 @@ CATCH = (0.0, 0.3, 0.01)
 """Dry friction of a catch, in units of its force."""
 BARRIER = (0.2, 3.0, 0.02)
 """Of a latch, in units of its hold."""
+CENTRES = ((0.5,), (0.27, 0.73))
+"""Of one well, and of two, in their interval; their outer flanks run out more slowly."""
+TAIL = 0.5
+"""Force halfway between a well's largest and its end, in units of that."""
 RARE = 3.0
 """Rarity of a constant force all over a slide's range: a tilt is the same, and more usual."""
 NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
@@ -76,14 +80,16 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
     """
     parts = len(lobes)
     zeros = np.arange(parts // 2 + 1) * 2 / parts
-    centres = 0.5 * (zeros[1:] + zeros[:-1])
+    centres = np.array(CENTRES[parts // 2 - 1])
 
     def write(profile: Profile, x: Array) -> Profile:
         half = float(x[1]) / parts
         tops = np.stack([centres - half, centres + half], axis=1).ravel()
-        at = np.concatenate([zeros, centres, tops])
+        tails = np.array([tops[0] / 2, (1 + tops[-1]) / 2])
+        at = np.concatenate([zeros, centres, tops, tails])
         order = np.argsort(at)
-        y = np.concatenate([np.zeros(len(zeros) + len(centres)), lobes])[order]
+        still = np.zeros(len(zeros) + len(centres))
+        y = np.concatenate([still, lobes, [TAIL * lobes[0], TAIL * lobes[-1]]])[order]
         interval = ends("anywhere", x)
         own = tuple(units.force * x[0] * y)
         part = Component(label=name, interval=interval, x=tuple(at[order]), y=own)
@@ -94,7 +100,7 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
     return Hypothesis(
         name,
         "both",
-        unknowns_of(STRENGTH, (0.3, 0.7, 0.02), CATCH, *bounds),
+        unknowns_of(STRENGTH, (0.2, 0.7, 0.02), CATCH, *bounds),
         np.array([(TRIAL, 0.45, 0.0, *t) for t in tries]),
         write,
         lambda x: ends("anywhere", x),
@@ -180,8 +186,8 @@ def _snap(units: Units, name: str) -> Hypothesis:
     def write(profile: Profile, x: Array) -> Profile:
         hold, share, end, tip, most = (float(value) for value in x[:5])
         barrier, rest = share * hold, 1 - tip
-        at = np.array((0.0, most * tip, tip, tip + 0.4 * rest, tip + 0.75 * rest, 1.0))
-        y = units.force * np.array((-end * hold, -hold, 0.0, barrier, 0.35 * barrier, 0.0))
+        at = np.array((0.0, most * tip, tip, tip + 0.33 * rest, tip + 0.66 * rest, 1.0))
+        y = units.force * np.array((-end * hold, -hold, 0.0, barrier, TAIL * barrier, 0.0))
         if not low:
             at, y = 1 - at[::-1], -y[::-1]
         interval = ends(place, x)
@@ -206,23 +212,23 @@ def _snap(units: Units, name: str) -> Hypothesis:
 
 
 def _bistable(units: Units, name: str) -> Hypothesis:
-    """Strength, where it tips over, and how far from there the force is largest."""
+    """Strength, where it tips over, how far from there the force turns, and its part at the ends."""
 
     def write(profile: Profile, x: Array) -> Profile:
         tip, far = float(x[1]), float(x[2])
         at = (0.0, tip * (1 - far), tip, tip + (1 - tip) * far, 1.0)
-        y = tuple(units.force * x[0] * np.array((-0.6, -1.0, 0.0, 1.0, 0.6)))
+        y = tuple(units.force * x[0] * np.array((-x[3], -1.0, 0.0, 1.0, x[3])))
         part = Component(label=name, interval=(0, 1), x=at, y=y)
         return profile.with_component("conservative", part)
 
     return Hypothesis(
         name,
         "both",
-        unknowns_of(STRENGTH, (0.2, 0.8, 0.01), (0.15, 0.85, 0.01)),
-        np.array(list(product((TRIAL,), (0.35, 0.5, 0.65), (0.3, 0.6)))),
+        unknowns_of(STRENGTH, (0.2, 0.8, 0.01), (0.15, 0.85, 0.01), (0.0, 1.8, 0.02)),
+        np.array(list(product((TRIAL,), (0.35, 0.5, 0.65), (0.3, 0.6), (0.8,)))),
         write,
         everywhere,
-        lambda x: units.force * float(x[0]),
+        lambda x: units.force * float(x[0]) * max(1.0, float(x[3])),
         unit_of(units),
         remains=KNOWN_SHAPE,
     )
