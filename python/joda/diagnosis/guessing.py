@@ -22,6 +22,8 @@ ROUGH = 6
 """Iterations in which windows that are far off count in full."""
 BEST = 3
 """How many trials of a hypothesis with many are fitted."""
+OFF = 0.1
+"""How far off a factor of the model's own strengths is that may stand in for what is missing."""
 APART = 0.06
 """How much these must differ in one of their numbers."""
 
@@ -105,13 +107,19 @@ def screened(
 
 
 def guess(judge: Judge, base: Base, fit: Fit, about: Linear, hypothesis: Hypothesis) -> Guess:
-    """The hypothesis fitted, from its most promising trials."""
+    """The hypothesis fitted, from its most promising trials.
+
+    Each from the model's own strengths as fitted without it, which may stand in for it, and, where
+    these are off, as they were given.
+    """
     make, unknowns = joined(base, hypothesis)
     wide = BEND * usual(judge, fit)
-
+    given = np.ones(len(fit.x))
+    own = [fit.x, given] if np.any(np.abs(fit.x - given) > OFF) else [fit.x]
     rough = [
-        judge.fit(make, unknowns, np.concatenate([fit.x, trial]), fit.start, ROUGH, wide)
+        judge.fit(make, unknowns, np.concatenate([x, trial]), fit.start, ROUGH, wide)
         for trial in screened(judge, base, fit, about, hypothesis)
+        for x in own
     ]
     near = min(rough, key=lambda f: judge.loss(f.squares))
     fit = judge.fit(make, unknowns, near.x, near.start)

@@ -19,7 +19,7 @@ NOTICEABLE = 0.02
 """The same, per sample."""
 CRUDE = 0.12
 """Part of its excess that any true effect may leave where more than noise is left of all."""
-WEAK, LEFT = 0.12, 0.5
+WEAK, LEFT = 0.12, 0.25
 """Part of its excess that any true effect may leave, up to so much per sample: noise is not known
 better."""
 LITTLE = 0.05

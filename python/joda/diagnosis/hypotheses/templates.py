@@ -34,7 +34,8 @@ CENTRES = ((0.5,), (0.27, 0.73))
 TAIL = 0.5
 """Force halfway between a well's largest and its end, in units of that."""
 RARE = 3.0
-"""Rarity of a constant force all over a slide's range: a tilt is the same, and more usual."""
+"""Rarity of magnets, latches and clicks beside what rubs in every joint, and of a constant force
+all over a slide's range: a tilt is the same, and more usual."""
 NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
 """Control points of a magnet, in units of its gap: there its force has fallen to 2 %."""
 SEEN = 3.47
@@ -107,6 +108,7 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
         lambda x: units.force * float(x[0]),
         unit_of(units),
         len(bounds),
+        rarity=RARE,
         remains=KNOWN_SHAPE,
     )
 
@@ -143,6 +145,7 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         felt,
         lambda x: units.force * float(x[0]),
         unit_of(units),
+        rarity=RARE,
         remains=KNOWN_SHAPE,
     )
 
@@ -207,12 +210,13 @@ def _snap(units: Units, name: str) -> Hypothesis:
         lambda x: units.force * float(x[0]) * max(1.0, float(x[1])),
         unit_of(units),
         len(bounds),
+        rarity=RARE,
         remains=KNOWN_SHAPE,
     )
 
 
 def _bistable(units: Units, name: str) -> Hypothesis:
-    """Strength, where it tips over, how far from there the force turns, and its part at the ends."""
+    """Strength, where it tips over, how far from there the force turns, its part at the ends."""
 
     def write(profile: Profile, x: Array) -> Profile:
         tip, far = float(x[1]), float(x[2])
