@@ -179,21 +179,19 @@ def door(request, tmp_path_factory):
     return examined(tmp_path_factory.mktemp(request.param), DOOR, names)
 
 
-def lab_is_unexplained(request):
-    """One run, with a catch over a tenth of the way: a known limit of the diagnosis."""
-    if request.node.callspec.params["door"] == "lab":
-        pytest.xfail("the lab cabinet's one run is called unexplained, with drag named first")
 
-
-def test_the_doors_resist_by_position(door, request):
-    lab_is_unexplained(request)
+def test_the_doors_resist_by_position(door):
     assert door.told.verdict == "missing_effect"
     assert door.first.effect in BY_PLACE
+
+
+def test_the_resistance_lowers_the_error_held_out(door, request):
+    if request.node.callspec.params["door"] == "lab":
+        pytest.xfail("of the lab cabinet's one run the windows held out hardly see its catch")
     assert door.first.held_out_error_after < door.first.held_out_error_before
 
 
-def test_of_one_direction_both_readings_are_named(door, request):
-    lab_is_unexplained(request)
+def test_of_one_direction_both_readings_are_named(door):
     likely = {door.first.effect, *door.first.indistinguishable_from}
     assert likely & set(RESISTING)
     assert likely & set(DRIVING)
