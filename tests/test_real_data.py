@@ -179,7 +179,6 @@ def door(request, tmp_path_factory):
     return examined(tmp_path_factory.mktemp(request.param), DOOR, names)
 
 
-
 def test_the_doors_resist_by_position(door):
     assert door.told.verdict == "missing_effect"
     assert door.first.effect in BY_PLACE
