@@ -1,5 +1,6 @@
 """A hypothesis fitted together with the model's own strengths, from where it promises most."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ BEST = 3
 """How many trials of a hypothesis with many are fitted."""
 OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
+MANY = 4000
+"""Samples from which a fit goes on from there only."""
 APART = 0.06
 """How much these must differ in one of their numbers."""
 
@@ -60,13 +63,43 @@ class Guess:
         return self.hypothesis.write(base.written(self.fit.x[: len(base.places)]), self.x)
 
 
-def screened(
-    judge: Judge, base: Base, fit: Fit, about: Linear, hypothesis: Hypothesis
-) -> list[Array]:
+@dataclass(frozen=True)
+class Begin:
+    """The model without a hypothesis, from where that is fitted.
+
+    Attributes:
+        fit: of the model's factors.
+        bend: mean square residual from which a window counts as its logarithm at first.
+        about: the model there, linear.
+    """
+
+    fit: Fit
+    bend: float
+    about: Linear
+
+
+def begins(judge: Judge, base: Base, fit: Fit) -> tuple[Begin, ...]:
+    """From the model as it was fitted, and of few samples as it was given, where that is far off.
+
+    A factor that is far off may stand in for what is missing; many samples lead back from there.
+    """
+    given = np.ones(len(fit.x))
+    fits = [fit]
+    if judge.samples < MANY and np.any(np.abs(fit.x - given) > OFF):
+        started = judge.started(base.solo(given))
+        fits.append(Fit(given, started.start, started.squares, started.loss))
+    wide = [BEND * usual(judge, one) for one in fits]
+    return tuple(
+        Begin(one, bend, judge.linear(base.solo, base.unknowns, one.x, one.start, bend))
+        for one, bend in zip(fits, wide, strict=True)
+    )
+
+
+def screened(judge: Judge, base: Base, begin: Begin, hypothesis: Hypothesis) -> list[Array]:
     """The most promising trials, by the gain that a small strength promises."""
     if len(hypothesis.trials) == 1:
         return list(hypothesis.trials)
-    windows = judge.windows
+    windows, fit, about = judge.windows, begin.fit, begin.about
     profile = base.written(fit.x)
     H, gradient = about.normal()
     H = H + np.diag(base.unknowns.doubt**-2.0)
@@ -86,7 +119,7 @@ def screened(
         gains.append(slope**2 / max(bend, 1e-12) if amount > 0 else 0.0)
         first = trial.copy()
         first[0] = np.clip(
-            trial[0] * np.clip(amount, 0.3, 30.0),
+            trial[0] * np.clip(amount, 0.3, 300.0),
             hypothesis.unknowns.low[0],
             hypothesis.unknowns.high[0],
         )
@@ -106,24 +139,19 @@ def screened(
     return [out[k] for k in chosen]
 
 
-def guess(judge: Judge, base: Base, fit: Fit, about: Linear, hypothesis: Hypothesis) -> Guess:
-    """The hypothesis fitted, from its most promising trials.
-
-    Each from the model's own strengths as fitted without it, which may stand in for it, and, where
-    these are off, as they were given.
-    """
+def guess(judge: Judge, base: Base, begun: Sequence[Begin], hypothesis: Hypothesis) -> Guess:
+    """The hypothesis fitted, from its most promising trials."""
     make, unknowns = joined(base, hypothesis)
-    wide = BEND * usual(judge, fit)
-    given = np.ones(len(fit.x))
-    own = [fit.x, given] if np.any(np.abs(fit.x - given) > OFF) else [fit.x]
-    rough = [
-        judge.fit(make, unknowns, np.concatenate([x, trial]), fit.start, ROUGH, wide)
-        for trial in screened(judge, base, fit, about, hypothesis)
-        for x in own
-    ]
-    near = min(rough, key=lambda f: judge.loss(f.squares))
-    fit = judge.fit(make, unknowns, near.x, near.start)
-    return guessed(judge, hypothesis, judge.refit(make, unknowns, fit))
+
+    def fitted(begin: Begin) -> Fit:
+        trials = (
+            np.concatenate([begin.fit.x, x]) for x in screened(judge, base, begin, hypothesis)
+        )
+        rough = [judge.fit(make, unknowns, x, begin.fit.start, ROUGH, begin.bend) for x in trials]
+        near = min(rough, key=lambda f: judge.loss(f.squares))
+        return judge.refit(make, unknowns, judge.fit(make, unknowns, near.x, near.start))
+
+    return guessed(judge, hypothesis, min(map(fitted, begun), key=lambda f: f.loss))
 
 
 def moved(judge: Judge, base: Base, found: Guess) -> Guess:

@@ -9,9 +9,9 @@ import numpy as np
 
 from joda._templates import templates
 from joda.diagnosis.baseline import Base, base_of, single_for, units_of, usable, windows_for
-from joda.diagnosis.guessing import Guess, guess, moved, usual
+from joda.diagnosis.guessing import Begin, Guess, begins, guess, moved
 from joda.diagnosis.hypotheses import Hypothesis, hypotheses
-from joda.diagnosis.judge import BEND, Fit, Judge, Linear
+from joda.diagnosis.judge import Fit, Judge
 from joda.diagnosis.knocks import knock_guess
 from joda.measured.reading import Measured
 
@@ -33,14 +33,14 @@ class Asked:
         judge: of the windows.
         base: the model as it is.
         fit: of its factors alone.
-        about: the model there, linear.
+        begins: from where hypotheses are fitted.
         hypotheses: all of the catalogue.
     """
 
     judge: Judge
     base: Base
     fit: Fit
-    about: Linear
+    begins: tuple[Begin, ...]
     hypotheses: tuple[Hypothesis, ...]
 
     def tell(self, hypothesis: Hypothesis) -> Guess | None:
@@ -51,7 +51,7 @@ class Asked:
 
     def guess(self, hypothesis: Hypothesis) -> Guess:
         """The hypothesis fitted to windows without knocks."""
-        return guess(self.judge, self.base, self.fit, self.about, hypothesis)
+        return guess(self.judge, self.base, self.begins, hypothesis)
 
     def apart(self) -> "Asked":
         """The same, but what is fitted from here on has every window's start apart."""
@@ -71,9 +71,8 @@ def asked(measured: Measured, length: float | None = None) -> Asked:
     starts = windows.start, judge.started(base.solo(given)).start
     fits = [judge.fit(base.solo, base.unknowns, given, start) for start in starts]
     fit = min(fits, key=lambda f: f.loss)
-    about = judge.linear(base.solo, base.unknowns, fit.x, fit.start, BEND * usual(judge, fit))
     every = hypotheses(units_of(windows, measured), templates(), measured.profile)
-    return Asked(judge, base, fit, about, tuple(every))
+    return Asked(judge, base, fit, begins(judge, base, fit), tuple(every))
 
 
 @dataclass(frozen=True)
