@@ -23,12 +23,12 @@ ROUGH = 6
 """Iterations in which windows that are far off count in full."""
 BEST = 3
 """How many trials of a hypothesis with many are fitted."""
+APART = 0.06
+"""How much these must differ in one of their numbers."""
 OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
 MANY = 4000
-"""Samples from which a fit goes on from there only."""
-APART = 0.06
-"""How much these must differ in one of their numbers."""
+"""Samples from which hypotheses are fitted from there only."""
 
 
 @dataclass(frozen=True)
