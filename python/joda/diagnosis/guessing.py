@@ -21,14 +21,14 @@ FEW = 4
 """Iterations after that."""
 ROUGH = 6
 """Iterations in which windows that are far off count in full."""
-BEST = 3
-"""How many trials of a hypothesis with many are fitted."""
+BEST, MORE = 3, 6
+"""How many trials of a hypothesis with many are fitted: of many samples, and of few."""
 APART = 0.06
 """How much these must differ in one of their numbers."""
 OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
 MANY = 4000
-"""Samples from which hypotheses are fitted from there only."""
+"""Samples that count as many: from there on, what was fitted first is hardly in the way."""
 
 
 @dataclass(frozen=True)
@@ -124,12 +124,13 @@ def screened(judge: Judge, base: Base, begin: Begin, hypothesis: Hypothesis) -> 
             hypothesis.unknowns.high[0],
         )
         out.append(first)
-    if len(out) <= BEST + 1:
+    most = BEST if judge.samples > MANY else MORE
+    if len(out) <= most + 1:
         return out
     order = np.argsort(gains)[::-1]
     chosen: list[int] = []
     for k in order:
-        if len(chosen) == BEST:
+        if len(chosen) == most:
             break
         apart = [
             np.abs(hypothesis.trials[k] - hypothesis.trials[c])[1:].max(initial=0.0) for c in chosen

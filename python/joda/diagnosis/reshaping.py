@@ -33,6 +33,8 @@ ROUNDS = 6
 """Iterations with each length, while windows that are far off count, and after."""
 NUDGE = 0.004
 """Step of a number for differences, in its own unit."""
+GIVEN_DOUBT = 0.3
+"""How far off (one standard deviation, relative) a control point of the model as given may be."""
 PRICE = 2.0
 """What a control point must gain, of twice the log-likelihood (Akaike 1974)."""
 
@@ -154,13 +156,9 @@ def refitted(train: Measured, profile: Profile, length: float, free: str | None 
     if not n:
         return profile
     unbounded = np.full(n, np.inf)
+    mean, doubt = _known(parameters, train.profile)
     unknowns = Unknowns(
-        -unbounded,
-        unbounded,
-        np.full(n, NUDGE),
-        parameters.start,
-        parameters.doubt,
-        parameters.constraints,
+        -unbounded, unbounded, np.full(n, NUDGE), mean, doubt, parameters.constraints
     )
     single, h = train.single, windows.h
 
@@ -171,3 +169,21 @@ def refitted(train: Measured, profile: Profile, length: float, free: str | None 
     for bend in (BEND * usual(judge, fit), BEND):
         fit = judge.fit(make, unknowns, fit.x, fit.start, ROUNDS, bend)
     return parameters.written(judge.refit(make, unknowns, fit, ROUNDS).x)
+
+
+def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:
+    """What is known of the numbers before the data, and how well.
+
+    Control points of the model as it was given are near what they are there, however often all is
+    fitted: else its friction and damping stand in for what is still missing.
+    """
+    mean, doubt = parameters.start.copy(), parameters.doubt.copy()
+    for k, (slot, scale) in enumerate(zip(parameters.slots, parameters.scales, strict=True)):
+        if slot.kind != "values":
+            continue
+        channel = getattr(parameters.profile.channels, slot.channel).components
+        there = getattr(given.channels, slot.channel).components[slot.component :][:1]
+        if there and any(there[0].y) and len(there[0].y) == len(channel[slot.component].y):
+            mean[k] = there[0].y[slot.index] / scale
+            doubt[k] = GIVEN_DOUBT * max(map(abs, there[0].y)) / scale
+    return mean, doubt

@@ -22,6 +22,11 @@ from joda.scenes.scene import profiles_of
 
 Array = NDArray[np.float64]
 
+FINEST = 1e-6
+"""Least noise, in units of the range."""
+LEAST = 0.3
+"""The same of a run, in units of the runs' usual noise: one encoder measured them all."""
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -99,7 +104,9 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
             curves.append(beside)
             notes += more
     timed = tuple(run for run in read if isinstance(run, Run))
-    least = 1e-6 * float(np.ptp(profile.joint.range))
+    noises = [smoothing.noise(run.time, run.position) for run in timed]
+    usual = float(np.median(noises)) if noises else 0.0
+    least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     own, step = single(found, profile, compiled, number), float(compiled.opt.timestep)
     return Measured(
         context=found,
@@ -108,7 +115,7 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
         timestep=step,
         replayer=Replayer(found, profile, own, step),
         runs=timed,
-        sigma=tuple(max(smoothing.noise(run.time, run.position), least) for run in timed),
+        sigma=tuple(max(noise, least) for noise in noises),
         curves=tuple(curves),
         notes=tuple(notes),
     )

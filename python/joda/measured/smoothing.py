@@ -95,7 +95,7 @@ def resolution(position: Array) -> float:
     steps = steps[steps > 1e-6 * (values[-1] - values[0])]  # smaller ones are rounding
     if len(steps) < 3:
         return 0.0
-    for parts in (1, 2, 3):  # the smallest difference that occurs may be a few steps
+    for parts in range(1, 7):  # the smallest difference that occurs may be a few steps
         step = steps.min() / parts
         near = steps[steps < 10 * step * parts]
         counts = np.round(near / step)

@@ -200,7 +200,7 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
     if units.hinge:
         yield _effect(
             "gravity_offset",
-            [(-20.0, 20.0, 0.005)] * 2,
+            [(-300.0, 300.0, 0.005)] * 2,
             [(TRIAL, 0.0), (0.0, TRIAL)],
             lambda x: GravityOffset(sin=F * float(x[0]) or TINY, cos=F * float(x[1])),
             lambda x: F * float(np.hypot(*x)),
@@ -209,7 +209,7 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
     else:
         yield _effect(
             "gravity_offset",
-            [(-20.0, 20.0, 0.005)],
+            [(-300.0, 300.0, 0.005)],
             [[TRIAL]],
             lambda x: GravityOffset(force=F * float(x[0]) or TINY),
             lambda x: F * abs(float(x[0])),

@@ -27,8 +27,6 @@ EDGE = (0.002, 0.3, 0.01)
 """Of a constant on a part of the range, in units of that part."""
 CATCH = (0.0, 0.3, 0.01)
 """Dry friction of a catch, in units of its force."""
-STEEP = (0.0, 300.0, 0.005)
-"""Of a magnet, a latch or a well: a joint left alone hardly goes where it is strong."""
 BARRIER = (0.2, 3.0, 0.02)
 """Of a latch, in units of its hold."""
 CENTRES = ((0.5,), (0.27, 0.73))
@@ -103,7 +101,7 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
     return Hypothesis(
         name,
         "both",
-        unknowns_of(STEEP, (0.2, 0.7, 0.02), CATCH, *bounds),
+        unknowns_of(STRENGTH, (0.2, 0.7, 0.02), CATCH, *bounds),
         np.array([(TRIAL, 0.45, 0.0, *t) for t in tries]),
         write,
         lambda x: ends("anywhere", x),
@@ -141,7 +139,7 @@ def _magnet(units: Units, name: str) -> Hypothesis:
     return Hypothesis(
         name,
         "both",
-        unknowns_of(STEEP, CATCH, (0.004, 0.4, 0.002)),
+        unknowns_of(STRENGTH, CATCH, (0.004, 0.4, 0.002)),
         np.array(list(product((2 * TRIAL,), (0.0, 0.12), (0.02, 0.04, 0.08, 0.16)))),
         write,
         felt,
@@ -201,7 +199,7 @@ def _snap(units: Units, name: str) -> Hypothesis:
         return _caught(profile.with_component("conservative", part), name, interval, rubs)
 
     bounds, tries = places(place, WIDEST)
-    own = [STEEP, BARRIER, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), (0.15, 0.7, 0.02), CATCH]
+    own = [STRENGTH, BARRIER, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), (0.15, 0.7, 0.02), CATCH]
     return Hypothesis(
         name,
         "both",
