@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from joda.diagnosis.ahead import first_of_two
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.mending import Error, error, mend, parted
@@ -22,9 +20,6 @@ NOTHING_HELPS = "No likely effect lowers the error on the runs that were held ou
 WORTH, MUCH = 0.95, 0.8
 """Part of the error before, on runs held out, to which an effect must bring it: a likely one; one
 that is tried because nothing is likely and the first did not."""
-FAR = 0.5
-"""How far, in units of what it was, one of the model's own curves must be fitted from it to be
-suspected of standing in for what is missing."""
 AS_GOOD = 1.05
 """Part of the error with an effect up to which one that is likelier may take its place."""
 
@@ -71,9 +66,9 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
     try:
         while len(steps) <= MOST:
             told("diagnose")
-            profile, asked = _asked(parts, steps)
+            asked = diagnosed(_with(parts, steps[-1].profile)[0])
             steps[-1] = replace(steps[-1], diagnosis=asked.diagnosis)
-            if (step := _next(parts, steps[-1], profile, asked, told)) is None:
+            if (step := _next(parts, steps[-1], asked, told)) is None:
                 known = asked.diagnosis.verdict == "missing_effect"
                 why = NOTHING_HELPS if known else asked.diagnosis.summary
                 break
@@ -84,21 +79,7 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
     return tuple(steps), why
 
 
-def _asked(parts: Parts, steps: Sequence[Step]) -> tuple[Profile, Diagnosed]:
-    """What is missing still, and the profile that lacks it.
-
-    If the model's own strengths were fitted far from what they were, they may stand in for it: then
-    it is asked for beside what they were.
-    """
-    last = steps[-1].profile
-    asked = diagnosed(_with(parts, last)[0])
-    given = _given(last, steps[0].profile)
-    if asked.diagnosis.verdict == "adequate" or given == last:
-        return last, asked
-    return given, diagnosed(_with(parts, given)[0])
-
-
-def _next(parts: Parts, last: Step, profile: Profile, asked: Diagnosed, told: Told) -> Step | None:
+def _next(parts: Parts, last: Step, asked: Diagnosed, told: Told) -> Step | None:
     """The first effect of the diagnosis that clearly lowers the error held out; None if none does.
 
     Where no effect explains at once what the model as it was lacks, perhaps two do: then the first
@@ -106,13 +87,13 @@ def _next(parts: Parts, last: Step, profile: Profile, asked: Diagnosed, told: To
     """
     known, found = asked.diagnosis.verdict == "missing_effect", asked.diagnosis.effects
     if asked.puzzling and not last.added:
-        train = parts[0].changed(profile)
+        train = parts[0].changed(last.profile)
         known, found = False, first_of_two(train, asked.puzzling, told)
     for number, finding in enumerate(found[:TRIED]):
         if known and number and finding.probability < LIKELY:
             return None
-        most = (WORTH if known or not number else MUCH) * last.error.window
-        if step := _added(parts, profile, finding, most, told):
+        most = WORTH if known or not number else MUCH
+        if step := _added(parts, last.profile, finding, most, told):
             return step
     return None
 
@@ -120,11 +101,11 @@ def _next(parts: Parts, last: Step, profile: Profile, asked: Diagnosed, told: To
 def _added(
     parts: Parts, profile: Profile, finding: Finding, most: float, told: Told
 ) -> Step | None:
-    """The profile with what was found, if that brings the error held out below `most`."""
+    """The profile with what was found, if that brings the error held out to a part of it."""
     told(f"add {finding.effect}")
     train, held = _with(parts, profile)
     mended = mend(train, held, finding.effect, finding.direction, finding.interval, told)
-    if mended.effect and mended.after.window < most:
+    if mended.effect and mended.after.window < most * mended.before.window:
         return Step(finding, mended.profile, mended.after)
     return None
 
@@ -158,8 +139,7 @@ def _stairs(
     """What was found, added one after the other; None if one of them does not lower the error."""
     steps = [begin]
     for finding in findings:
-        most = WORTH * steps[-1].error.window
-        if not finding or not (step := _added(parts, steps[-1].profile, finding, most, told)):
+        if not finding or not (step := _added(parts, steps[-1].profile, finding, WORTH, told)):
             return None
         steps.append(step)
     return steps
@@ -168,20 +148,6 @@ def _stairs(
 def _with(parts: Parts, profile: Profile) -> Parts:
     train, held = parts
     return train.changed(profile), held.changed(profile)
-
-
-def _given(profile: Profile, begin: Profile) -> Profile:
-    """The profile, with the model's own components that were fitted far from it as they were."""
-    channels = {}
-    for name in CHANNELS:
-        channel = getattr(profile.channels, name)
-        parts = list(channel.components)
-        for k, own in enumerate(getattr(begin.channels, name).components):
-            y, was = np.array(parts[k].y), np.array(own.y)
-            if np.abs(y - was).max() > FAR * np.abs(was).max():
-                parts[k] = own
-        channels[name] = channel.model_copy(update={"components": tuple(parts)})
-    return profile.model_copy(update={"channels": Channels(**channels)})
 
 
 def _without(profile: Profile, effect: str, begin: Profile) -> Profile:
