@@ -46,9 +46,21 @@ def hops(height, hold=0.0):
 
 
 @pytest.mark.parametrize("height", [0.003, 0.03, 0.3])
-def test_hops_at_an_end_are_knocks(height):
-    assert cut(hops(height)).knocks.all()
-    assert cut(1 - hops(height)).knocks.all()
+@pytest.mark.parametrize("low", [True, False])
+def test_hops_at_an_end_are_knocks(height, low):
+    windows = cut(hops(height) if low else 1 - hops(height))
+    assert windows.knocks[-1]
+    for row in windows.rows[~windows.knocks]:  # the flight before the first one
+        assert windows.time[row[row >= 0]].max() < 0.1
+
+
+def test_what_is_before_a_knock_is_kept():
+    """A joint that falls to its end in 0.15 s and stays there, in windows of 0.2 s."""
+    t = STEP * np.arange(400)
+    windows = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0))
+    first, knock, *rest = (windows.time[row[row >= 0]] for row in windows.rows)
+    assert list(windows.knocks) == [False, True] + [False] * len(rest)
+    assert 0.13 < first.max() < knock.min() < 0.15 < knock.max()
 
 
 def test_hops_elsewhere_are_none():

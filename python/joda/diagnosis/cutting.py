@@ -25,6 +25,8 @@ STOP = 0.004
 """How near an end of the range, in normalised position, counts as touching it."""
 HOP = 0.25
 """How far a joint must fall back to an end to knock there, in units of that."""
+APPROACH = 8
+"""Samples before a knock that belong to it."""
 CLEAR = 1.5
 """How much larger the noise of fast samples must be to count as such."""
 
@@ -64,6 +66,9 @@ def windows_of(
             begins = np.round(np.arange(many) * steps / many).astype(int)
             place = (time - time[0]) / h
             index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
+            spread = _spread(time, position, sigma)
+            begins = _before_knocks(begins, index, (position - lo) / span, spread / span)
+            many = len(begins)
             window = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST
             begun = smoothing.smooth(time, position, time[0] + h * begins, sigma)
@@ -77,7 +82,7 @@ def windows_of(
             same = np.full(many, number)
             parts.append((force, step + begins, fresh, start, doubts, same))
             window = np.where(enough[window] & _thinned(window), window + count, -1)
-            noise = _spread(time, position, sigma), _rough(time, run.force[piece], run.forced)
+            noise = spread, _rough(time, run.force[piece], run.forced)
             samples.append((step + index, place - index, position, time, window, *noise))
             step, count = step + steps, count + many
     force, at, fresh, start, doubts, run_of = (np.concatenate(x) for x in zip(*parts, strict=True))
@@ -170,22 +175,36 @@ def _whitener(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
     return out
 
 
+def _before_knocks(begins: Integers, index: Integers, s: Array, noise: Array) -> Integers:
+    """Where windows begin, also just before a knock: what is before it tells of the joint."""
+    window = np.searchsorted(begins, index, side="right") - 1
+    more = []
+    for k in range(len(begins)):
+        own = np.flatnonzero(window == k)
+        knock = _knock(s[own], noise[own])
+        if knock is not None and knock - APPROACH >= FEWEST:
+            more.append(index[own[knock - APPROACH]])
+    return np.unique(np.append(begins, np.array(more, int)))
+
+
 def _knocks(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
     """Whether the joint comes to an end of its range in a window, at some speed."""
-    out = np.zeros(len(rows), bool)
-    for k, row in enumerate(rows):
-        own = row[row >= 0]
-        if len(own) < 3:
-            continue
-        travel = np.abs(np.diff(s[own]))
-        travel = np.maximum(np.append(travel, 0.0), np.append(0.0, travel))
-        near = STOP + 3 * noise[own]
-        reach = near + np.where(travel > near, travel, 0.0)  # a knock may be between two samples
-        touches = (s[own] < reach) | (s[own] > 1 - reach)
-        away = np.minimum(s[own], 1 - s[own])
-        fall = np.maximum.accumulate(away) - away  # hops at an end stay within `reach`
-        comes_back = (touches & (fall > HOP * STOP + 6 * noise[own])).any()
-        moves = np.ptp(s[own]) > STOP + 6 * noise[own[0]]
-        rebounds = touches[0] and 2 * travel[0] > near[0]
-        out[k] = bool(comes_back or (moves and rebounds))
-    return out
+    found = [_knock(s[row[row >= 0]], noise[row[row >= 0]]) for row in rows]
+    return np.array([knock is not None for knock in found], bool)
+
+
+def _knock(s: Array, noise: Array) -> int | None:
+    """The first of a window's samples at which the joint is at an end that it came to."""
+    if len(s) < 3:
+        return None
+    travel = np.abs(np.diff(s))
+    travel = np.maximum(np.append(travel, 0.0), np.append(0.0, travel))
+    near = STOP + 3 * noise
+    reach = near + np.where(travel > near, travel, 0.0)  # a knock may be between two samples
+    touches = (s < reach) | (s > 1 - reach)
+    if touches[0] and 2 * travel[0] > near[0] and np.ptp(s) > STOP + 6 * noise[0]:
+        return 0  # thrown back
+    away = np.minimum(s, 1 - s)
+    fall = np.maximum.accumulate(away) - away  # hops at an end stay within `reach`
+    back = np.flatnonzero(touches & (fall > HOP * STOP + 6 * noise))
+    return int(back[0]) if len(back) else None
