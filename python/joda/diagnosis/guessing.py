@@ -21,8 +21,8 @@ FEW = 4
 """Iterations after that."""
 ROUGH = 6
 """Iterations in which windows that are far off count in full."""
-BEST, MORE = 3, 6
-"""How many trials of a hypothesis with many are fitted: of many samples, and of few."""
+BEST = 3
+"""How many trials of a hypothesis with many are fitted."""
 APART = 0.06
 """How much these must differ in one of their numbers."""
 OFF = 0.1
@@ -124,13 +124,12 @@ def screened(judge: Judge, base: Base, begin: Begin, hypothesis: Hypothesis) -> 
             hypothesis.unknowns.high[0],
         )
         out.append(first)
-    most = BEST if judge.samples > MANY else MORE
-    if len(out) <= most + 1:
+    if len(out) <= BEST + 1:
         return out
     order = np.argsort(gains)[::-1]
     chosen: list[int] = []
     for k in order:
-        if len(chosen) == most:
+        if len(chosen) == BEST:
             break
         apart = [
             np.abs(hypothesis.trials[k] - hypothesis.trials[c])[1:].max(initial=0.0) for c in chosen
