@@ -14,7 +14,7 @@ Ours names what is missing and adds it.
 
 Both are judged by one function: `joda.diagnosis.mending.error` in windows of 0.4 s on runs that
 neither saw; errors are in units of the encoder's noise, and `true` is that of the true joint
-(`hidden_bench`).
+(`hidden_floor`).
 Seconds are the processor's, of mujoco.sysid and of ours. `report` is what the log of mujoco.sysid's
 own report says about the fit; it is not made to name what is missing.
 """
@@ -33,7 +33,8 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from hidden_bench import AGAIN, read, true_error
+from hidden_cases import AGAIN, read
+from hidden_floor import true_error
 from mujoco import sysid
 from mujoco.sysid.report.sections.insights import AutomatedInsights
 

@@ -5,7 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_bench import case_of, dice, fine, job_of, read, said, told, true_error
+from hidden_bench import said
+from hidden_cases import case_of, dice, job_of, read
+from hidden_figures import fine, told
+from hidden_floor import true_error
 from hidden_model import true_profile
 
 from joda.diagnosis.mending import error, mend, parted

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 
+from joda.diagnosis.asking import asked
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.holdout import Holdout
-from joda.diagnosis.ranking import Ranking, asked, rank
+from joda.diagnosis.ranking import Ranking, rank
 from joda.diagnosis.reshaping import checked
 from joda.diagnosis.verdict import finding
 from joda.diagnosis.weighing import weigh

@@ -25,6 +25,8 @@ BEYOND, STRAYS = 4.0, 3
 """So many noises outside its range a joint is beyond it; at most so many samples are by chance."""
 LEAST = 4
 """Fewest samples of a window that counts."""
+AT_END = 0.02
+"""Of the range: what was measured as near to its end goes to the end."""
 
 
 @dataclass(frozen=True)
@@ -107,11 +109,22 @@ def units_of(windows: Windows, measured: Measured) -> Units:
         speed=speed or 1.0,
         inertia=inertia,
         span=float(np.ptp(profile.joint.range)),
+        visited=_visited(measured),
         friction=friction,
         forced=not measured.runs or any(run.forced for run in measured.runs),
         weight=max(map(abs, measured.context.gravity_force)),
         hinge=measured.single.hinge,
     )
+
+
+def _visited(measured: Measured) -> tuple[float, float]:
+    """Part of the range that was measured."""
+    lo, hi = measured.profile.joint.range
+    measurements = measured.runs or [gauged.curve for gauged in measured.curves]
+    s = (np.concatenate([one.position for one in measurements]) - lo) / (hi - lo)
+    first, last = float(s.min()), float(s.max())
+    first, last = first if first > AT_END else 0.0, last if last < 1 - AT_END else 1.0
+    return (first, last) if last - first > AT_END else (0.0, 1.0)
 
 
 def windows_for(measured: Measured, length: float | None = None, fine: bool = True) -> Windows:

@@ -177,20 +177,23 @@ def _whitener(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
 
 def _before_knocks(begins: Integers, index: Integers, s: Array, noise: Array) -> Integers:
     """Where windows begin, also just before a knock: what is before it tells of the joint."""
-    window = np.searchsorted(begins, index, side="right") - 1
-    more = []
-    for k in range(len(begins)):
-        own = np.flatnonzero(window == k)
-        knock = _knock(s[own], noise[own])
-        if knock is not None and knock - APPROACH >= FEWEST:
-            more.append(index[own[knock - APPROACH]])
+    rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
+    more = [
+        index[row[knock - APPROACH]]
+        for row, knock in zip(rows, _each_knock(rows, s, noise), strict=True)
+        if knock is not None and knock - APPROACH >= FEWEST
+    ]
     return np.unique(np.append(begins, np.array(more, int)))
 
 
 def _knocks(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
     """Whether the joint comes to an end of its range in a window, at some speed."""
-    found = [_knock(s[row[row >= 0]], noise[row[row >= 0]]) for row in rows]
-    return np.array([knock is not None for knock in found], bool)
+    return np.array([knock is not None for knock in _each_knock(rows, s, noise)], bool)
+
+
+def _each_knock(rows: Integers, s: Array, noise: Array) -> list[int | None]:
+    """Of each window, see `_knock`."""
+    return [_knock(s[own], noise[own]) for own in (row[row >= 0] for row in rows)]
 
 
 def _knock(s: Array, noise: Array) -> int | None:

@@ -1,7 +1,7 @@
 """A hypothesis fitted together with the model's own strengths, from where it promises most."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,16 +78,13 @@ class Begin:
     about: Linear
 
 
-def begins(judge: Judge, base: Base, fit: Fit) -> tuple[Begin, ...]:
+def begins(judge: Judge, base: Base, given: Fit, fit: Fit) -> tuple[Begin, ...]:
     """From the model as it was fitted, and of few samples as it was given, where that is far off.
 
     A factor that is far off may stand in for what is missing; many samples lead back from there.
     """
-    given = np.ones(len(fit.x))
-    fits = [fit]
-    if judge.samples < MANY and np.any(np.abs(fit.x - given) > OFF):
-        started = judge.started(base.solo(given))
-        fits.append(Fit(given, started.start, started.squares, started.loss))
+    far = judge.samples < MANY and np.any(np.abs(fit.x - given.x) > OFF)
+    fits = [fit, given] if far else [fit]
     wide = [BEND * usual(judge, one) for one in fits]
     return tuple(
         Begin(one, bend, judge.linear(base.solo, base.unknowns, one.x, one.start, bend))
@@ -139,19 +136,40 @@ def screened(judge: Judge, base: Base, begin: Begin, hypothesis: Hypothesis) -> 
     return [out[k] for k in chosen]
 
 
-def guess(judge: Judge, base: Base, begun: Sequence[Begin], hypothesis: Hypothesis) -> Guess:
-    """The hypothesis fitted, from its most promising trials."""
+def rough(
+    judge: Judge, base: Base, begun: Sequence[Begin], hypothesis: Hypothesis
+) -> tuple[Fit, ...]:
+    """The hypothesis fitted roughly: from each begin, its most promising trial."""
     make, unknowns = joined(base, hypothesis)
 
     def fitted(begin: Begin) -> Fit:
         trials = (
             np.concatenate([begin.fit.x, x]) for x in screened(judge, base, begin, hypothesis)
         )
-        rough = [judge.fit(make, unknowns, x, begin.fit.start, ROUGH, begin.bend) for x in trials]
-        near = min(rough, key=lambda f: judge.loss(f.squares))
-        return judge.refit(make, unknowns, judge.fit(make, unknowns, near.x, near.start))
+        fits = [judge.fit(make, unknowns, x, begin.fit.start, ROUGH, begin.bend) for x in trials]
+        near = [
+            replace(fit, loss=judge.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in fits
+        ]
+        return min(near, key=lambda f: f.loss)
 
-    return guessed(judge, hypothesis, min(map(fitted, begun), key=lambda f: f.loss))
+    return tuple(map(fitted, begun))
+
+
+def finished(judge: Judge, base: Base, hypothesis: Hypothesis, near: Sequence[Fit]) -> Guess:
+    """The hypothesis fitted to the end, from rough fits."""
+    make, unknowns = joined(base, hypothesis)
+    fits = [
+        judge.refit(make, unknowns, judge.fit(make, unknowns, fit.x, fit.start)) for fit in near
+    ]
+    return guessed(judge, hypothesis, min(fits, key=lambda f: f.loss))
+
+
+def beside(hypothesis: Hypothesis, found: Guess) -> Hypothesis:
+    """One with a place, to be tried where another was found, and twice as far to either side."""
+    low, high = found.x[-2:]
+    wide = high - low
+    longer = (low, min(high + wide, 1.0)), (max(low - wide, 0.0), high)
+    return hypothesis.placed([(low, high), *longer])
 
 
 def moved(judge: Judge, base: Base, found: Guess) -> Guess:

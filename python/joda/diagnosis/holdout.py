@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.diagnosis.asking import Asked
 from joda.diagnosis.baseline import joined
 from joda.diagnosis.guessing import Guess
 from joda.diagnosis.judge import Judge, Make, Unknowns
-from joda.diagnosis.ranking import Asked
 from joda.diagnosis.windows import Windows
 from joda.measured.comparison import rms
 

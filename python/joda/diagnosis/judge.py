@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 Make = Callable[[Array], Solo]
 """A joint with its numbers."""
 
+BLAS = "blas"
+"""Fits' matrices are small: threads of their own would only be in the way of ours."""
 BEND = 20.0
 """Mean square residual from which a window counts as its logarithm."""
 TRIALS = 6

@@ -5,12 +5,13 @@ number (`joda.diagnosis.reshaping`). What is written makes runs that no fit has 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
+from threadpoolctl import threadpool_limits
 
+from joda.diagnosis.asking import asked
 from joda.diagnosis.hypotheses import Hypothesis
-from joda.diagnosis.ranking import asked
+from joda.diagnosis.judge import BLAS
 from joda.diagnosis.reshaping import Likelihood, checked, reshaped
 from joda.measured.errors import errors
 from joda.measured.reading import Measured
@@ -100,11 +101,10 @@ def mend(
     """
     before = error(held)
     told("the effect's own numbers")
-    profile = _guessed(train, effect, direction, near)
-    if profile is None:
-        return Mended(train.profile, None, before, before)
+    with threadpool_limits(1, BLAS):
+        profile = _guessed(train, effect, direction, near)
+        tried = list(reshaped(train, held, profile, effect, told)) if profile else []
     most = NEARLY * Likelihood(held).loss(train.profile)
-    tried = reshaped(train, held, profile, effect, told)
     for one in sorted(tried, key=lambda one: one.score):
         if (
             one.unseen < most
@@ -122,7 +122,7 @@ def _guessed(
     every = [h for h in begun.hypotheses if h.effect == effect]
     tried = [h for h in every if direction in (None, h.direction)] or every
     guesses = [found for h in tried if (found := begun.tell(h))]
-    guesses += [begun.guess(there) for h in tried if (there := _placed(h, near))]
+    guesses += [begun.finished(begun.rough(there)) for h in tried if (there := _placed(h, near))]
     if not guesses:
         return None
     return checked(begun.moved(min(guesses, key=lambda found: found.score)).written(begun.base))
@@ -134,7 +134,4 @@ def _placed(hypothesis: Hypothesis, near: tuple[float, float] | None) -> Hypothe
     if near is None or not ends:
         return None
     own = near if ends == 2 else near[1:] if near[0] <= 0 else near[:1]
-    trials = np.repeat(hypothesis.trials[:1], len(STRENGTHS), axis=0)
-    trials[:, 0] *= STRENGTHS
-    trials[:, -ends:] = own
-    return replace(hypothesis, trials=trials)
+    return hypothesis.placed([own], STRENGTHS)

@@ -1,78 +1,32 @@
-"""What may be missing, ranked: each hypothesis is fitted together with the model's own numbers."""
+"""What may be missing, ranked: from a fit of every hypothesis to the best ones of each effect."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from os import cpu_count
+from typing import TypeVar
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from joda._templates import templates
-from joda.diagnosis.baseline import Base, base_of, single_for, units_of, usable, windows_for
-from joda.diagnosis.guessing import Begin, Guess, begins, guess, moved
-from joda.diagnosis.hypotheses import Hypothesis, hypotheses
-from joda.diagnosis.judge import Fit, Judge
-from joda.diagnosis.knocks import knock_guess
-from joda.measured.reading import Measured
+from joda.diagnosis.asking import RESTITUTION, Asked, Rough
+from joda.diagnosis.guessing import Guess, beside
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.judge import BLAS, Fit, Judge
 
 POLISHED, NEAR = 4, 3.0
 """Of how many effects the numbers are tried elsewhere, and up to which part of the least loss."""
 QUICK = 1200
 """Samples up to which they are tried whatever their loss; of more, up to that part of the own."""
+ENOUGH, FAR = 1.5, 5.0
+"""Loss per sample at which nothing more can be found, and from how many times the least a rough fit
+is then left as it is."""
+WELLS = {"detent_internal", "bistable_mechanism_internal"}
+"""Effects of which one may stand in for the other where no run went all the way."""
 CALM = 0.3
 """Part of the windows, the better ones, that tell the noise."""
 WORST = 1.5
 """Mean square residual that noise may make."""
-
-
-@dataclass(frozen=True)
-class Asked:
-    """A model fitted to measured runs, and what it may lack.
-
-    Attributes:
-        judge: of the windows.
-        base: the model as it is.
-        fit: of its factors alone.
-        begins: from where hypotheses are fitted.
-        hypotheses: all of the catalogue.
-    """
-
-    judge: Judge
-    base: Base
-    fit: Fit
-    begins: tuple[Begin, ...]
-    hypotheses: tuple[Hypothesis, ...]
-
-    def tell(self, hypothesis: Hypothesis) -> Guess | None:
-        """The hypothesis fitted; None if the data cannot tell of it."""
-        if hypothesis.effect == "end_stop_restitution":
-            return knock_guess(self.judge, self.base, self.fit, hypothesis)
-        return self.guess(hypothesis)
-
-    def guess(self, hypothesis: Hypothesis) -> Guess:
-        """The hypothesis fitted to windows without knocks."""
-        return guess(self.judge, self.base, self.begins, hypothesis)
-
-    def apart(self) -> "Asked":
-        """The same, but what is fitted from here on has every window's start apart."""
-        return replace(self, judge=replace(self.judge, apart=True))
-
-    def moved(self, found: Guess) -> Guess:
-        """The guess with its numbers tried elsewhere."""
-        return moved(self.judge, self.base, found)
-
-
-def asked(measured: Measured, length: float | None = None) -> Asked:
-    """Fits the model's own strengths in windows of some length (s); None: by the joint's pace."""
-    windows = windows_for(measured, length)
-    judge = Judge(windows, usable(windows))
-    base = base_of(measured.profile, single_for(measured, windows.h), windows.h)
-    given = np.ones(len(base.places))
-    starts = windows.start, judge.started(base.solo(given)).start
-    fits = [judge.fit(base.solo, base.unknowns, given, start) for start in starts]
-    fit = min(fits, key=lambda f: f.loss)
-    every = hypotheses(units_of(windows, measured), templates(), measured.profile)
-    return Asked(judge, base, fit, begins(judge, base, fit), tuple(every))
 
 
 @dataclass(frozen=True)
@@ -93,13 +47,14 @@ class Ranking:
 
 
 Told = Callable[[int, int, str], None]
+A = TypeVar("A", Hypothesis, Rough, Guess)
+T = TypeVar("T", Rough, Guess)
 
 
 def rank(
     begun: Asked,
     exclude: Collection[str] = (),
     heed: Told = lambda done, total, what: None,
-    known: Sequence[Guess] = (),
 ) -> Ranking:
     """Fits every hypothesis to measured runs.
 
@@ -107,36 +62,74 @@ def rank(
         begun: the model and its runs.
         exclude: effects that are not tried.
         heed: told how many hypotheses are done, of how many, and the last one's name.
-        known: guesses of the same windows that are there already; the better ones are taken.
     """
     tried = [h for h in begun.hypotheses if h.effect not in exclude]
-    total = len(tried) + POLISHED
-    done = 0
+    with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
+        work = _Work(pool, heed, 2 * len(tried) + POLISHED)
+        guesses = _fitted(begun, tried, work)
+        guesses += _beside(begun, tried, guesses, work)
+        guesses += _polished(begun, guesses, work)
+    there = [one for one in guesses if not one.vanished]
+    return Ranking(begun, *_scored(begun.judge, there))
 
-    def heard(found: Iterable[Guess | None]) -> list[Guess]:
-        nonlocal done
+
+@dataclass
+class _Work:
+    """Threads, and how much they have done."""
+
+    pool: ThreadPoolExecutor
+    heed: Told
+    total: int
+    done: int = 0
+
+    def all(self, make: Callable[[A], T], each: Iterable[A]) -> list[T]:
+        """What is made of each."""
         out = []
-        for one in found:
-            done += 1
-            if one is not None:
-                heed(done, total, one.hypothesis.effect)
-                out.append(one)
+        for one in self.pool.map(make, each):
+            self.done += 1
+            self.heed(self.done, max(self.total, self.done), one.hypothesis.effect)
+            out.append(one)
         return out
 
-    with ThreadPoolExecutor(cpu_count()) as pool:
-        guesses = heard(pool.map(begun.tell, tried))
-        best = _best(guesses)[:POLISHED]
-        guesses += heard(map(begun.moved, best[:1]))
-        least = min((one.fit.loss for one in guesses), default=0.0)
-        part = min(QUICK / max(begun.judge.samples, 1.0), 1.0)
-        most = max(NEAR * least, part * begun.fit.loss)
-        names = {one.hypothesis.effect for one in best}
-        likely = [one for one in guesses if one.hypothesis.effect in names and one is not best[0]]
-        near = [one for one in likely if one.fit.loss < most]
-        done = total - len(near)
-        guesses += heard(pool.map(begun.moved, near))
-    there = [one for one in (*guesses, *known) if not one.vanished]
-    return Ranking(begun, *_levelled(begun.judge, there))
+
+def _fitted(begun: Asked, tried: Sequence[Hypothesis], work: _Work) -> list[Guess]:
+    """All hypotheses fitted; where one leaves only noise, those that are far off, roughly."""
+    guesses = [g for h in tried if h.effect == RESTITUTION and (g := begun.restitution(h))]
+    roughs = work.all(begun.rough, [h for h in tried if h.effect != RESTITUTION])
+    roughs.sort(key=lambda one: one.best.loss)
+    guesses += work.all(begun.finished, roughs[:POLISHED])
+    least = min((one.fit.loss for one in guesses), default=0.0)
+    most = FAR * least if least < ENOUGH * begun.judge.samples else np.inf
+    near = [one for one in roughs[POLISHED:] if one.best.loss < most]
+    far = [one for one in roughs[POLISHED:] if one.best.loss >= most]
+    return guesses + work.all(begun.finished, near) + work.all(begun.taken, far)
+
+
+def _beside(
+    begun: Asked, tried: Sequence[Hypothesis], guesses: Sequence[Guess], work: _Work
+) -> list[Guess]:
+    """Those that may be where the best one was found."""
+    alike = [
+        beside(h, best)
+        for best in _best(guesses)[:1]
+        for h in tried
+        if {h.effect, best.hypothesis.effect} == WELLS
+    ]
+    return work.all(begun.finished, work.all(begun.rough, alike))
+
+
+def _polished(begun: Asked, guesses: Sequence[Guess], work: _Work) -> list[Guess]:
+    """The best effects, in every variant that is near, with their numbers tried elsewhere."""
+    best = _best(guesses)[:POLISHED]
+    names = {one.hypothesis.effect for one in best}
+    others = [one for one in guesses if one.hypothesis.effect in names and one is not best[0]]
+    moved = work.all(begun.moved, best[:1])
+    least = min((one.fit.loss for one in (*guesses, *moved)), default=0.0)
+    part = min(QUICK / max(begun.judge.samples, 1.0), 1.0)
+    most = max(NEAR * least, part * begun.fit.loss)
+    near = [one for one in others if one.fit.loss < most]
+    work.total = work.done + len(near)
+    return moved + work.all(begun.moved, near)
 
 
 def _best(guesses: Iterable[Guess]) -> list[Guess]:
@@ -153,7 +146,7 @@ def levelled(judge: Judge, fit: Fit, level: float) -> float:
     return judge.loss(fit.squares, level=level) + beside / level
 
 
-def _levelled(judge: Judge, guesses: Sequence[Guess]) -> tuple[tuple[Guess, ...], float, float]:
+def _scored(judge: Judge, guesses: Sequence[Guess]) -> tuple[tuple[Guess, ...], float, float]:
     """The best guesses, scored by what the best of them leaves in its better windows.
 
     Recorded noise is often less than all that a simulation cannot follow: clocks, forces, whatever

@@ -181,9 +181,14 @@ def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:
     for k, (slot, scale) in enumerate(zip(parameters.slots, parameters.scales, strict=True)):
         if slot.kind != "values":
             continue
-        channel = getattr(parameters.profile.channels, slot.channel).components
-        there = getattr(given.channels, slot.channel).components[slot.component :][:1]
-        if there and any(there[0].y) and len(there[0].y) == len(channel[slot.component].y):
-            mean[k] = there[0].y[slot.index] / scale
-            doubt[k] = GIVEN_DOUBT * max(map(abs, there[0].y)) / scale
+        own, there = (
+            getattr(profile.channels, slot.channel).components
+            for profile in (parameters.profile, given)
+        )
+        if slot.component >= len(there):
+            continue
+        y = np.array(there[slot.component].y)
+        if y.any() and len(y) == len(own[slot.component].y):
+            mean[k] = y[slot.index] / scale
+            doubt[k] = GIVEN_DOUBT * np.abs(y).max() / scale
     return mean, doubt

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from joda.diagnosis.asking import asked
 from joda.diagnosis.baseline import joined, usable, windows_for
 from joda.diagnosis.coverage import moved_one_way, too_little
 from joda.diagnosis.findings import Diagnosis, Finding
@@ -12,7 +13,7 @@ from joda.diagnosis.guessing import Guess
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
-from joda.diagnosis.ranking import Ranking, Told, asked, rank
+from joda.diagnosis.ranking import Ranking, Told, rank
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import strengths_off, summarised
 from joda.diagnosis.weighing import Verdict, Weighed, weigh
@@ -67,13 +68,10 @@ def diagnosed(
     strictness = LOOSELY if one_way else 1.0
     weighed = weigh(ranking, strictness)
     puzzling = ranking if weighed.verdict == "unexplained" else None
-    if weighed.verdict == "unexplained" and measured.runs:  # fits that stuck may be freed
-        ranking = rank(ranking.asked.apart(), exclude, told, ranking.guesses)
-        weighed = weigh(ranking, strictness)
     if weighed.verdict == "unexplained" and measured.runs:  # what is weak shows in longer windows
         length = min(LONGER * ranking.asked.judge.windows.length, LONGEST)
         longer = rank(asked(measured, length), exclude, told)
-        again = weigh(longer, STRICTLY)
+        again = weigh(longer, STRICTLY, wholly=True)
         if again.verdict == "missing_effect" or again.share < weighed.share:
             ranking, weighed = longer, again
     if weighed.verdict == "adequate" and (why := too_little(measured)):

@@ -53,12 +53,13 @@ class Weighed:
         return left[0] / max(own, LITTLE) if left else 1.0
 
 
-def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
+def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Weighed:
     """The verdict on a ranking, and how likely each effect is the missing one.
 
     Args:
         ranking: of what may be missing.
         strictness: factor of what the true effect may leave.
+        wholly: whether it is unexplained where more than noise is left of all.
     """
     judge, guesses = ranking.asked.judge, ranking.guesses
     samples = judge.samples
@@ -82,7 +83,7 @@ def weigh(ranking: Ranking, strictness: float = 1.0) -> Weighed:
     if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and likely[0] < HARDLY):
         loss = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
         said: Verdict = "adequate" if excess(loss, samples) < MUCH else "unexplained"
-    elif likely[0] < 1 - likely.sum():
+    elif likely[0] < 1 - likely.sum() or (wholly and ranking.level > WORST):
         said = "unexplained"
     else:
         said = "missing_effect"

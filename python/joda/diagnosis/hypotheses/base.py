@@ -4,8 +4,8 @@ The numbers are in the joint's own units: forces in its usual force, positions n
 its usual speed.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -37,6 +37,7 @@ class Units:
         speed: usual speed, rad/s or m/s.
         inertia: kg·m² or kg.
         span: of the range, rad or m.
+        visited: part of the range that was measured, normalised.
         friction: usual dry friction of the model, N·m or N; 0 for none.
         forced: whether a force was recorded.
         weight: largest force of gravity, N·m or N.
@@ -47,6 +48,7 @@ class Units:
     speed: float
     inertia: float
     span: float
+    visited: tuple[float, float]
     friction: float
     forced: bool
     weight: float
@@ -83,6 +85,15 @@ class Hypothesis:
     ends: int = 0
     rarity: float = 0.0
     remains: float = KNOWN_LAW
+
+    def placed(
+        self, places: Sequence[Sequence[float]], strengths: Sequence[float] = (1.0,)
+    ) -> "Hypothesis":
+        """The same, to begin with at these places, in all of these units of its first strength."""
+        trials = np.repeat(self.trials[:1], len(places) * len(strengths), axis=0)
+        trials[:, 0] *= np.tile(strengths, len(places))
+        trials[:, -self.ends :] = np.repeat(places, len(strengths), axis=0)
+        return replace(self, trials=trials)
 
 
 def unit_of(units: Units, power: int = 0) -> str:

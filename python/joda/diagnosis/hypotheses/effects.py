@@ -48,7 +48,7 @@ HEAVIEST = 0.45
 
 
 def free_curves(units: Units) -> Iterator[Hypothesis]:
-    """Friction and damping that differ along the way."""
+    """Friction and damping that differ along the way, level where no run has been."""
     yield _curve(units, "position_dependent_friction", "friction")
     yield _curve(units, "position_dependent_damping", "damping")
 
@@ -56,11 +56,15 @@ def free_curves(units: Units) -> Iterator[Hypothesis]:
 def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
     power = int(channel == "damping")
     unit = units.force / units.speed**power
-    at = tuple(np.linspace(0, 1, KNOTS))
+    at = np.linspace(*units.visited, KNOTS)
+    beyond = int(at[0] > 0), int(at[-1] < 1)
+    knots = tuple(map(float, np.unique([0.0, *at, 1.0])))
 
     def write(profile: Profile, x: Array) -> Profile:
-        part = Component(label=effect, interval=(0, 1), x=at, y=tuple(unit * x))
-        return profile.with_component(channel, part)
+        y = tuple(unit * np.pad(x, beyond, mode="edge"))
+        return profile.with_component(
+            channel, Component(label=effect, interval=(0, 1), x=knots, y=y)
+        )
 
     return Hypothesis(
         effect,

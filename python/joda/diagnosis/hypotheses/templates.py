@@ -77,7 +77,7 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
     Args:
         units: of the joint.
         name: of the template.
-        lobes: signs of the force from one end of the interval to the other, of even count.
+        lobes: signs of the force from one end of the interval to the other, two or four.
     """
     parts = len(lobes)
     zeros = np.arange(parts // 2 + 1) * 2 / parts

@@ -1,0 +1,89 @@
+"""A model fitted to measured runs, and what it may lack, fitted together with it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from joda._templates import templates
+from joda.diagnosis.baseline import Base, base_of, single_for, units_of, usable, windows_for
+from joda.diagnosis.guessing import Begin, Guess, begins, finished, guessed, moved, rough
+from joda.diagnosis.hypotheses import Hypothesis, hypotheses
+from joda.diagnosis.judge import Fit, Judge
+from joda.diagnosis.knocks import knock_guess
+from joda.measured.reading import Measured
+
+RESTITUTION = "end_stop_restitution"
+"""Effect that only knocks tell of."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A model fitted to measured runs, and what it may lack.
+
+    Attributes:
+        judge: of the windows.
+        base: the model as it is.
+        fit: of its factors alone.
+        begins: from where hypotheses are fitted.
+        hypotheses: all of the catalogue.
+    """
+
+    judge: Judge
+    base: Base
+    fit: Fit
+    begins: tuple[Begin, ...]
+    hypotheses: tuple[Hypothesis, ...]
+
+    def tell(self, hypothesis: Hypothesis) -> Guess | None:
+        """The hypothesis fitted; None if the data cannot tell of it."""
+        if hypothesis.effect == RESTITUTION:
+            return self.restitution(hypothesis)
+        return self.finished(self.rough(hypothesis))
+
+    def restitution(self, hypothesis: Hypothesis) -> Guess | None:
+        """How bouncy the ends are; None if the data cannot tell."""
+        return knock_guess(self.judge, self.base, self.fit, hypothesis)
+
+    def rough(self, hypothesis: Hypothesis) -> "Rough":
+        """The hypothesis fitted roughly to windows without knocks."""
+        return Rough(hypothesis, rough(self.judge, self.base, self.begins, hypothesis))
+
+    def finished(self, found: "Rough") -> Guess:
+        """The same fitted to the end."""
+        return finished(self.judge, self.base, found.hypothesis, found.fits)
+
+    def taken(self, found: "Rough") -> Guess:
+        """The same as it is."""
+        return guessed(self.judge, found.hypothesis, found.best)
+
+    def moved(self, found: Guess) -> Guess:
+        """The guess with its numbers tried elsewhere."""
+        return moved(self.judge, self.base, found)
+
+
+@dataclass(frozen=True)
+class Rough:
+    """A hypothesis fitted roughly, from one or two beginnings."""
+
+    hypothesis: Hypothesis
+    fits: tuple[Fit, ...]
+
+    @property
+    def best(self) -> Fit:
+        """The better one."""
+        return min(self.fits, key=lambda fit: fit.loss)
+
+
+def asked(measured: Measured, length: float | None = None) -> Asked:
+    """Fits the model's own strengths in windows of some length (s); None: by the joint's pace."""
+    windows = windows_for(measured, length)
+    judge = Judge(windows, usable(windows))
+    base = base_of(measured.profile, single_for(measured, windows.h), windows.h)
+    ones = np.ones(len(base.places))
+    given = replace(judge.started(base.solo(ones)), x=ones)
+    fits = [
+        judge.fit(base.solo, base.unknowns, ones, start) for start in (windows.start, given.start)
+    ]
+    fit = min(fits, key=lambda f: f.loss)
+    every = hypotheses(units_of(windows, measured), templates(), measured.profile)
+    return Asked(judge, base, fit, begins(judge, base, given, fit), tuple(every))

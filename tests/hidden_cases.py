@@ -1,0 +1,120 @@
+"""Cases of the bench: joints that hide an effect, drawn from a master seed."""
+
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+
+from joda.hidden import EFFECTS, OUTSIDE, Case, draw, write
+from joda.hidden.cases import PUSHED, VISIBLE
+from joda.measured.reading import Measured, read_measured
+
+FREE = tuple(name for name in EFFECTS if name not in PUSHED)
+HARD = ("stribeck_friction", "presliding_friction", "backlash")
+BROAD = tuple(n for n in EFFECTS if n.startswith(("constant_p", "constant_n", "spring_return")))
+BOXES = ("detent_internal", "bistable_mechanism_internal")
+ENDS = tuple(n for n in EFFECTS if n.startswith(("magnetic", "spring_loaded")))
+RUBS = ("constant_friction_hinge", "position_dependent_friction", "load_dependent_friction")
+DRAGS = ("constant_damping_hinge", "position_dependent_damping", "direction_dependent_damping")
+LOCAL = (*BROAD, *BOXES, *ENDS, *RUBS[:2], *DRAGS[:2])
+"""Effects that may act in a part of the range only."""
+FAMILIES = (
+    (*BROAD, "bistable_mechanism", "gravity_offset"),
+    (*BOXES, *ENDS),
+    (*RUBS, "asymmetric_friction", "stribeck_friction"),
+    (*DRAGS, "quadratic_damping"),
+    ("added_inertia", "backlash"),
+)
+"""Two effects of one case are of two families: within one, some make up for each other."""
+
+CONTAINED = (
+    *("constant_friction_hinge", "constant_damping_hinge"),  # in those that differ along the way
+    *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
+    *("gravity_offset", "asymmetric_friction"),  # in constant forces, and those in gravity
+)
+"""Effects that another entry, or the model's own with another, can be without any error."""
+
+CLEAR = 15.0
+"""How far an effect that shows for sure moves the joint, in standard deviations of the encoder."""
+AGAIN = 5
+"""How often a case in which the effect hardly shows is drawn again."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A case to be drawn and examined; `wrong` is an effect to be added on purpose."""
+
+    master: int
+    group: str
+    number: int
+    seed: int
+    effect: str | None
+    second: str | None = None
+    forced: bool = True
+    exclude: tuple[str, ...] = ()
+    wrong: str | None = None
+
+
+def dice(master: int, *what) -> np.random.Generator:
+    return np.random.default_rng([master, crc32(repr(what).encode())])
+
+
+def job_of(master: int, group: str, number: int) -> Job:
+    """The number-th case of a group; effects come in turn, in a new order every round."""
+    rng = dice(master, group, number, "case")
+
+    def turn(names: tuple[str, ...], at: int = number) -> str:
+        order = dice(master, group, names, at // len(names)).permutation(len(names))
+        return names[order[at % len(names)]]
+
+    one = Job(master, group, number, int(rng.integers(2**31)), None)
+    if group == "none":
+        return replace(one, forced=number % 2 == 0)
+    if group == "free":
+        return replace(one, effect=turn(FREE), forced=False)
+    if group == "outside" and number % 2 == 0:
+        return replace(one, effect=turn(OUTSIDE, number // 2))
+    if group == "outside":
+        effect = turn(EFFECTS, number // 2)
+        return replace(one, effect=effect, exclude=(effect,))
+    if group == "two":
+        families = rng.choice(len(FAMILIES), 2, replace=False)
+        effect, second = (str(rng.choice(FAMILIES[k])) for k in families)
+        return replace(one, effect=effect, second=second)
+    effect = turn({"hard": HARD, "place": LOCAL}.get(group, EFFECTS))
+    if group == "add":
+        others = [name for name in EFFECTS if name != effect]
+        return replace(one, effect=effect, wrong=str(rng.choice(others)))
+    return replace(one, effect=effect)
+
+
+def case_of(job: Job) -> Case:
+    """Draws again, with the next seed, where the effect hardly shows."""
+    for seed in range(job.seed, job.seed + AGAIN):
+        case = draw(seed, job.effect, job.forced, job.second)
+        if case.visible >= VISIBLE:
+            break
+    return case
+
+
+def clear_case(effect: str) -> Case:
+    """Drawn anew each time, until the effect is clear."""
+    rng = np.random.default_rng()
+    while (case := draw(int(rng.integers(2**31)), effect)).visible < CLEAR:
+        pass
+    print(effect, case.seed)  # shown where a test fails
+    return case
+
+
+def read(case: Case) -> tuple[Measured, Measured]:
+    """The base model with the runs to learn from, and with those held out."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write(case, folder)
+        train, held_out = (
+            read_measured(folder / "model.xml", case.joint, [folder / run.name for run in runs])
+            for runs in (case.train, case.held_out)
+        )
+    return train, held_out

@@ -1,0 +1,106 @@
+"""How what may be missing is ranked, and when that is a verdict."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_cases import clear_case, read
+
+from joda._templates import templates
+from joda.diagnosis import asking, ranking
+from joda.diagnosis.asking import asked
+from joda.diagnosis.guessing import beside
+from joda.diagnosis.hypotheses import Units, hypotheses
+from joda.diagnosis.ranking import WELLS, WORST, rank
+from joda.diagnosis.weighing import weigh
+from joda.field import evaluate
+from joda.profile import Channel
+
+EFFECT = "quadratic_damping"
+OTHERS = (
+    *("direction_dependent_damping", "asymmetric_friction", "stribeck_friction"),
+    *("gravity_offset", "spring_return_to_low_end", "added_inertia", "presliding_friction"),
+)
+UNITS = Units(
+    force=1.0, speed=1.0, inertia=1.0, span=1.0, visited=(0.0, 1.0), friction=1.0, forced=True,
+    weight=0.0, hinge=True,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def begun():
+    """A model that lacks an effect, two runs of the joint."""
+    return asked(read(clear_case(EFFECT))[0].changed(runs=[0, 4]))
+
+
+@pytest.fixture(scope="module")
+def told():
+    """What is done, of how much."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def ranked(begun, told):
+    return rank(begun, without(begun), lambda done, total, what: told.append((done, total)))
+
+
+def without(begun):
+    """What is not tried."""
+    return {h.effect for h in begun.hypotheses} - {EFFECT, *OTHERS}
+
+
+def test_what_is_left_rough_changes_nothing_of_the_best(begun, ranked, monkeypatch):
+    finished = []
+    monkeypatch.setattr(ranking, "ENOUGH", 0.0)
+    monkeypatch.setattr(
+        asking, "finished", lambda *args, make=asking.finished: finished.append(0) or make(*args)
+    )
+    whole = rank(begun, without(begun))
+    assert len(finished) >= 1 + len(OTHERS)
+    assert whole.guesses[0].hypothesis.effect == ranked.guesses[0].hypothesis.effect == EFFECT
+    assert whole.guesses[0].fit.loss == pytest.approx(ranked.guesses[0].fit.loss, abs=1.0)
+    assert whole.level == pytest.approx(ranked.level, rel=0.01)
+
+
+def test_progress_counts_and_never_exceeds_the_total(ranked, told):
+    assert [done for done, _ in told] == list(range(1, len(told) + 1))
+    assert all(done <= total for done, total in told)
+    assert told[-1][0] > 0.8 * told[-1][1]
+
+
+def test_no_excluded_effect_is_ranked(begun):
+    kept = "added_inertia"
+    exclude = {h.effect for h in begun.hypotheses} - {kept}
+    assert {one.hypothesis.effect for one in rank(begun, exclude).guesses} <= {kept}
+    assert rank(begun, {*exclude, kept}).guesses == ()
+
+
+def test_a_well_is_tried_where_the_other_was_found(begun):
+    first, second = (next(h for h in begun.hypotheses if h.effect == name) for name in WELLS)
+    found = begun.tell(first)
+    found = replace(found, fit=replace(found.fit, x=np.append(found.fit.x[:-2], (0.6, 0.9))))
+    tried = beside(second, found)
+    assert tried.effect == second.effect
+    assert np.allclose(tried.trials[:, -2:], [(0.6, 0.9), (0.6, 1.0), (0.3, 0.9)])
+
+
+def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
+    assert weigh(ranked).verdict == weigh(ranked, wholly=True).verdict == "missing_effect"
+    more = replace(ranked, level=2 * WORST)
+    assert weigh(more, wholly=True).verdict == "unexplained"
+
+
+@pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])
+def test_a_curve_is_level_where_no_run_has_been(begun, effect):
+    units = replace(UNITS, visited=(0.2, 0.7))
+    curve = next(
+        h for h in hypotheses(units, templates(), begun.base.profile) if h.effect == effect
+    )
+    written = curve.write(begun.base.profile, np.arange(1.0, len(curve.unknowns.low) + 1))
+    channel = getattr(written.channels, "friction" if "friction" in effect else "damping")
+    part = channel.components[-1]
+    s = np.array([0, 0.1, 0.2, 0.7, 0.8, 1])
+    values = evaluate(Channel(components=(part,)), s)[0]
+    assert values[0] == values[1] == values[2] == part.y[0] > 0
+    assert values[3] == pytest.approx(values[4]) == pytest.approx(part.y[-1])
+    assert part.y[-1] > part.y[0]
