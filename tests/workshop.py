@@ -101,7 +101,8 @@ def check_whole(path: Path) -> None:
     elif path.suffix == ".json":
         json.loads(path.read_text())
     elif path.suffix == ".xml":
-        ElementTree.parse(path)
+        # as MuJoCo does, it is taken as bytes: a comment in Latin-1 is kept as it was
+        ElementTree.fromstring(path.read_text(errors="replace"))
     elif path.suffix == ".html":
         assert path.read_text().rstrip().endswith("</html>"), path
     elif path.suffix == ".csv":

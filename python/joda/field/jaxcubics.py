@@ -92,3 +92,12 @@ def cubic(c: Array, t: Array) -> tuple[Array, Array]:
     """Value and slope of cubics, shape (..., 4), at t."""
     value = c[..., 0] + t * (c[..., 1] + t * (c[..., 2] + t * c[..., 3]))
     return value, c[..., 1] + t * (2 * c[..., 2] + 3 * t * c[..., 3])
+
+
+def largest(values: Array) -> Array:
+    """The largest along the first axis, with the derivative of that one.
+
+    Not jnp.max: its derivative looks for the entries that equal the maximum, and is 0 / 0 where the
+    compiler has rounded one of the two otherwise.
+    """
+    return jnp.take_along_axis(values, jnp.argmax(values, axis=0)[None], axis=0)[0]

@@ -18,7 +18,7 @@ from jax.typing import ArrayLike
 
 from joda import profile
 from joda.component import Component
-from joda.field.jaxcubics import Array, Cubics, curve, pchip
+from joda.field.jaxcubics import Array, Cubics, curve, largest, pchip
 from joda.field.jaxmerge import merge
 
 __all__ = ["Channel", "Cubics", "evaluate", "from_channel", "max_descent", "prepare", "to_channel"]
@@ -144,7 +144,7 @@ def max_descent(channel: Channel | Cubics, lo: ArrayLike, hi: ArrayLike) -> Arra
     left, right, descent = cubics.pieces
     end = jnp.max(jnp.where(right > left, right, 0))
     touches = (left <= hi) & ((right > lo) | ((right >= end) & (lo <= end)))
-    return jnp.max(jnp.where(touches & (right > left), descent, 0))
+    return largest(jnp.where(touches & (right > left), descent, 0))
 
 
 def prepare(channel: Channel, pieces: bool = False) -> Cubics:

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from joda.field.jaxcubics import Array, Cubics, cubic
+from joda.field.jaxcubics import Array, Cubics, cubic, largest
 
 BISECTIONS = 60
 """Halvings that find where two components of a maximum cross."""
@@ -80,7 +80,7 @@ def _descent(c: Array, lo: Array, hi: Array) -> Array:
     vertex = -c[..., 2] / (3 * jnp.where(bent, c[..., 3], 1))
     inside = bent & (vertex > lo) & (vertex < hi)
     places = jnp.stack((lo, hi, jnp.where(inside, vertex, lo)))
-    return jnp.maximum(0, -cubic(c, places)[1]).max(0)
+    return jnp.maximum(0, largest(-cubic(c, places)[1]))
 
 
 def _roots(c: Array, w: Array) -> Array:
