@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 from mujoco import mjx
-from test_solo_effects import FAST, cases, check_slopes, profile_of, pushes, run
+from slopes import FAST, check_slopes, named
+from test_solo_effects import cases, profile_of, pushes, run
 
 import joda
 
@@ -93,8 +94,11 @@ class Scene:
         return np.array(positions), np.array(states)
 
     def mjx(self, forces):
-        """The same by MJX; handles without backlash have no state."""
-        q, held, handles = roll(self.m, self.start(), self.fields, jnp.array(forces))[1]
+        """The same by MJX."""
+        return self.told(*roll(self.m, self.start(), self.fields, jnp.array(forces))[1])
+
+    def told(self, q, held, handles):
+        """The same of what MJX's data hold; handles without backlash have no state."""
         rows = [field.place.friction_row for field in self.fields.values()]
         states = np.concatenate([held[:, rows, None], handles.reshape(-1, 2, 2)], axis=2)
         if not any(e.effect == "backlash" for e in self.profiles["arm"].effects):
@@ -102,10 +106,8 @@ class Scene:
         return np.array(q), states
 
 
-roll = jax.jit(
-    partial(joda.mjx.rollout, read=lambda d: (d.qpos, d._impl.efc_force, d.userdata)),
-    compiler_options=FAST,
-)
+READ = partial(joda.mjx.rollout, read=lambda d: (d.qpos, d._impl.efc_force, d.userdata))
+roll = jax.jit(READ, compiler_options=FAST)
 
 
 def random_forces():
@@ -127,27 +129,33 @@ def check_states(actual, expected):
 # --- trajectories
 
 
-@pytest.mark.parametrize(
-    ("case", "integrator"),
-    [(case, "Euler") for case in CASES] + [(case, "implicitfast") for case in list(CASES)[::3]],
-)
-def test_trajectories_are_the_plugins(folder, case, integrator):
-    scene = Scene(folder, case, integrator)
-    forces = random_forces()
-    positions, states = scene.plugin(forces)
-    found, found_states = scene.mjx(forces)
-    assert (np.abs(found - positions).max(0) < 2e-8 * SPANS).all()
-    check_states(found_states, states)
-    assert (np.ptp(positions, axis=0) > 0.4 * SPANS).all()
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_trajectories_are_the_plugins(folder, integrator):
+    """All cases side by side, as a batch of environments, each with a model of its own."""
+    scenes, forces = {case: Scene(folder, case, integrator) for case in CASES}, random_forces()
+    stack = partial(jax.tree.map, lambda *leaves: jnp.stack(leaves))
+    each = [(scene.m, scene.start(), scene.fields) for scene in scenes.values()]
+    batched = jax.jit(jax.vmap(READ, in_axes=(0, 0, 0, None)), compiler_options=FAST)
+    motions = batched(*stack(*each), jnp.array(forces))[1]
+    for k, (case, scene) in enumerate(scenes.items()):
+        positions, states = scene.plugin(forces)
+        found, found_states = scene.told(*(np.array(part[k]) for part in motions))
+        assert (np.abs(found - positions).max(0) < 2e-8 * SPANS).all(), case
+        check_states(found_states, states)
+        assert (np.ptp(positions, axis=0) > 0.4 * SPANS).all(), case
+        if integrator == "Euler":
+            check_alone(scene, forces, found)
 
-    if integrator == "Euler":  # and the joints by themselves
-        for k, name in enumerate(JOINTS):
-            place, profile = scene.fields[name].place, scene.profiles[name]
-            joint = solo.from_context(scene.found[name], profile, scene.model, place.joint)
-            joint = replace(joint, effects=from_effects(profile.effects, NAMES))
-            start = (jnp.array(x) for x in (LOW[k] + 0.4 * SPANS[k], 0.0, 0.0))
-            path = run(joint, solo.State(*start), jnp.array(forces[:, k]), H)
-            assert np.abs(path.q - found[:, k]).max() < 2e-8 * SPANS[k]
+
+def check_alone(scene, forces, found):
+    """The joints by themselves move as they do in the scene."""
+    for k, name in enumerate(JOINTS):
+        place, profile = scene.fields[name].place, scene.profiles[name]
+        joint = solo.from_context(scene.found[name], profile, scene.model, place.joint)
+        joint = replace(joint, effects=from_effects(profile.effects, NAMES))
+        start = (jnp.array(x) for x in (LOW[k] + 0.4 * SPANS[k], 0.0, 0.0))
+        path = run(joint, solo.State(*start), jnp.array(forces[:, k]), H)
+        assert np.abs(path.q - found[:, k]).max() < 2e-8 * SPANS[k]
 
 
 def test_joints_with_different_effects_stand_side_by_side(folder):
@@ -161,20 +169,6 @@ def test_joints_with_different_effects_stand_side_by_side(folder):
     d = mjx.make_data(both[0].m).replace(qpos=jnp.array(LOW + 0.4 * SPANS))
     found = roll(both[0].m, d, fields, jnp.array(forces))[1][0]
     assert (np.abs(found - np.stack(alone, 1)).max(0) < 1e-9 * SPANS).all()
-
-
-def test_a_batch_of_effects_is_its_environments_one_by_one(folder):
-    scenes = [Scene(folder, case) for case in ("stribeck_friction", "prandtl", "backlash")]
-    forces = jnp.array(random_forces())
-    alone = [np.array(scene.mjx(forces)[0]) for scene in scenes]
-    many = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(scene.fields for scene in scenes))
-    d, m = scenes[0].start(), scenes[0].m
-    batch = jax.jit(
-        jax.vmap(partial(joda.mjx.rollout, read=lambda d: d.qpos), in_axes=(None, None, 0, None)),
-        compiler_options=FAST,
-    )
-    together = batch(m, d, many, forces)[1]
-    assert (np.abs(together - np.array(alone)).max((0, 1)) < 1e-8 * SPANS).all()
 
 
 def test_the_example_of_the_docs(folder):
@@ -205,10 +199,9 @@ def test_derivatives_by_all_numbers_are_those_of_central_differences(folder):
         fields = scene.fields | {"arm": scene.fields["arm"].replace(effects=back(values))}
         return joda.mjx.rollout(m, d, fields, jnp.array(swing), read=lambda d: d.qpos[0])[1]
 
-    run = jax.jit(lambda x, along: jax.jvp(positions, (x,), (along,)), compiler_options=FAST)
-    path = (run(values, 0 * values)[0] - LOW[0]) / SPANS[0]
+    path = check_slopes(positions, values, named(scene.fields["arm"].effects))
+    path = (path - LOW[0]) / SPANS[0]
     assert path.min() > 0 and path.max() < 1 and np.ptp(path) > 0.8
-    check_slopes(run, values, back)
 
 
 # --- state

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
+from slopes import FAST, check_slopes, named
 
 from joda import context
 from joda.effects import (
@@ -32,7 +33,6 @@ from joda.field.jaxeffects import NAMES, from_effects, prepare  # noqa: E402
 from joda.joints import laws, solo  # noqa: E402
 
 MODELS = Path(__file__).parents[1] / "models"
-FAST = {"xla_backend_optimization_level": "0"}  # compiles in a third of the time
 KINDS = {"hinge": "cabinet.xml", "slide": "drawer.xml"}
 
 
@@ -269,7 +269,7 @@ def test_an_effect_that_a_joint_has_not_does_nothing():
 def test_two_seconds_under_random_forces_are_the_plugins(kind, case):
     h = 0.005
     model, joint, profile = joint_of(kind, case, h)
-    if kind == "slide":  # compiled once: effects that do nothing besides
+    if case != "all":  # compiled once: effects that do nothing besides
         joint = replace(joint, effects=from_effects(profile.effects, NAMES))
     (lo, hi), force = profile.joint.range, found_of(kind)[1]
     data, q, state = mujoco.MjData(model), [], []
@@ -312,28 +312,8 @@ def test_derivatives_by_all_numbers_are_those_of_central_differences(kind):
         own = replace(joint, effects=back(values))
         return solo.rollout(own, start, jnp.array(force * swing), h)
 
-    run = jax.jit(lambda x, along: jax.jvp(positions, (x,), (along,)), compiler_options=FAST)
-    path = run(values, 0 * values)[0]
+    path = check_slopes(positions, values, named(joint.effects))
     assert path.min() > lo and path.max() < hi and np.ptp(path) > 0.8 * (hi - lo)
-    check_slopes(run, values, back)
-
-
-def check_slopes(run, values, back):
-    """Compares the derivatives of `run(values, direction)` by each value; none may be zero."""
-    names = jax.tree_util.tree_leaves_with_path(back(np.arange(len(values))))
-    for path, numbers in names:
-        for k in np.ravel(numbers).astype(int):
-            unit = np.eye(len(values))[k]
-            found, errors = run(values, unit)[1], []
-            for part in (1e-6, 1e-5, 1e-7):
-                step = part * max(abs(values[k]), 1e-2) * unit
-                wanted = (run(values + step, unit)[0] - run(values - step, unit)[0]) / (
-                    2 * step.sum()
-                )
-                errors.append(np.abs(found - wanted).max() / np.abs(found).max())
-                if errors[-1] < 1e-5:
-                    break
-            assert min(errors) < 1e-5, (jax.tree_util.keystr(path), errors)
 
 
 def test_derivatives_at_rest_are_finite():

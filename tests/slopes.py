@@ -1,0 +1,55 @@
+"""Derivatives compared with central differences, all of them at once."""
+
+from collections.abc import Callable, Collection
+from functools import partial
+
+import jax
+import numpy as np
+
+FAST = {"xla_backend_optimization_level": "0"}  # compiles in a third of the time; for single runs
+PARTS = (1e-6, 1e-5, 1e-7, 1e-4)
+"""Steps tried, in units of the number: what is best depends on how the path bends."""
+MANY = 100
+"""Runs at once, from which on it is worth compiling them well."""
+LEAST = 1e-2
+"""Of a number that is next to nothing."""
+
+
+def check_slopes(
+    path: Callable, values, names: Collection[str], within=1e-5, skip: Collection[str] = ()
+) -> np.ndarray:
+    """The path at the values; checks its derivatives by each of them, of which none may be zero.
+
+    Names that end with one of `skip` are not checked.
+    """
+
+    @partial(jax.jit, compiler_options=FAST if len(values) < MANY else {})
+    @jax.vmap
+    def run(x, along):
+        return jax.jvp(path, (x,), (along,))
+
+    values, units = np.asarray(values), np.eye(len(values))
+    here, slopes = (np.asarray(part) for part in run(np.tile(values, (len(values), 1)), units))
+    assert np.isfinite(slopes).all()
+    flat = slopes.reshape(len(values), -1)
+    steps, best = np.maximum(np.abs(values), LEAST), np.full(len(values), np.inf)
+    wanted = ~np.array([name.endswith(tuple(skip)) for name in names]) if skip else best > 0
+    for part in PARTS:
+        ends = [np.asarray(run(values + way * part * steps * units, units)[0]) for way in (1, -1)]
+        differences = (ends[0] - ends[1]).reshape(flat.shape) / (2 * part * steps)[:, None]
+        size = np.abs(flat).max(1)
+        best = np.fmin(best, np.abs(flat - differences).max(1) / np.where(size > 0, size, np.nan))
+        if (best[wanted] < within).all():
+            break
+    wrong = {n: e for n, e, w in zip(names, best, wanted, strict=True) if w and not e < within}
+    assert not wrong, wrong
+    return here[0]
+
+
+def named(tree) -> list[str]:
+    """A name for each number of a tree, in the order of ravel_pytree."""
+    return [
+        f"{jax.tree_util.keystr(path)}{list(index)}"
+        for path, leaf in jax.tree_util.tree_leaves_with_path(tree)
+        for index in np.ndindex(np.shape(leaf))
+    ]
