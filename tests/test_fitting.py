@@ -9,6 +9,7 @@ from refine_table import STEP, cabinet, planted, problem_of, recovery
 from joda.refining.stretches import cut
 
 
+@pytest.mark.sweep(0)  # the command does the same in test_refine.py
 @pytest.mark.parametrize("seed", range(3))
 def test_nine_iterations_bring_the_papers_door_down_to_the_noise(seed):
     found, start, train, held_out = cabinet(seed)

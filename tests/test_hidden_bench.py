@@ -28,17 +28,17 @@ RUNS = range(0, 8, 2)
 """Half of the runs, in half of the time."""
 
 
-def test_of_a_null_and_three_effects_at_most_one_is_wrong():
+def test_of_a_null_and_two_effects_at_most_one_is_wrong():
     master = secrets.randbits(32)
     print("master seed", master)
-    effects = dice(master, "reliable").choice(RELIABLE, 3, replace=False)
+    effects = dice(master, "reliable").choice(RELIABLE, 2, replace=False)
     hidden = [replace(job_of(master, "forced", k), effect=str(e)) for k, e in enumerate(effects)]
     rows = []
     for job in [job_of(master, "none", 0), *hidden]:
         train, _ = read(case_of(job))
         rows.append(vars(job) | said(train.changed(runs=RUNS)))
         print(told(rows[-1]))
-    assert sum(map(fine, rows)) >= 3
+    assert sum(map(fine, rows)) >= 2
 
 
 def test_the_true_model_misses_a_null_by_the_noise():

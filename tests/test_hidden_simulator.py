@@ -165,6 +165,7 @@ def test_a_seed_gives_the_same_case():
 NAMES = [*EFFECTS, *OUTSIDE, "added_inertia"]
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize(("effect", "second"), list(zip(NAMES[::2], NAMES[1::2], strict=True)))
 def test_what_is_hidden_shows(effect, second):
     case = draw(1, effect, second=second)

@@ -21,7 +21,7 @@ import pytest
 from forked import Ended, Forked
 from workshop import COMMANDS, SEVERAL, check, contents, fill
 
-COUNT = int(os.environ.get("JODA_MISUSE", "40"))
+COUNT = int(os.environ.get("JODA_MISUSE", "24"))
 SEED = int(os.environ.get("JODA_MISUSE_SEED", secrets.randbelow(10**6)))
 
 WORDS = [

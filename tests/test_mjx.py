@@ -134,6 +134,7 @@ def run_mjx(model, profiles, forces, start=(0.3, 0.5), rows=True):
 SPANS = np.array([hi - lo for lo, hi in RANGES.values()])
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("integrator", "contacts"), [("Euler", True), ("implicitfast", False)], ids="{}".format
 )

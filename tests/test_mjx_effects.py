@@ -129,6 +129,7 @@ def check_states(actual, expected):
 # --- trajectories
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 def test_trajectories_are_the_plugins(folder, integrator):
     """All cases side by side, as a batch of environments, each with a model of its own."""

@@ -222,6 +222,7 @@ def test_the_door_clears_the_arm_at_home():
         )
 
 
+@pytest.mark.sweep(2)
 def test_a_slight_push_does_not_latch_the_microwave(latched):
     """The door leaves the tip, comes to the latch, and rests or is thrown back there."""
     s = pushed(latched, SLIGHT_PUSH) / EXPECTED["microwave"].span
@@ -230,6 +231,7 @@ def test_a_slight_push_does_not_latch_the_microwave(latched):
     assert np.all(s[-1000:] == pytest.approx(s[-1], abs=1e-3))
 
 
+@pytest.mark.sweep(2)
 def test_an_additional_push_latches_the_microwave(latched):
     """It is still latched when the arm has gone home."""
     s = pushed(latched, TWO_PUSHES) / EXPECTED["microwave"].span

@@ -102,6 +102,7 @@ def good(done: Loop) -> None:
     assert done.last.behaviour.opening.arrived and done.last.behaviour.closing.arrived
 
 
+@pytest.mark.sweep(20)
 @pytest.mark.parametrize("key", KEYS)
 @each
 def test_every_own_model_ends_with_its_wishes_met_whatever_is_drawn(name, key):

@@ -173,7 +173,7 @@ def test_the_pendulum_has_no_quadratic_drag(pendulum):
 
 
 # --- the doors
-@pytest.fixture(scope="module", params=DOORS)
+@pytest.fixture(scope="module", params=["ikea", pytest.param("lab", marks=pytest.mark.sweep(0))])
 def door(request, tmp_path_factory):
     names = [f"pr2_cabinet_doors/{name}" for name in DOORS[request.param]]
     return examined(tmp_path_factory.mktemp(request.param), DOOR, names)

@@ -124,7 +124,7 @@ def experiments(
     does; a profile and the baselines fitted to it are parted where the numbers of all seeds are.
     Example:
 
-        joda experiments switch --seeds 2 -o experiments
+        joda experiments switch --seeds 1 -o experiments
     """
     from joda import experiments as run
 
