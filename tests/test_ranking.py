@@ -87,7 +87,19 @@ def test_a_well_is_tried_where_the_other_was_found(begun):
 def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
     assert weigh(ranked).verdict == weigh(ranked, wholly=True).verdict == "missing_effect"
     more = replace(ranked, level=2 * WORST)
-    assert weigh(more, wholly=True).verdict == "unexplained"
+    strange = weigh(more, wholly=True)
+    assert strange.verdict == "unexplained"
+    assert strange.probabilities[0] <= 0.5  # and an unknown one is as likely
+
+
+@pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])
+def test_a_curve_that_hardly_differs_along_the_way_is_none(begun, effect):
+    """Another effect, a constant one, is all that it is; excluding that makes no curve of it."""
+    found = begun.tell(next(h for h in begun.hypotheses if h.effect == effect))
+    n = len(begun.base.places)
+    for y, vanished in ((np.full(9, 0.3), True), (np.linspace(0, 0.6, 9), False)):
+        fit = replace(found.fit, x=np.append(found.fit.x[:n], y))
+        assert replace(found, fit=fit).vanished == vanished
 
 
 @pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])

@@ -54,9 +54,10 @@ class Guess:
 
     @property
     def vanished(self) -> bool:
-        """Whether its size is the least that is tried: what is left fits by something else."""
+        """Whether it is hardly there, or no more than a simpler effect: something else fits."""
         least = self.hypothesis.unknowns.low[0]
-        return bool(least > 0 and self.x[0] < 1.01 * least)
+        hardly = least > 0 and self.x[0] < 1.01 * least
+        return bool(hardly or not self.hypothesis.itself(self.x))
 
     def written(self, base: Base) -> Profile:
         """The model's profile with the effect."""

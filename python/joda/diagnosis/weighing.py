@@ -17,7 +17,7 @@ LEAST_GAIN = 60.0
 """Least gain in loss of an effect that is more than chance."""
 NOTICEABLE = 0.02
 """The same, per sample."""
-CRUDE = 0.12
+CRUDE = 0.1
 """Part of its excess that any true effect may leave where more than noise is left of all."""
 WEAK, LEFT = 0.12, 0.25
 """Part of its excess that any true effect may leave, up to so much per sample: noise is not known
@@ -75,15 +75,18 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
     left = np.array([excess(guess.score, ranking.told) for guess in guesses])
     noise = min(left.min(), CHANCE * float(np.sqrt(2 / ranking.told)))  # not known better
     own, left = max(own - noise, 0.0), left - noise
-    part = max(first.hypothesis.remains, CRUDE if ranking.level > WORST else 0.0)
+    part = CRUDE if ranking.level > WORST else first.hypothesis.remains
     unknown = strictness * max(part * own, min(WEAK * own, LEFT))
+    if wholly and ranking.level > WORST:  # then an unknown one is as likely as the first
+        unknown = min(unknown, float(left[0]))
     weights = (left + LITTLE) ** -SHARPNESS
-    likely = weights / (weights.sum() + (unknown + LITTLE) ** -SHARPNESS)
+    strange = (unknown + LITTLE) ** -SHARPNESS
+    likely = weights / (weights.sum() + strange)
     gain = ranking.asked.fit.loss - first.fit.loss - first.cost
     if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and likely[0] < HARDLY):
         loss = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
         said: Verdict = "adequate" if excess(loss, samples) < MUCH else "unexplained"
-    elif likely[0] < 1 - likely.sum() or (wholly and ranking.level > WORST):
+    elif weights[0] <= strange:
         said = "unexplained"
     else:
         said = "missing_effect"

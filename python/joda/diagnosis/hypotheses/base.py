@@ -72,6 +72,7 @@ class Hypothesis:
         rarity: twice the logarithm of how much rarer it is than others.
         remains: part of the excess misfit that it may leave where it is the true one: more where
             only the rough shape of its curve is known.
+        itself: whether it is, with these numbers, more than a simpler effect would be.
     """
 
     effect: str
@@ -85,6 +86,7 @@ class Hypothesis:
     ends: int = 0
     rarity: float = 0.0
     remains: float = KNOWN_LAW
+    itself: Callable[[Array], bool] = lambda x: True
 
     def placed(
         self, places: Sequence[Sequence[float]], strengths: Sequence[float] = (1.0,)

@@ -41,6 +41,8 @@ Way = Literal["positive", "negative"]
 
 KNOTS = 9
 """Control points of a free curve."""
+VARIED = 0.5
+"""How much a curve varies at least that differs along the way, in units of its mean."""
 TINY = 1e-12
 """As good as no force."""
 HEAVIEST = 0.45
@@ -76,6 +78,7 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
         lambda x: unit * float(np.ptp(x)),
         unit_of(units, power),
         remains=FREE_CURVE,
+        itself=lambda x: bool(np.ptp(x) > VARIED * np.mean(x)),
     )
 
 
