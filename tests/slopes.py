@@ -1,10 +1,11 @@
 """Derivatives compared with central differences, all of them at once."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from functools import partial
 
 import jax
 import numpy as np
+from jax.flatten_util import ravel_pytree
 
 FAST = {"xla_backend_optimization_level": "0"}  # compiles in a third of the time; for single runs
 PARTS = (1e-6, 1e-5, 1e-7, 1e-4)
@@ -15,29 +16,28 @@ LEAST = 1e-2
 """Of a number that is next to nothing."""
 
 
-def check_slopes(
-    path: Callable, values, names: Collection[str], within=1e-5, skip: Collection[str] = ()
-) -> np.ndarray:
-    """The path at the values; checks its derivatives by each of them, of which none may be zero.
+def check_slopes(path: Callable, tree, within=1e-5, skip: tuple[str, ...] = ()) -> np.ndarray:
+    """The path of a tree of numbers; checks its derivatives by each of them, of which none is zero.
 
-    Names that end with one of `skip` are not checked.
+    Numbers whose name ends with one of `skip` are not checked.
     """
+    values, back = ravel_pytree(tree)
+    values, units = np.asarray(values), np.eye(len(values))
 
     @partial(jax.jit, compiler_options=FAST if len(values) < MANY else {})
     @jax.vmap
-    def run(x, along):
-        return jax.jvp(path, (x,), (along,))
+    def run(x, along):  # one program for slopes and differences: compiling takes longest
+        return jax.jvp(lambda x: path(back(x)), (x,), (along,))
 
-    values, units = np.asarray(values), np.eye(len(values))
     here, slopes = (np.asarray(part) for part in run(np.tile(values, (len(values), 1)), units))
     assert np.isfinite(slopes).all()
     flat = slopes.reshape(len(values), -1)
-    steps, best = np.maximum(np.abs(values), LEAST), np.full(len(values), np.inf)
-    wanted = ~np.array([name.endswith(tuple(skip)) for name in names]) if skip else best > 0
+    size, steps = np.abs(flat).max(1), np.maximum(np.abs(values), LEAST)
+    names, best = _names(tree), np.full(len(values), np.inf)
+    wanted = np.array([not name.endswith(skip) for name in names])
     for part in PARTS:
         ends = [np.asarray(run(values + way * part * steps * units, units)[0]) for way in (1, -1)]
         differences = (ends[0] - ends[1]).reshape(flat.shape) / (2 * part * steps)[:, None]
-        size = np.abs(flat).max(1)
         best = np.fmin(best, np.abs(flat - differences).max(1) / np.where(size > 0, size, np.nan))
         if (best[wanted] < within).all():
             break
@@ -46,7 +46,7 @@ def check_slopes(
     return here[0]
 
 
-def named(tree) -> list[str]:
+def _names(tree) -> list[str]:
     """A name for each number of a tree, in the order of ravel_pytree."""
     return [
         f"{jax.tree_util.keystr(path)}{list(index)}"

@@ -84,7 +84,7 @@ def hidden(tmp_path_factory):
         told=told,
         added=added,
         unseen=unseen,
-    )  # fmt: skip
+    )
 
 
 def test_the_diagnosis_is_as_the_contract_says(hidden):

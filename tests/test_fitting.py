@@ -28,7 +28,7 @@ def test_a_planted_profile_with_a_barrier_is_recovered():
     seed = int(np.random.default_rng().integers(2**31))
     name = ("bistable_mechanism", "bistable_mechanism_internal")[seed % 2]
     for channel, (rms, _) in recovery(planted(name, seed)).items():
-        assert rms < 0.08, (name, seed, channel)  # 0.05 in 36 of 37 (refine_table.py planted)
+        assert rms < 0.05, (name, seed, channel)
 
 
 def test_an_interruption_keeps_the_best_so_far():

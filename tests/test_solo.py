@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from mujoco import mjx
+from slopes import FAST
 
 from joda import context, templates
 from joda.component import Component
@@ -22,7 +23,6 @@ import joda.mjx  # noqa: E402
 from joda.joints import solo  # noqa: E402
 
 MODELS = sorted((Path(__file__).parents[1] / "models").glob("*.xml"))
-FAST = {"xla_backend_optimization_level": "0"}  # compiles in a third of the time
 roll = jax.jit(solo.rollout, static_argnames="h")
 
 

@@ -75,9 +75,10 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
     left = np.array([excess(guess.score, ranking.told) for guess in guesses])
     noise = min(left.min(), CHANCE * float(np.sqrt(2 / ranking.told)))  # not known better
     own, left = max(own - noise, 0.0), left - noise
-    part = CRUDE if ranking.level > WORST else first.hypothesis.remains
+    noisy = ranking.level > WORST  # more than noise is left of all
+    part = CRUDE if noisy else first.hypothesis.remains
     unknown = strictness * max(part * own, min(WEAK * own, LEFT))
-    if wholly and ranking.level > WORST:  # then an unknown one is as likely as the first
+    if wholly and noisy:  # then an unknown one is as likely as the first
         unknown = min(unknown, float(left[0]))
     weights = (left + LITTLE) ** -SHARPNESS
     strange = (unknown + LITTLE) ** -SHARPNESS
