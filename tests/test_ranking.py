@@ -12,8 +12,10 @@ from joda.diagnosis.asking import asked
 from joda.diagnosis.guessing import beside
 from joda.diagnosis.hypotheses import Units, hypotheses
 from joda.diagnosis.ranking import WELLS, WORST, rank
+from joda.diagnosis.verdict import diagnosed
 from joda.diagnosis.weighing import weigh
 from joda.field import evaluate
+from joda.hidden import EFFECTS
 from joda.profile import Channel
 
 EFFECT = "quadratic_damping"
@@ -90,6 +92,16 @@ def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
     strange = weigh(more, wholly=True)
     assert strange.verdict == "unexplained"
     assert strange.probabilities[0] <= 0.5  # and an unknown one is as likely
+
+
+def test_ends_that_are_bouncier_than_the_model_s_are_unexplained_if_that_is_excluded():
+    """Only knocks tell of them, and those tell of nothing else."""
+    train = read(clear_case("end_stop_restitution"))[0]
+    others = set(EFFECTS) - {"end_stop_restitution", "quadratic_damping"}
+    assert diagnosed(train, others).diagnosis.effects[0].effect == "end_stop_restitution"
+    without = diagnosed(train, {*others, "end_stop_restitution"}).diagnosis
+    assert without.verdict == "unexplained"
+    assert without.summary.startswith("The ends of the range throw the joint back")
 
 
 @pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])

@@ -10,6 +10,7 @@ from joda.diagnosis.guessing import Begin, Guess, begins, finished, guessed, mov
 from joda.diagnosis.hypotheses import Hypothesis, hypotheses
 from joda.diagnosis.judge import Fit, Judge
 from joda.diagnosis.knocks import knock_guess
+from joda.joints.single import Single
 from joda.measured.reading import Measured
 
 RESTITUTION = "end_stop_restitution"
@@ -23,6 +24,7 @@ class Asked:
     Attributes:
         judge: of the windows.
         base: the model as it is.
+        given: the joint with its own ends of the range.
         fit: of its factors alone.
         begins: from where hypotheses are fitted.
         hypotheses: all of the catalogue.
@@ -30,6 +32,7 @@ class Asked:
 
     judge: Judge
     base: Base
+    given: Single
     fit: Fit
     begins: tuple[Begin, ...]
     hypotheses: tuple[Hypothesis, ...]
@@ -42,7 +45,7 @@ class Asked:
 
     def restitution(self, hypothesis: Hypothesis) -> Guess | None:
         """How bouncy the ends are; None if the data cannot tell."""
-        return knock_guess(self.judge, self.base, self.fit, hypothesis)
+        return knock_guess(self.judge, self.base, self.given, self.fit, hypothesis)
 
     def rough(self, hypothesis: Hypothesis) -> "Rough":
         """The hypothesis fitted roughly to windows without knocks."""
@@ -86,4 +89,4 @@ def asked(measured: Measured, length: float | None = None) -> Asked:
     ]
     fit = min(fits, key=lambda f: f.loss)
     every = hypotheses(units_of(windows, measured), templates(), measured.profile)
-    return Asked(judge, base, fit, begins(judge, base, given, fit), tuple(every))
+    return Asked(judge, base, measured.single, fit, begins(judge, base, given, fit), tuple(every))

@@ -9,6 +9,7 @@ from joda.diagnosis.guessing import ROUGH, Guess, guessed
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import NOTHING, Fit, Judge
 from joda.diagnosis.windows import Windows
+from joda.joints.single import Single
 from joda.profile import Channels
 
 Array = NDArray[np.float64]
@@ -25,10 +26,18 @@ KNOCK_TIME = 0.6
 """In which a joint goes through its range towards a knock, s."""
 
 
-def knock_guess(judge: Judge, base: Base, fit: Fit, hypothesis: Hypothesis) -> Guess | None:
+def knock_guess(
+    judge: Judge, base: Base, given: Single, fit: Fit, hypothesis: Hypothesis
+) -> Guess | None:
     """How bouncy the ends are, by the windows with knocks; they tell of nothing else.
 
-    None if the joint does not come back from the ends clearly faster than the model does.
+    Args:
+        judge, base, fit: the model and how it was fitted.
+        given: the joint with its own ends.
+        hypothesis: bouncy ends.
+
+    Returns:
+        None if the joint does not come back from the ends clearly faster than the model does.
     """
     windows = judge.windows
     knocks = windows.knocks & (windows.count >= LEAST)
@@ -42,7 +51,7 @@ def knock_guess(judge: Judge, base: Base, fit: Fit, hypothesis: Hypothesis) -> G
     measured = rebounds(windows, knocks, windows.position)
     if len(measured) < KNOCKS or np.median(measured) < BOUNCY:
         return None
-    if np.median(measured) < rebound(base) + CLEARLY:
+    if np.median(measured) < rebound(base, given) + CLEARLY:
         return None
     trials = [*hypothesis.trials, [np.median(measured)]]
     fits = [own.fit(make, hypothesis.unknowns, np.array(x), fit.start, ROUGH) for x in trials]
@@ -56,21 +65,21 @@ def knock_guess(judge: Judge, base: Base, fit: Fit, hypothesis: Hypothesis) -> G
     return guessed(judge, hypothesis, whole)
 
 
-def rebound(base: Base) -> float:
-    """Speed after a knock, per speed before, of the model."""
+def rebound(base: Base, given: Single) -> float:
+    """Speed after a knock, per speed before, of the model with its own ends."""
     profile = base.profile.model_copy(update={"channels": Channels()})
     lo, hi = profile.joint.range
     steps, speed = round(KNOCK_TIME / base.h), (hi - lo) / KNOCK_TIME
     start = np.array([[hi - 0.2 * (hi - lo), speed]])
     begin = np.zeros(1, np.int64)
-    solo = base.single.without_weight().solo(profile, base.h)
+    solo = given.without_weight().solo(profile, base.h)
     before, after = solo.replay(np.zeros(steps), begin, start, np.ones(1, bool), base.h)
     return float((before[-1] - after[-1]) / base.h / speed)
 
 
 def rebounds(windows: Windows, knocks: NDArray[np.bool_], position: Array) -> Array:
-    """Speed after per speed before, of the first knock in each window; shape (knocks,)."""
-    out = []
+    """Speed after per speed before, of the first knock in each window, the harder half of them."""
+    speeds = []
     for row in windows.rows[knocks]:
         own = row[row >= 0]
         t, y = windows.time[own], position[own]
@@ -82,5 +91,5 @@ def rebounds(windows: Windows, knocks: NDArray[np.bool_], position: Array) -> Ar
         before = np.polyfit(t[k - AROUND : k], y[k - AROUND : k], 1)[0]
         after = np.polyfit(t[k + 1 : k + 1 + AROUND], y[k + 1 : k + 1 + AROUND], 1)[0]
         if before:
-            out.append(-after / before)
-    return np.array(out)
+            speeds.append((abs(before), -after / before))
+    return np.array([ratio for _, ratio in sorted(speeds)[len(speeds) // 2 :]])

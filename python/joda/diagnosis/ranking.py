@@ -38,12 +38,14 @@ class Ranking:
         guesses: the best one of each effect, the most likely first.
         level: mean square residual that counts as noise, 1 at least.
         told: how many samples count.
+        bouncy: whether knocks tell of bouncier ends than the model's, and that is not tried.
     """
 
     asked: Asked
     guesses: tuple[Guess, ...]
     level: float
     told: float
+    bouncy: bool = False
 
 
 Told = Callable[[int, int, str], None]
@@ -63,14 +65,17 @@ def rank(
         exclude: effects that are not tried.
         heed: told how many hypotheses are done, of how many, and the last one's name.
     """
-    tried = [h for h in begun.hypotheses if h.effect not in exclude]
+    tried = [h for h in begun.hypotheses if h.effect not in {*exclude, RESTITUTION}]
+    ends = [g for h in begun.hypotheses if h.effect == RESTITUTION and (g := begun.restitution(h))]
+    silent = RESTITUTION in exclude
     with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, heed, 2 * len(tried) + POLISHED)
-        guesses = _fitted(begun, tried, work)
+        guesses = [] if silent else ends
+        guesses += _fitted(begun, tried, guesses, work)
         guesses += _beside(begun, tried, guesses, work)
         guesses += _polished(begun, guesses, work)
     there = [one for one in guesses if not one.vanished]
-    return Ranking(begun, *_scored(begun.judge, there))
+    return Ranking(begun, *_scored(begun.judge, there), bouncy=silent and bool(ends))
 
 
 @dataclass
@@ -92,13 +97,13 @@ class _Work:
         return out
 
 
-def _fitted(begun: Asked, tried: Sequence[Hypothesis], work: _Work) -> list[Guess]:
+def _fitted(
+    begun: Asked, tried: Sequence[Hypothesis], there: Sequence[Guess], work: _Work
+) -> list[Guess]:
     """All hypotheses fitted; where one leaves only noise, those that are far off, roughly."""
-    guesses = [g for h in tried if h.effect == RESTITUTION and (g := begun.restitution(h))]
-    roughs = work.all(begun.rough, [h for h in tried if h.effect != RESTITUTION])
-    roughs.sort(key=lambda one: one.best.loss)
-    guesses += work.all(begun.finished, roughs[:POLISHED])
-    least = min((one.fit.loss for one in guesses), default=0.0)
+    roughs = sorted(work.all(begun.rough, tried), key=lambda one: one.best.loss)
+    guesses = work.all(begun.finished, roughs[:POLISHED])
+    least = min((one.fit.loss for one in (*there, *guesses)), default=0.0)
     most = FAR * least if least < ENOUGH * begun.judge.samples else np.inf
     near = [one for one in roughs[POLISHED:] if one.best.loss < most]
     far = [one for one in roughs[POLISHED:] if one.best.loss >= most]

@@ -3,7 +3,7 @@
 from joda.diagnosis import phrases
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.ranking import Ranking
-from joda.diagnosis.weighing import Weighed
+from joda.diagnosis.weighing import MUCH, Weighed
 
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
@@ -23,8 +23,8 @@ def strengths_off(ranking: Ranking) -> str:
     return f" Its own numbers are somewhat off: {', '.join(factors)}." if factors else ""
 
 
-def summarised(first: Finding, weighed: Weighed, one_way: bool) -> str:
-    """The verdict in a sentence, where something is missing."""
+def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool = False) -> str:
+    """The verdict in a sentence, where something is missing; bouncy: the ends, as in `Ranking`."""
     name = phrases.named(first.effect)
     others = " or ".join(map(phrases.named, first.indistinguishable_from))
     either = f"{name} or {others}" if others else name
@@ -34,6 +34,8 @@ def summarised(first: Finding, weighed: Weighed, one_way: bool) -> str:
         if one_way and others
         else ""
     )
+    if weighed.verdict == "unexplained" and bouncy and weighed.excess[0] < MUCH:
+        return "The ends of the range throw the joint back more than the model's: not explained."
     if weighed.verdict == "unexplained":
         share = 100 * min(weighed.share, 1.0)
         if share < MOST:

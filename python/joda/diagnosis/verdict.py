@@ -93,7 +93,7 @@ def diagnosed(
     )
     profile = ranking.guesses[0].written(ranking.asked.base)
     experiment = _next(measured, ranking, weighed, one_way)
-    summary = summarised(findings[0], weighed, one_way)
+    summary = summarised(findings[0], weighed, one_way, ranking.bouncy)
     said = _said(measured, weighed.verdict, summary, findings, experiment)
     return Diagnosed(said, profile, puzzling)
 

@@ -84,9 +84,11 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
     strange = (unknown + LITTLE) ** -SHARPNESS
     likely = weights / (weights.sum() + strange)
     gain = ranking.asked.fit.loss - first.fit.loss - first.cost
-    if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and likely[0] < HARDLY):
+    doubtful = likely[0] < HARDLY or ranking.bouncy
+    if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and doubtful):
         loss = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
-        said: Verdict = "adequate" if excess(loss, samples) < MUCH else "unexplained"
+        calm = excess(loss, samples) < MUCH and not ranking.bouncy
+        said: Verdict = "adequate" if calm else "unexplained"
     elif weights[0] <= strange:
         said = "unexplained"
     else:
