@@ -92,4 +92,5 @@ def rebounds(windows: Windows, knocks: NDArray[np.bool_], position: Array) -> Ar
         after = np.polyfit(t[k + 1 : k + 1 + AROUND], y[k + 1 : k + 1 + AROUND], 1)[0]
         if before:
             speeds.append((abs(before), -after / before))
-    return np.array([ratio for _, ratio in sorted(speeds)[len(speeds) // 2 :]])
+    harder = sorted(speeds)[-max(KNOCKS, len(speeds) // 2) :]
+    return np.array([ratio for _, ratio in harder])
