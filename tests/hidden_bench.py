@@ -78,12 +78,12 @@ def added(job: Job, row: dict, case: Case, train: Measured, held_out: Measured) 
     kept, held = parted(train)
     before = error(held_out).window
     out = {"before": before, "floor": floor_of(case, held_out)}
-    tried = {"wrong": (job.wrong, None)}
+    tried = {"wrong": (job.wrong,)}
     if row["named"]:
-        tried["after"] = row["named"][0]["effect"], row["named"][0]["direction"]
-    for key, (effect, direction) in tried.items():
+        tried["after"] = tuple(row["named"][0][key] for key in ("effect", "direction", "interval"))
+    for key, effect in tried.items():
         begun = time.perf_counter()
-        mended = mend(kept, held, effect, direction)
+        mended = mend(kept, held, *effect)
         out[f"{key}_seconds"] = time.perf_counter() - begun
         new = error(held_out, mended.profile).window if mended.effect else before
         out[f"{key}_error"] = new

@@ -11,6 +11,8 @@ from joda.diagnosis import asking, ranking
 from joda.diagnosis.asking import asked
 from joda.diagnosis.guessing import beside
 from joda.diagnosis.hypotheses import Units, hypotheses
+from joda.diagnosis.hypotheses.base import KNOWN_SHAPE
+from joda.diagnosis.judge import BEND
 from joda.diagnosis.ranking import WELLS, WORST, rank
 from joda.diagnosis.verdict import diagnosed
 from joda.diagnosis.weighing import weigh
@@ -92,6 +94,25 @@ def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
     strange = weigh(more, wholly=True)
     assert strange.verdict == "unexplained"
     assert strange.probabilities[0] <= 0.5  # and an unknown one is as likely
+
+
+def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
+    """If neither leaves only noise, though one whose shape is roughly known might leave so much."""
+    own = weigh(ranked).excess[0]
+
+    def verdict(*parts):
+        """Where the first effects leave these parts of the excess."""
+        guesses = [
+            replace(guess, score=(part * own + BEND * np.log1p(1 / BEND)) * ranked.told)
+            for guess, part in zip(ranked.guesses, parts, strict=False)
+        ]
+        rough = replace(guesses[0].hypothesis, remains=KNOWN_SHAPE)
+        guesses[0] = replace(guesses[0], hypothesis=rough)
+        return weigh(replace(ranked, guesses=tuple(guesses))).verdict
+
+    assert verdict(0.15, 0.6) == "missing_effect"
+    assert verdict(0.15, 0.18) == "unexplained"
+    assert verdict(0.0, 0.01) == "missing_effect"  # both leave only noise: either may be
 
 
 def test_ends_that_are_bouncier_than_the_model_s_are_unexplained_if_that_is_excluded():

@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from joda.diagnosis.hypotheses.base import KNOWN_LAW
 from joda.diagnosis.judge import BEND
 from joda.diagnosis.ranking import WORST, Ranking, levelled
 
@@ -19,9 +20,12 @@ NOTICEABLE = 0.02
 """The same, per sample."""
 CRUDE = 0.1
 """Part of its excess that any true effect may leave where more than noise is left of all."""
-WEAK, LEFT = 0.12, 0.25
+WEAK, LEFT = 0.12, 0.12
 """Part of its excess that any true effect may leave, up to so much per sample: noise is not known
 better."""
+APART = 0.5
+"""Part of what the next best effect leaves that a true one may leave, if that is less: where two
+are nearly as good, and neither leaves only noise, both only resemble what is missing."""
 LITTLE = 0.05
 """Excess per sample that is never worth a word."""
 CHANCE = 2.0
@@ -77,7 +81,8 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
     own, left = max(own - noise, 0.0), left - noise
     noisy = ranking.level > WORST  # more than noise is left of all
     part = CRUDE if noisy else first.hypothesis.remains
-    unknown = strictness * max(part * own, min(WEAK * own, LEFT))
+    least = max(KNOWN_LAW * own, min(WEAK * own, LEFT))
+    unknown = strictness * max(min(part * own, APART * left[1:].min(initial=np.inf)), least)
     if wholly and noisy:  # then an unknown one is as likely as the first
         unknown = min(unknown, float(left[0]))
     weights = (left + LITTLE) ** -SHARPNESS

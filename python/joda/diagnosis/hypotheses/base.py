@@ -24,7 +24,7 @@ TRIAL = 0.1
 """Strength with which an effect is tried, in usual forces."""
 STRENGTH = (0.0, 300.0, 0.005)
 """Bounds and step of a strength, in usual forces: where it is strong, few joints left alone go."""
-KNOWN_LAW, FREE_CURVE, KNOWN_SHAPE = 0.02, 0.12, 0.2
+KNOWN_LAW, FREE_CURVE, KNOWN_SHAPE = 0.01, 0.12, 0.2
 """Part of the excess misfit that a true effect may leave, by what is known of it."""
 
 
