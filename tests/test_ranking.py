@@ -79,6 +79,13 @@ def test_no_excluded_effect_is_ranked(begun):
     assert rank(begun, {*exclude, kept}).guesses == ()
 
 
+def test_a_model_that_was_fitted_badly_is_fitted_anew(begun):
+    """From where the best effect was found; else all that is tried would seem to be missing."""
+    stuck = replace(begun, fit=replace(begun.fit, loss=3 * begun.fit.loss))
+    found = rank(stuck, {h.effect for h in begun.hypotheses} - {EFFECT}).asked.fit
+    assert found.loss < 1.5 * begun.fit.loss
+
+
 def test_a_well_is_tried_where_the_other_was_found(begun):
     first, second = (next(h for h in begun.hypotheses if h.effect == name) for name in WELLS)
     found = begun.tell(first)

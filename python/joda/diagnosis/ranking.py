@@ -74,6 +74,7 @@ def rank(
         guesses += _fitted(begun, tried, guesses, work)
         guesses += _beside(begun, tried, guesses, work)
         guesses += _polished(begun, guesses, work)
+        begun = _unstuck(begun, guesses)
     there = [one for one in guesses if not one.vanished]
     return Ranking(begun, *_scored(begun.judge, there), bouncy=silent and bool(ends))
 
@@ -135,6 +136,18 @@ def _polished(begun: Asked, guesses: Sequence[Guess], work: _Work) -> list[Guess
     near = [one for one in others if one.fit.loss < most]
     work.total = work.done + len(near)
     return moved + work.all(begun.moved, near)
+
+
+def _unstuck(begun: Asked, guesses: Sequence[Guess]) -> Asked:
+    """The model as it is, fitted from where the best guess is too: it may do as well from there."""
+    judge, base = begun.judge, begun.base
+    own = [one for one in guesses if one.hypothesis.effect != RESTITUTION]
+    if not own:
+        return begun
+    best = min(own, key=lambda one: one.fit.loss).fit
+    fit = judge.fit(base.solo, base.unknowns, best.x[: len(base.places)], best.start)
+    fit = judge.refit(base.solo, base.unknowns, fit)
+    return replace(begun, fit=min(begun.fit, fit, key=lambda one: one.loss))
 
 
 def _best(guesses: Iterable[Guess]) -> list[Guess]:
