@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.asking import Asked
+from joda.diagnosis.asking import RESTITUTION, Asked
 from joda.diagnosis.baseline import joined
 from joda.diagnosis.guessing import Guess
 from joda.diagnosis.judge import Judge, Make, Unknowns
@@ -40,7 +40,7 @@ class Holdout:
         """
         base, windows = self.asked.base, self.asked.judge.windows
         make, unknowns = joined(base, found.hypothesis)
-        if found.hypothesis.effect == "end_stop_restitution":
+        if found.hypothesis.effect == RESTITUTION:
             knocks = windows.knocks & (windows.count > 0)
             without = _misfit(windows, base.solo, self.asked.fit.x, knocks)
             return without, _misfit(windows, make, found.fit.x, knocks)

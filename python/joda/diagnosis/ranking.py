@@ -45,7 +45,7 @@ class Ranking:
     guesses: tuple[Guess, ...]
     level: float
     told: float
-    bouncy: bool = False
+    bouncy: bool
 
 
 Told = Callable[[int, int, str], None]
@@ -66,11 +66,12 @@ def rank(
         heed: told how many hypotheses are done, of how many, and the last one's name.
     """
     tried = [h for h in begun.hypotheses if h.effect not in {*exclude, RESTITUTION}]
-    ends = [g for h in begun.hypotheses if h.effect == RESTITUTION and (g := begun.restitution(h))]
+    bouncy = [h for h in begun.hypotheses if h.effect == RESTITUTION]
     silent = RESTITUTION in exclude
     with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, heed, 2 * len(tried) + POLISHED)
-        guesses = [] if silent else ends
+        ends = [guess for h in bouncy if (guess := begun.restitution(h))]
+        guesses = [guess for guess in ends if not silent]
         guesses += _fitted(begun, tried, guesses, work)
         guesses += _beside(begun, tried, guesses, work)
         guesses += _polished(begun, guesses, work)

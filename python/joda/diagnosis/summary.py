@@ -23,7 +23,7 @@ def strengths_off(ranking: Ranking) -> str:
     return f" Its own numbers are somewhat off: {', '.join(factors)}." if factors else ""
 
 
-def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool = False) -> str:
+def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool) -> str:
     """The verdict in a sentence, where something is missing; bouncy: the ends, as in `Ranking`."""
     name = phrases.named(first.effect)
     others = " or ".join(map(phrases.named, first.indistinguishable_from))
@@ -34,9 +34,11 @@ def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool = F
         if one_way and others
         else ""
     )
-    if weighed.verdict == "unexplained" and bouncy and weighed.excess[0] < MUCH:
-        return "The ends of the range throw the joint back more than the model's: not explained."
     if weighed.verdict == "unexplained":
+        if bouncy and weighed.excess[0] < MUCH:
+            return (
+                "The ends of the range throw the joint back more than the model's: not explained."
+            )
         share = 100 * min(weighed.share, 1.0)
         if share < MOST:
             return (
