@@ -105,17 +105,21 @@ def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
 
 def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
     """If neither leaves only noise, though one whose shape is roughly known might leave so much."""
-    own = weigh(ranked).excess[0]
+    judge = ranked.asked.judge
+    squares = 30.0 * judge.windows.count  # far off, whatever effect was drawn
+    far = replace(ranked.asked.fit, squares=squares, loss=judge.loss(squares))
+    clear = replace(ranked, asked=replace(ranked.asked, fit=far), level=1.0, told=judge.samples)
+    own = weigh(clear).excess[0]
 
     def verdict(*parts):
         """Where the first effects leave these parts of the excess."""
         guesses = [
-            replace(guess, score=(part * own + BEND * np.log1p(1 / BEND)) * ranked.told)
-            for guess, part in zip(ranked.guesses, parts, strict=False)
+            replace(guess, score=(part * own + BEND * np.log1p(1 / BEND)) * clear.told)
+            for guess, part in zip(clear.guesses, parts, strict=False)
         ]
         rough = replace(guesses[0].hypothesis, remains=KNOWN_SHAPE)
         guesses[0] = replace(guesses[0], hypothesis=rough)
-        return weigh(replace(ranked, guesses=tuple(guesses))).verdict
+        return weigh(replace(clear, guesses=tuple(guesses))).verdict
 
     assert verdict(0.15, 0.6) == "missing_effect"
     assert verdict(0.15, 0.18) == "unexplained"
