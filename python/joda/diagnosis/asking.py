@@ -87,6 +87,6 @@ def asked(measured: Measured, length: float | None = None) -> Asked:
     fits = [
         judge.fit(base.solo, base.unknowns, ones, start) for start in (windows.start, given.start)
     ]
-    fit = min(fits, key=lambda f: f.loss)
+    fit = judge.refit(base.solo, base.unknowns, min(fits, key=lambda f: f.loss))
     every = hypotheses(units_of(windows, measured), templates(), measured.profile)
     return Asked(judge, base, measured.single, fit, begins(judge, base, given, fit), tuple(every))

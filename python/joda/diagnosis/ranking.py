@@ -70,12 +70,12 @@ def rank(
     silent = RESTITUTION in exclude
     with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, heed, 2 * len(tried) + POLISHED)
-        ends = [guess for h in bouncy if (guess := begun.restitution(h))]
-        guesses = [guess for guess in ends if not silent]
-        guesses += _fitted(begun, tried, guesses, work)
+        guesses = _fitted(begun, tried, work)
         guesses += _beside(begun, tried, guesses, work)
         guesses += _polished(begun, guesses, work)
         begun = _unstuck(begun, guesses)
+        ends = [guess for h in bouncy if (guess := begun.restitution(h))]
+        guesses += [guess for guess in ends if not silent]
     there = [one for one in guesses if not one.vanished]
     return Ranking(begun, *_scored(begun.judge, there), bouncy=silent and bool(ends))
 
@@ -99,13 +99,11 @@ class _Work:
         return out
 
 
-def _fitted(
-    begun: Asked, tried: Sequence[Hypothesis], there: Sequence[Guess], work: _Work
-) -> list[Guess]:
+def _fitted(begun: Asked, tried: Sequence[Hypothesis], work: _Work) -> list[Guess]:
     """All hypotheses fitted; where one leaves only noise, those that are far off, roughly."""
     roughs = sorted(work.all(begun.rough, tried), key=lambda one: one.best.loss)
     guesses = work.all(begun.finished, roughs[:POLISHED])
-    least = min((one.fit.loss for one in (*there, *guesses)), default=0.0)
+    least = min((one.fit.loss for one in guesses), default=0.0)
     most = FAR * least if least < ENOUGH * begun.judge.samples else np.inf
     near = [one for one in roughs[POLISHED:] if one.best.loss < most]
     far = [one for one in roughs[POLISHED:] if one.best.loss >= most]
@@ -142,10 +140,9 @@ def _polished(begun: Asked, guesses: Sequence[Guess], work: _Work) -> list[Guess
 def _unstuck(begun: Asked, guesses: Sequence[Guess]) -> Asked:
     """The model as it is, fitted from where the best guess is too: it may do as well from there."""
     judge, base = begun.judge, begun.base
-    own = [one for one in guesses if one.hypothesis.effect != RESTITUTION]
-    if not own:
+    if not guesses:
         return begun
-    best = min(own, key=lambda one: one.fit.loss).fit
+    best = min(guesses, key=lambda one: one.fit.loss).fit
     fit = judge.fit(base.solo, base.unknowns, best.x[: len(base.places)], best.start)
     fit = judge.refit(base.solo, base.unknowns, fit)
     return replace(begun, fit=min(begun.fit, fit, key=lambda one: one.loss))
