@@ -1,4 +1,4 @@
-"""Where no effect explains what is missing, perhaps two do: which of them is the first?"""
+"""Where no effect explains what is missing, perhaps two do: which of them?"""
 
 from collections.abc import Callable
 
@@ -15,25 +15,30 @@ AHEAD = 4
 """Of how many effects it is seen what a second one adds."""
 
 
-def first_of_two(
+def pairs(
     measured: Measured, ranking: Ranking, told: Callable[[str], None]
-) -> tuple[Finding, ...]:
-    """The likeliest effects; first the one beside which another one explains most.
+) -> tuple[tuple[Finding, ...], ...]:
+    """The likeliest effects, each with what is missing beside it; the best pair first.
 
-    The one that explains most by itself often stands in for both.
+    The effect that explains most by itself often stands in for two.
 
     Args:
         measured: the joint and its runs.
         ranking: of what may be missing.
         told: what is being done.
     """
-    losses = []
-    for guess in ranking.guesses[:AHEAD]:
+    tried = []
+    for first, guess in zip(_found(measured, ranking, AHEAD), ranking.guesses, strict=False):
         told(f"what is missing beside {guess.hypothesis.effect}")
         beside = measured.changed(checked(guess.written(ranking.asked.base)))
-        both = rank(asked(beside)).guesses
-        second = min((one.fit.loss + one.cost for one in both), default=guess.fit.loss)
-        losses.append(second + guess.cost)
-    order = sorted(range(len(losses)), key=losses.__getitem__)
+        rest = rank(asked(beside), roughly=True)
+        loss = min((one.fit.loss + one.cost for one in rest.guesses), default=guess.fit.loss)
+        tried.append((loss + guess.cost, (first, *_found(beside, rest, 1))))
+    return tuple(pair for _, pair in sorted(tried, key=lambda one: one[0]))
+
+
+def _found(measured: Measured, ranking: Ranking, most: int) -> list[Finding]:
+    """The likeliest guesses of a ranking, told."""
     weighed, held = weigh(ranking), Holdout(ranking.asked)
-    return tuple(finding(measured, ranking, held, k, weighed) for k in order)
+    likeliest = range(len(ranking.guesses[:most]))
+    return [finding(measured, ranking, held, k, weighed) for k in likeliest]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from joda.diagnosis.ahead import first_of_two
+from joda.diagnosis.ahead import pairs
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.mending import Error, error, mend, parted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
@@ -68,34 +68,35 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
             told("diagnose")
             asked = diagnosed(_with(parts, steps[-1].profile)[0])
             steps[-1] = replace(steps[-1], diagnosis=asked.diagnosis)
-            if (step := _next(parts, steps[-1], asked, told)) is None:
+            if not (more := _next(parts, steps[-1], asked, told)):
                 known = asked.diagnosis.verdict == "missing_effect"
                 why = NOTHING_HELPS if known else asked.diagnosis.summary
                 break
-            steps.append(step)
+            steps += more
             steps = _named_anew(parts, steps, told)
     except KeyboardInterrupt:
         why = "Interrupted; what was found until then is kept."
     return tuple(steps), why
 
 
-def _next(parts: Parts, last: Step, asked: Diagnosed, told: Told) -> Step | None:
-    """The first effect of the diagnosis that clearly lowers the error held out; None if none does.
+def _next(parts: Parts, last: Step, asked: Diagnosed, told: Told) -> list[Step]:
+    """The first effect of the diagnosis that clearly lowers the error held out; none if none does.
 
     Where no effect explains at once what the model as it was lacks, perhaps two do: then the first
-    one of two is looked for.
+    one of the best pair, and with it the second if that lowers the error further.
     """
-    known, found = asked.diagnosis.verdict == "missing_effect", asked.diagnosis.effects
+    known = asked.diagnosis.verdict == "missing_effect"
+    found: Sequence[Sequence[Finding]] = [[one] for one in asked.diagnosis.effects]
     if asked.puzzling and not last.added:
         train = parts[0].changed(last.profile)
-        known, found = False, first_of_two(train, asked.puzzling, told)
-    for number, finding in enumerate(found[:TRIED]):
-        if known and number and finding.probability < LIKELY:
-            return None
+        known, found = False, pairs(train, asked.puzzling, told)
+    for number, (first, *second) in enumerate(found[:TRIED]):
+        if known and number and first.probability < LIKELY:
+            return []
         most = WORTH if known or not number else MUCH
-        if step := _added(parts, last.profile, finding, most, told):
-            return step
-    return None
+        if step := _added(parts, last.profile, first, most, told):
+            return _stairs(parts, step, second, told) or [step]
+    return []
 
 
 def _added(
@@ -113,10 +114,11 @@ def _added(
 def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
     """The stairs, with another effect in the place of one that stood in for it.
 
-    Each but the last was named while the others were missing. Beside them it is asked for again.
+    Each was named while others were missing, or not yet fitted beside it. Beside them as they are
+    now it is asked for again.
     """
     begin, *added = steps
-    for k, step in enumerate(added[:-1]):
+    for k, step in enumerate(added if len(added) > 1 else ()):
         told(f"asking again what {step.effect} is")
         others = [one.added for one in added if one is not step]
         without = _without(added[-1].profile, step.effect or "", begin.profile)

@@ -31,6 +31,8 @@ SETTLED = 0.5
 """Decrease of the loss below which there is no more to gain."""
 NUDGE = 0.01
 """Of a start's doubt: its step for differences."""
+ROWS = ((0, 1), (0, 1))
+"""Axes of windows and samples, over which products are summed."""
 
 
 @dataclass(frozen=True)
@@ -119,15 +121,13 @@ class Linear:
             a, b: shapes (m, n, p) and (m, n, q).
             za: a's part on the starts' own rows, shape (m, 2, p); None: zero.
         """
-        Sa = np.einsum("mni,mnp->mip", self.S, a)
+        across = self.S.transpose(0, 2, 1)
+        Sa, Sb = across @ a, across @ b
         if za is not None:
             Sa = Sa + za
-        Sb = np.einsum("mni,mnq->miq", self.S, b)
-        w = self.weight
-        out = np.einsum("m,mnp,mnq->pq", w, a, b, optimize=True)
-        return np.asarray(
-            out - np.einsum("m,mip,mij,mjq->pq", w, Sa, self.inverse, Sb, optimize=True)
-        )
+        w = self.weight[:, None, None]
+        own, taken = np.tensordot(w * a, b, ROWS), np.tensordot(w * Sa, self.inverse @ Sb, ROWS)
+        return np.asarray(own - taken)
 
     def normal(self) -> tuple[Array, Array]:
         """The normal equations of the numbers: matrix and gradient."""

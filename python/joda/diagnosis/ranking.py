@@ -57,6 +57,7 @@ def rank(
     begun: Asked,
     exclude: Collection[str] = (),
     heed: Told = lambda done, total, what: None,
+    roughly: bool = False,
 ) -> Ranking:
     """Fits every hypothesis to measured runs.
 
@@ -64,15 +65,17 @@ def rank(
         begun: the model and its runs.
         exclude: effects that are not tried.
         heed: told how many hypotheses are done, of how many, and the last one's name.
+        roughly: whether only the most promising ones are fitted to the end.
     """
     tried = [h for h in begun.hypotheses if h.effect not in {*exclude, RESTITUTION}]
     bouncy = [h for h in begun.hypotheses if h.effect == RESTITUTION]
     silent = RESTITUTION in exclude
     with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, heed, 2 * len(tried) + POLISHED)
-        guesses = _fitted(begun, tried, work)
-        guesses += _beside(begun, tried, guesses, work)
-        guesses += _polished(begun, guesses, work)
+        guesses = _fitted(begun, tried, work, roughly)
+        if not roughly:
+            guesses += _beside(begun, tried, guesses, work)
+            guesses += _polished(begun, guesses, work)
         begun = _unstuck(begun, guesses)
         ends = [guess for h in bouncy if (guess := begun.restitution(h))]
         guesses += [guess for guess in ends if not silent]
@@ -99,12 +102,13 @@ class _Work:
         return out
 
 
-def _fitted(begun: Asked, tried: Sequence[Hypothesis], work: _Work) -> list[Guess]:
+def _fitted(begun: Asked, tried: Sequence[Hypothesis], work: _Work, roughly: bool) -> list[Guess]:
     """All hypotheses fitted; where one leaves only noise, those that are far off, roughly."""
     roughs = sorted(work.all(begun.rough, tried), key=lambda one: one.best.loss)
     guesses = work.all(begun.finished, roughs[:POLISHED])
     least = min((one.fit.loss for one in guesses), default=0.0)
     most = FAR * least if least < ENOUGH * begun.judge.samples else np.inf
+    most = 0.0 if roughly else most
     near = [one for one in roughs[POLISHED:] if one.best.loss < most]
     far = [one for one in roughs[POLISHED:] if one.best.loss >= most]
     return guesses + work.all(begun.finished, near) + work.all(begun.taken, far)
