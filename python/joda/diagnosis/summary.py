@@ -40,14 +40,15 @@ def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool) ->
                 "The ends of the range throw the joint back more than the model's: not explained."
             )
         share = 100 * min(weighed.share, 1.0)
+        part = f"{share:.0f} %" if share > 1 else "less than 1 %"
         if share < MOST:
             return (
                 f"Missing is {either if one_way else name}, but not only that{same}; it leaves "
-                f"{share:.0f} % of the misfit, which no known effect explains."
+                f"{part} of the misfit, which no known effect explains."
             )
         return (
             f"Something is missing that no known effect explains: the best of them, {name}, leaves "
-            f"{share:.0f} % of the misfit."
+            f"{part} of the misfit."
         )
     if others:
         return f"Missing is {either}{same or ': these data cannot tell which'}."
