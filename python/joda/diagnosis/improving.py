@@ -128,8 +128,8 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
         ]:
             continue
         instead = found.effects[0]
-        for order in ([*others[:k], instead, *others[k:]], [*others, instead]):
-            stairs = _stairs(parts, begin, order, told)
+        for place in sorted({k, len(others)}):  # where it was, and last
+            stairs = _stairs(parts, begin, [*others[:place], instead, *others[place:]], told)
             if stairs and stairs[-1].error.window < AS_GOOD * added[-1].error.window:
                 return stairs
     return steps

@@ -106,9 +106,10 @@ def _fitted(begun: Asked, tried: Sequence[Hypothesis], work: _Work, roughly: boo
     """All hypotheses fitted; where one leaves only noise, those that are far off, roughly."""
     roughs = sorted(work.all(begun.rough, tried), key=lambda one: one.best.loss)
     guesses = work.all(begun.finished, roughs[:POLISHED])
+    if roughly:
+        return guesses + work.all(begun.taken, roughs[POLISHED:])
     least = min((one.fit.loss for one in guesses), default=0.0)
     most = FAR * least if least < ENOUGH * begun.judge.samples else np.inf
-    most = 0.0 if roughly else most
     near = [one for one in roughs[POLISHED:] if one.best.loss < most]
     far = [one for one in roughs[POLISHED:] if one.best.loss >= most]
     return guesses + work.all(begun.finished, near) + work.all(begun.taken, far)
