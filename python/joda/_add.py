@@ -5,8 +5,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from joda._diagnose import check_effect
 from joda.diagnosis.findings import read_diagnosis
 from joda.diagnosis.mending import Error, mend, parted
@@ -14,15 +12,15 @@ from joda.diagnosis.outcome import (
     beside,
     held_out,
     mended_picture,
+    nearby,
     parting,
-    read_timed,
+    read_runs,
     scene_files,
     told_errors,
 )
 from joda.diagnosis.phrases import named
 from joda.errors import JodaError
 from joda.files import write_together
-from joda.measured.comparison import rms
 from joda.pictures.changes import changes
 from joda.pictures.style import png
 
@@ -35,9 +33,9 @@ class Added:
         scene, composed, picture: the files that were written.
         effect: its name.
         added: whether the scene has it; it has not where no variant lowers the error.
-        before, after: errors on what was held out of the fit, rad or m.
-        noise_floor: of the positions there, rad or m.
-        unit: of positions.
+        before, after: errors on what was held out of the fit.
+        noise_floor: of what was measured there.
+        unit: of the errors and the noise: rad or m; N·m or N where there are only curves.
         held_out: what was held out, in words.
         changes: a line per changed component.
         notes: what the user should be told, a sentence each.
@@ -75,14 +73,15 @@ def add(
 ) -> Added:
     """Adds an effect to a joint's profile and fits everything together.
 
-    Of four or more runs every fourth is held out of the fit, of fewer the last quarter of each.
+    Of four or more runs every fourth is held out of the fit, of fewer the last quarter of each; of
+    fewer quasi-static curves, where there are no runs, every fourth stretch of each.
     The effect is added only if that lowers the error there.
 
     Args:
         model: MJCF or URDF, with or without a profile on the joint.
         joint: its name or address, see `joda.scenes.model.find_joint`.
         diagnosis: what `joda.diagnose` wrote as JSON.
-        runs: CSV files with time, position and perhaps force.
+        runs: CSV files with time, position and perhaps force, or quasi-static curves.
         output: scene to write; beside it, with its name, go .composed.json and .png.
         effect: which one; None: the diagnosis' first.
         force: overwrite what exists.
@@ -99,7 +98,7 @@ def add(
     composed, picture = beside(target, force)
     told = read_diagnosis(Path(diagnosis))
     name, direction, near = _chosen(told, Path(diagnosis), effect)
-    measured = read_timed(model, joint, runs)
+    measured = read_runs(model, joint, runs)
     own = measured.profile.joint
     if told.get("joint", own.name) != own.name:
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
@@ -116,8 +115,8 @@ def add(
         added=mended.effect is not None,
         before=mended.before,
         after=mended.after,
-        noise_floor=rms(np.array(held.sigma)),
-        unit=own.unit,
+        noise_floor=held.floor,
+        unit=held.unit,
         held_out=held_out(measured, held),
         changes=tuple(changes(measured.profile, mended.profile)),
         notes=(*measured.notes, *notes),
@@ -133,7 +132,7 @@ def sentences(added: Added) -> list[str]:
     else:
         out = [
             f"Not added: {what}, as it does not lower the error on what was held out of the fit "
-            f"({added.held_out}): {added.before.window:.3g} {added.unit} in windows of 0.4 s, "
+            f"({added.held_out}): {nearby(added.before)} {added.before.window:.3g} {added.unit}, "
             f"noise {added.noise_floor:.2g} {added.unit}. The scene behaves as before."
         ]
     told = parting(added.after, added.noise_floor) if added.added else []

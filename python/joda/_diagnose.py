@@ -10,7 +10,7 @@ from joda.diagnosis.phrases import NAMES, named
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
 from joda.files import check_target, write_together
-from joda.measured.maps import SHOWN, draw_curves, draw_maps, draw_runs, replayed
+from joda.measured.maps import draw_maps, draw_models, draw_runs, replayed
 from joda.measured.reading import Measured
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
@@ -128,10 +128,7 @@ def _picture(measured: Measured, profile: Profile | None, diagnosis: Diagnosis) 
         figure = Figure(figsize=(12, 7), dpi=110, layout="constrained")
         if not measured.runs:
             shown = {"model": measured.profile} | ({"with the effect": profile} if profile else {})
-            parts = figure.subfigures(len(shown), 1, squeeze=False)[:, 0]
-            for part, (label, own) in zip(parts, shown.items(), strict=True):
-                draw_curves(part, measured.changed(own), measured.curves[:SHOWN])
-                part.suptitle(label, x=0.01, ha="left", fontsize=10)
+            draw_models(figure, measured, shown)
             return figure
         models = [replayed("model", measured)]
         if profile is not None:

@@ -9,11 +9,10 @@ import numpy as np
 
 from joda.diagnosis.improving import Step, improved
 from joda.diagnosis.mending import parted
-from joda.diagnosis.outcome import beside, draw_mended, held_out, read_timed, scene_files
+from joda.diagnosis.outcome import beside, draw_mended, held_out, nearby, read_runs, scene_files
 from joda.diagnosis.phrases import named
 from joda.files import check_target, write_together
-from joda.measured.comparison import rms
-from joda.measured.maps import draw_maps, replayed
+from joda.measured.maps import draw_maps, draw_models, replayed
 from joda.measured.reading import Measured
 from joda.pictures.changes import changes
 from joda.pictures.page import page, paragraph, table
@@ -33,8 +32,8 @@ class Improved:
         joint: its name.
         steps: the model as it was, then with one effect more each.
         why: it ended, a sentence.
-        noise_floor: of the positions held out, rad or m.
-        unit: of positions.
+        noise_floor: of what was held out.
+        unit: of the errors and the noise: rad or m; N·m or N where there are only curves.
         held_out: what was held out of all fits, in words.
         changes: a line per changed component, of the last profile against the first.
         notes: what the user should be told, a sentence each.
@@ -69,7 +68,8 @@ def improve(
         model: MJCF or URDF, with or without a profile on the joint.
         joint: its name or address, see `joda.scenes.model.find_joint`.
         runs: CSV files with time, position and perhaps force. Of four or more every fourth is
-            held out of all fits, of fewer the last quarter of each.
+            held out of all fits, of fewer the last quarter of each. Or quasi-static curves: of
+            fewer than four every fourth stretch of each is held out.
         output: scene to write; beside it, with its name, go .composed.json and .png.
         report: an HTML page to write that needs nothing else.
         force: overwrite what exists.
@@ -85,7 +85,7 @@ def improve(
     composed, picture = beside(target, force)
     if report:
         check_target(Path(report), force)
-    measured = read_timed(model, joint, runs)
+    measured = read_runs(model, joint, runs)
     steps, why = improved(measured, progress)
     progress("drawing")
     last, (_, held) = steps[-1].profile, parted(measured)
@@ -97,8 +97,8 @@ def improve(
         joint=last.joint.name,
         steps=steps,
         why=why,
-        noise_floor=rms(np.array(held.sigma)),
-        unit=last.joint.unit,
+        noise_floor=held.floor,
+        unit=held.unit,
         held_out=held_out(measured, held),
         changes=tuple(changes(measured.profile, last)),
         notes=(*measured.notes, *notes),
@@ -142,13 +142,23 @@ def _ending(result: Improved) -> list[str]:
     ]
 
 
-def _rows(result: Improved) -> list[tuple[str, str, str]]:
-    """Effect, error in windows, error of whole runs; the head first."""
-    rows = [("model", "windows of 0.4 s", "whole runs")]
-    for step in result.steps:
-        window, whole = (f"{x:.3g} {result.unit}" for x in (step.error.window, step.error.whole))
-        rows.append((_step(step), window, whole))
-    return rows
+def _rows(result: Improved) -> list[tuple[str, ...]]:
+    """Effect and errors, the head first."""
+    stairs = _errors(result)
+    rows = [
+        tuple(f"{value:.3g} {result.unit}" for value in values)
+        for values in zip(*stairs.values(), strict=True)
+    ]
+    names = map(_step, result.steps)
+    return [("model", *stairs), *((name, *row) for name, row in zip(names, rows, strict=True))]
+
+
+def _errors(result: Improved) -> dict[str, list[float]]:
+    """The errors of all steps by what they are of."""
+    errors = [step.error for step in result.steps]
+    out = {nearby(errors[0]): [error.window for error in errors]}
+    whole = [error.whole for error in errors if error.whole is not None]
+    return out | ({"whole runs": whole} if whole else {})
 
 
 def _step(step: Step) -> str:
@@ -165,13 +175,14 @@ def _page(result: Improved, drawn: bytes) -> str:
     count = len(rows) - 1
     first, last = result.steps[0].error.window, result.steps[-1].error.window
     added = ", ".join(named(step.effect) for step in result.steps if step.effect)
+    what = nearby(result.steps[0].error)
+    noise = f"the measurement's noise is {result.noise_floor:.2g} {result.unit}."
     story = (
-        f"{count} effect{'s' * (count > 1)} added: {added}. Windows of 0.4 s of what was held out "
-        f"of all fits ({result.held_out}) are missed by {last:.3g} instead of {first:.3g} "
-        f"{result.unit}; the measurement's noise is {result.noise_floor:.2g} {result.unit}."
+        f"{count} effect{'s' * (count > 1)} added: {added}. On what was held out of all fits "
+        f"({result.held_out}) the error, {what}, is {last:.3g} instead of {first:.3g} "
+        f"{result.unit}; {noise}"
         if count
-        else f"Windows of 0.4 s are missed by {first:.3g} {result.unit}; the "
-        f"measurement's noise is {result.noise_floor:.2g} {result.unit}."
+        else f"The error, {what}, is {first:.3g} {result.unit}; {noise}"
     )
     return page(
         f"{result.joint}: what the model lacked",
@@ -192,12 +203,14 @@ def _picture(result: Improved, measured: Measured, held: Measured) -> "Figure":
         above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=[6, 7])[:, 0]
         left, right = above.subfigures(1, 2, squeeze=False)[0]
         _stairs(left, result)
-        models = [replayed("before", measured)]
-        if len(result.steps) > 1:
-            models.append(replayed("after", measured.changed(last)))
-        draw_maps(right, models, last.joint)
-        what = "force too much: windows of 0.1 s, \u00b1 2 standard deviations"
-        right.suptitle(what, x=0.02, ha="left", fontsize=10)
+        models = {"before": measured.profile} | ({"after": last} if len(result.steps) > 1 else {})
+        if measured.runs:
+            maps = [replayed(label, measured.changed(own)) for label, own in models.items()]
+            draw_maps(right, maps, last.joint)
+            what = "force too much: windows of 0.1 s, \u00b1 2 standard deviations"
+            right.suptitle(what, x=0.02, ha="left", fontsize=10)
+        else:
+            draw_models(right, measured, models)
         draw_mended(below, held, last)
     return figure
 
@@ -206,11 +219,8 @@ def _stairs(part: "Figure | SubFigure", result: Improved) -> None:
     """The held-out error falling towards the noise."""
     axes = part.subplots()
     count = len(result.steps)
-    series = {
-        "windows of 0.4 s": ([step.error.window for step in result.steps], "conservative"),
-        "whole runs": ([step.error.whole for step in result.steps], "friction"),
-    }
-    for label, (values, colour) in series.items():
+    stairs = _errors(result).items()
+    for (label, values), colour in zip(stairs, ("conservative", "friction"), strict=False):
         axes.stairs(values, np.arange(count + 1) - 0.5, baseline=None, lw=2, color=COLOURS[colour])
         axes.plot(range(count), values, "o", color=COLOURS[colour], label=label)
         for k, value in enumerate(values):

@@ -142,11 +142,15 @@ def single_for(measured: Measured, h: float) -> Single:
     MuJoCo's own ends of a range yield by more than an encoder's noise to what presses on them. They
     are hard here, unless somebody chose others or the measured ones yield too.
     """
-    if not measured.runs:
-        return Still(**vars(measured.single))
-    if measured.single.solref != SOFT or _yields(measured):
-        return measured.single
-    return replace(measured.single, solref=(2 * h, 1.0))
+    single = as_it_is(measured)
+    if single.solref != SOFT or not measured.runs or _yields(measured):
+        return single
+    return replace(single, solref=(2 * h, 1.0))
+
+
+def as_it_is(measured: Measured) -> Single:
+    """The joint as its scene has it; where there are only curves it is not simulated."""
+    return measured.single if measured.runs else Still(**vars(measured.single))
 
 
 def _yields(measured: Measured) -> bool:

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import usable, windows_for
+from joda.measured.gauge import Gauged
 from joda.measured.reading import Measured
+from joda.measured.slow import one_way, ways
 
-ONE_WAY = 0.97
-"""Part of the way, in one direction, from which the joint counts as moved in that one only."""
 WINDOWS, MOVES = 4, 8.0
 """Fewest windows with motion that tell anything; and what is motion, in noises."""
 SAMPLES = 15
@@ -18,25 +18,15 @@ VISITED = 0.02
 
 def moved_one_way(measured: Measured) -> bool:
     """Whether the joint was moved in one direction only."""
-    forth = back = 0.0
-    for gauged in () if measured.runs else measured.curves:
-        forth += float(np.sum(gauged.direction > 0))
-        back += float(np.sum(gauged.direction < 0))
-    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        turns = _directed(run.position, 6 * sigma)
-        forth, back = forth + turns[0], back + turns[1]
-    return max(forth, back) > ONE_WAY * (forth + back)
+    if not measured.runs:
+        return one_way(np.sum([_samples(curve) for curve in measured.curves], axis=0))
+    pairs = zip(measured.runs, measured.sigma, strict=True)
+    return one_way(np.sum([ways(run.position, 6 * sigma) for run, sigma in pairs], axis=0))
 
 
-def _directed(position: NDArray[np.float64], noise: float) -> tuple[float, float]:
-    """Ways in positive and in negative direction; what is within the noise is no way."""
-    forth = back = 0.0
-    at = position[0]
-    for q in position[1:]:
-        if abs(q - at) > noise:
-            forth, back = forth + max(q - at, 0.0), back + max(at - q, 0.0)
-            at = q
-    return forth, back
+def _samples(curve: Gauged) -> NDArray[np.float64]:
+    """How many are in positive and in negative direction."""
+    return np.array([np.sum(curve.direction > 0), np.sum(curve.direction < 0)], float)
 
 
 def too_little(measured: Measured) -> str:

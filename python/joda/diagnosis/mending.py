@@ -7,13 +7,17 @@ number (`joda.diagnosis.reshaping`). What is written makes runs that no fit has 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.asking import asked
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS
 from joda.diagnosis.reshaping import Likelihood, checked, reshaped
+from joda.measured.comparison import rms
 from joda.measured.errors import errors
+from joda.measured.gauge import Gauged
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.profile import Profile
@@ -23,19 +27,21 @@ NEARLY = 0.95
 STRENGTHS = (1.0, 3.0, 10.0)
 """Of an effect whose place is known: the trials, in units of the usual one."""
 FEWEST = 4
-"""Runs from which every fourth is held out; of fewer, the last quarter of each."""
+"""Runs or curves from which every fourth is held out; of fewer, parts of each."""
+STRETCHES, SAMPLES = 40, 12
+"""In how many stretches a curve is cut at most for that, of how many samples at the least."""
 
 
 @dataclass(frozen=True)
 class Error:
-    """How far a model is off, rad or m.
+    """How far a model is off.
 
     Attributes:
-        whole: RMS of open-loop replays of whole runs.
-        window: RMS of windows of 0.4 s.
+        whole: RMS of open-loop replays of whole runs, rad or m; None where there are only curves.
+        window: RMS of windows of 0.4 s, rad or m; of curves the force's, N·m or N.
     """
 
-    whole: float
+    whole: float | None
     window: float
 
 
@@ -56,7 +62,13 @@ class Mended:
 
 
 def parted(measured: Measured) -> tuple[Measured, Measured]:
-    """The runs to fit, and those held out: every fourth, or of few runs each one's last quarter."""
+    """What to fit, and what is held out: every fourth run, or of few runs each one's last quarter.
+
+    Where there are only curves: every fourth, or of few curves every fourth stretch of each, as
+    what acts on a part of the range is at one place of a curve.
+    """
+    if not measured.runs:
+        return _parted_curves(measured)
     count = len(measured.runs)
     if count >= FEWEST:
         held = list(range(3, count, 4))
@@ -68,14 +80,33 @@ def parted(measured: Measured) -> tuple[Measured, Measured]:
     return measured.with_runs(first), measured.with_runs(last)
 
 
+def _parted_curves(measured: Measured) -> tuple[Measured, Measured]:
+    curves, ways = measured.curves, (False, True)
+    if len(curves) >= FEWEST:
+        parts = [[one for k, one in enumerate(curves) if (k % 4 == 3) == way] for way in ways]
+    else:
+        parts = [[one.part(_held(one) == way) for one in curves] for way in ways]
+    return measured.with_curves(parts[0]), measured.with_curves(parts[1])
+
+
+def _held(curve: Gauged) -> NDArray[np.bool_]:
+    """Which samples of a curve are held out, shape (n,)."""
+    n = len(curve.direction)
+    stretch = np.arange(n) * min(STRETCHES, max(n // SAMPLES, FEWEST)) // n
+    return np.asarray(stretch % 4 == 2)
+
+
 def _cut(run: Run, part: slice) -> Run:
     velocity = None if run.velocity is None else run.velocity[part]
     return Run(run.name, run.time[part], run.position[part], velocity, run.force[part], run.forced)
 
 
 def error(measured: Measured, profile: Profile | None = None) -> Error:
-    """How far the model, or another profile, is off in MuJoCo with the plugin."""
-    found = errors(measured if profile is None else measured.changed(profile))
+    """How far the model, or another profile, is off: of runs, in MuJoCo with the plugin."""
+    model = measured if profile is None else measured.changed(profile)
+    if not model.runs:
+        return Error(None, rms(np.concatenate([curve.excess for curve in model.curves])))
+    found = errors(model)
     return Error(found.whole, found.window)
 
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from joda._attach import attached
 from joda.diagnosis.mending import Error
-from joda.errors import JodaError
 from joda.files import check_target
-from joda.measured.maps import draw_runs
+from joda.measured.maps import draw_models, draw_runs
 from joda.measured.reading import Measured, read_measured
 from joda.pictures.changes import draw_channels
 from joda.pictures.style import house_style
@@ -39,14 +38,6 @@ def read_runs(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Meas
     return replace(measured, notes=measured.notes + ignored)
 
 
-def read_timed(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
-    """As `read_runs`; raises JodaError also if no run has times."""
-    measured = read_runs(model, joint, runs)
-    if not measured.runs:
-        raise JodaError(f"{runs[0]}: no column 'time'; at least one timed run is needed.")
-    return measured
-
-
 def beside(scene: Path, force: bool) -> tuple[Path, Path]:
     """The profile's and the picture's file beside a scene; raises JodaError if one exists."""
     composed, picture = scene.with_suffix(".composed.json"), scene.with_suffix(".png")
@@ -69,7 +60,7 @@ def scene_files(
 
 def parting(after: Error, noise: float) -> list[str]:
     """A sentence where whole runs part although windows do not."""
-    if after.whole < PARTED * max(after.window, noise):
+    if after.whole is None or after.whole < PARTED * max(after.window, noise):
         return []
     return [
         "Whole runs still part from the measured ones although windows of 0.4 s hardly do: near a "
@@ -78,14 +69,27 @@ def parting(after: Error, noise: float) -> list[str]:
 
 
 def held_out(measured: Measured, held: Measured) -> str:
-    """Which runs were held out, in words."""
+    """What was held out, in words."""
+    if len(held.curves) < len(measured.curves):
+        return ", ".join(one.curve.name for one in held.curves)
+    if not measured.runs:
+        return "every fourth stretch of " + ("each" if len(held.curves) > 1 else "the curve")
     if len(held.runs) < len(measured.runs):
         return ", ".join(run.name for run in held.runs)
     return "the last quarter of each run" if len(held.runs) > 1 else "the run's last quarter"
 
 
+def nearby(error: Error) -> str:
+    """What the error that every effect must lower is of."""
+    return "force" if error.whole is None else "windows of 0.4 s"
+
+
 def told_errors(before: Error, after: Error, noise: float, unit: str) -> str:
-    """Errors before and after for a person; rad or m."""
+    """Errors before and after for a person."""
+    if before.whole is None:
+        return (
+            f"force {before.window:.3g} → {after.window:.3g} {unit} RMS (noise {noise:.2g} {unit})"
+        )
     return (
         f"whole runs {before.whole:.3g} → {after.whole:.3g} {unit} RMS, windows of 0.4 s "
         f"{before.window:.3g} → {after.window:.3g} {unit} (noise {noise:.2g} {unit})"
@@ -93,11 +97,11 @@ def told_errors(before: Error, after: Error, noise: float, unit: str) -> str:
 
 
 def draw_mended(part: "Figure | SubFigure", held: Measured, after: Profile) -> None:
-    """The profile before and after, and the runs held out with both replays.
+    """The profile before and after, and what was held out with both models.
 
     Args:
         part: of a figure.
-        held: the joint with its profile before, and runs.
+        held: the joint with its profile before, and runs or curves.
         after: its profile afterwards.
     """
     joint, found = after.joint, held.context
@@ -113,8 +117,12 @@ def draw_mended(part: "Figure | SubFigure", held: Measured, after: Profile) -> N
     effects = "".join(f"\n+ {effect.described()}" for effect in after.effects)
     title = f"{joint.name}: profile{effects}"
     left.suptitle(title, x=0.02, ha="left", fontsize=10, parse_math=False)
-    models = {"before": held.paths(), "after": held.changed(after).paths()}
-    draw_runs(right, held.runs, models, joint.unit)
+    if not held.runs:
+        models = {"before, held out of the fit": held.profile, "after": after}
+        draw_models(right, held, models)
+        return
+    paths = {"before": held.paths(), "after": held.changed(after).paths()}
+    draw_runs(right, held.runs, paths, joint.unit)
     right.suptitle("runs held out of the fit", x=0.02, ha="left", fontsize=10)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from joda._core import Solo
 from joda.component import Component
-from joda.diagnosis.baseline import LEAST, usable, windows_for
+from joda.diagnosis.baseline import LEAST, as_it_is, usable, windows_for
 from joda.diagnosis.guessing import usual
 from joda.diagnosis.hypotheses.effects import HEAVIEST
 from joda.diagnosis.judge import BEND, Judge, Unknowns
@@ -40,11 +40,11 @@ PRICE = 2.0
 
 
 class Likelihood:
-    """Of measured runs, as MuJoCo would move the joint at the scene's own step."""
+    """Of measured runs, as MuJoCo would move the joint at the scene's own step, or of curves."""
 
     def __init__(self, measured: Measured) -> None:
         """Cuts the runs into windows."""
-        self.single, self.windows = measured.single, windows_for(measured, WINDOW, fine=False)
+        self.single, self.windows = as_it_is(measured), windows_for(measured, WINDOW, fine=False)
         self.judge = Judge(self.windows, self.windows.count >= LEAST)
 
     def loss(self, profile: Profile) -> float:
@@ -86,6 +86,7 @@ def reshaped(
     """
     seen, unseen = Likelihood(train), Likelihood(held)
     usual_length = windows_for(train).length
+    longer = LONGER if train.runs else (1.0,)  # curves' windows are all alike
 
     def tried(profile: Profile) -> Tried:
         loss = unseen.loss(profile)
@@ -98,7 +99,7 @@ def reshaped(
         points = sum(len(part.x) for part in _parts(profile) if part.label == effect)
         if finer and not points:
             return
-        for length in (factor * usual_length for factor in LONGER):
+        for length in (factor * usual_length for factor in longer):
             told(f"all numbers, {points} control points of the effect, windows of {length:.2g} s")
             profile = refitted(train, profile, length, effect if finer else None)
             yield tried(profile)
@@ -160,7 +161,7 @@ def refitted(train: Measured, profile: Profile, length: float, free: str | None 
     unknowns = Unknowns(
         -unbounded, unbounded, np.full(n, NUDGE), mean, doubt, parameters.constraints
     )
-    single, h = train.single, windows.h
+    single, h = as_it_is(train), windows.h
 
     def make(theta: Array) -> Solo:
         return single.solo(parameters.written(theta, exact=True), h)

@@ -1,7 +1,7 @@
 """What a model lacks: the verdict on a ranking, with probabilities, sizes and sentences."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Diagnosed:
     Attributes:
         diagnosis: for the user.
         profile: with the likeliest effect; None if there is none.
-        puzzling: the first look's ranking, where no effect explained it; else None.
+        puzzling: the first look's ranking, where no effect explained the runs; else None.
     """
 
     diagnosis: Diagnosis
@@ -67,19 +67,17 @@ def diagnosed(
     one_way = moved_one_way(measured)
     strictness = LOOSELY if one_way else 1.0
     weighed = weigh(ranking, strictness)
-    puzzling = ranking if weighed.verdict == "unexplained" else None
-    if weighed.verdict == "unexplained" and measured.runs:  # what is weak shows in longer windows
-        length = min(LONGER * ranking.asked.judge.windows.length, LONGEST)
-        longer = rank(asked(measured, length), exclude, told)
-        again = weigh(longer, STRICTLY, wholly=True)
-        if again.verdict == "missing_effect" or again.share < weighed.share:
-            ranking, weighed = longer, again
+    puzzling = ranking if weighed.verdict == "unexplained" and measured.runs else None
+    if weighed.verdict == "unexplained":
+        again, anew = _looked_again(measured, ranking, strictness, exclude, told)
+        if anew.verdict == "missing_effect" or anew.share < weighed.share:
+            ranking, weighed = again, anew
     if weighed.verdict == "adequate" and (why := too_little(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if weighed.verdict == "adequate":
         summary = (
-            f"The model is adequate: nothing beyond the noise ({_floor(measured):.2g} "
-            f"{_unit(measured)}) that an effect would explain.{strengths_off(ranking)}"
+            f"The model is adequate: nothing beyond the noise ({measured.floor:.2g} "
+            f"{measured.unit}) that an effect would explain.{strengths_off(ranking)}"
         )
         return Diagnosed(_said(measured, "adequate", summary, (), None))
     held = Holdout(ranking.asked)
@@ -96,6 +94,27 @@ def diagnosed(
     summary = summarised(findings[0], weighed, one_way, ranking.bouncy)
     said = _said(measured, weighed.verdict, summary, findings, experiment)
     return Diagnosed(said, profile, puzzling)
+
+
+def _looked_again(
+    measured: Measured, first: Ranking, strictness: float, exclude: Collection[str], told: Told
+) -> tuple[Ranking, Weighed]:
+    """A second look: of runs at longer windows, where what is weak shows.
+
+    Of curves as if their noise were what the best effect usually leaves: a hand trembles, and
+    friction is uneven, by more than a gauge's noise. That stays unexplained, but it no longer
+    decides what is named.
+    """
+    judge = first.asked.judge
+    if measured.runs:
+        length = min(LONGER * judge.windows.length, LONGEST)
+        ranking = rank(asked(measured, length), exclude, told)
+        return ranking, weigh(ranking, STRICTLY, wholly=True)
+    left = first.guesses[0].fit.squares / np.maximum(judge.windows.count, 1)
+    factor = max(float(np.sqrt(np.median(left[judge.counts]))), 1.0)
+    rough = measured.with_curves([curve.noisier(factor) for curve in measured.curves])
+    ranking = rank(asked(rough), exclude, told)
+    return ranking, replace(weigh(ranking, strictness), verdict="unexplained")
 
 
 def _said(
@@ -116,23 +135,11 @@ def _said(
         verdict=verdict,
         summary=summary,
         effects=effects,
-        noise_floor=_floor(measured),
-        unit=_unit(measured),
+        noise_floor=measured.floor,
+        unit=measured.unit,
         next_experiment=experiment,
         notes=measured.notes,
     )
-
-
-def _floor(measured: Measured) -> float:
-    """Noise of the runs' positions, or of the curves' forces where there are no runs."""
-    noises = measured.sigma or tuple(gauged.sigma for gauged in measured.curves)
-    return float(np.sqrt(np.mean(np.square(noises))))
-
-
-def _unit(measured: Measured) -> str:
-    """Of what is missed: position, or force where there are only curves."""
-    joint = measured.profile.joint
-    return joint.unit if measured.runs else joint.force_unit
 
 
 def finding(
@@ -173,8 +180,8 @@ def finding(
             hypothesis.direction,
             interval,
             (magnitude, doubt, hypothesis.unit),
-            (before, after, _floor(measured)),
-            _unit(measured),
+            (before, after, measured.floor),
+            measured.unit,
             joint,
         ),
         held_out_error_before=before,
@@ -212,7 +219,7 @@ def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool)
         inertia=measured.single.inertia,
         speed=max(float(np.sqrt(np.mean(velocity**2))), least),
         h=ranking.asked.base.h,
-        sigma=_floor(measured),
+        sigma=measured.floor,
         forced=any(run.forced for run in measured.runs),
     )
     if one_way:

@@ -4,7 +4,7 @@ Nothing moves fast, so that neither inertia nor damping matters. What both direc
 in common is force by position (conservative, gravity); half of what they differ by is friction.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,7 @@ class Gauged:
     Attributes:
         curve: measured.
         direction: of travel, 1 or -1; 0 where it is not known.
+        blur: noise of the measured position, rad or m.
         force: the model's in that direction, N·m or N; NaN where the direction is not known.
         sigma: noise of the measured force, N·m or N.
         doubt: of the difference: that noise, and what the position's noise makes of the model's.
@@ -49,9 +50,35 @@ class Gauged:
 
     curve: QuasiStatic
     direction: Array
+    blur: float
     force: Array
     sigma: float
     doubt: Array
+
+    def against(self, profile: Profile, context: Context) -> "Gauged":
+        """The same curve beside another model's."""
+        position, known = self.curve.position, self.direction != 0
+        low, force, high = (
+            static_force(profile, context, position + off, self.direction)
+            for off in (-self.blur, 0.0, self.blur)
+        )
+        doubt = np.hypot(self.sigma, (high - low) / 2)
+        return replace(self, force=np.where(known, force, np.nan), doubt=doubt)
+
+    def noisier(self, factor: float) -> "Gauged":
+        """The same curve, of which less is known."""
+        return replace(self, sigma=factor * self.sigma, doubt=factor * self.doubt)
+
+    def part(self, samples: NDArray[np.bool_]) -> "Gauged":
+        """Some samples of the curve."""
+        position, force = self.curve.position[samples], self.curve.force[samples]
+        return replace(
+            self,
+            curve=QuasiStatic(self.curve.name, position, force),
+            direction=self.direction[samples],
+            force=self.force[samples],
+            doubt=self.doubt[samples],
+        )
 
     @property
     def excess(self) -> Array:
@@ -235,8 +262,6 @@ def gauged(curve: QuasiStatic, profile: Profile, context: Context) -> tuple[Gaug
         )
     noise = force_noise(position, curve.force, direction)
     sigma = max(noise, 1e-6 * float(np.abs(curve.force).max()))
-    low, force, high = (
-        static_force(profile, context, position + off, direction) for off in (-blur, 0.0, blur)
-    )
-    known = np.where(direction == 0, np.nan, force)
-    return Gauged(curve, direction, known, sigma, np.hypot(sigma, (high - low) / 2)), notes
+    empty = np.zeros(len(position))
+    alone = Gauged(curve, direction, blur, empty, sigma, empty)
+    return alone.against(profile, context), notes

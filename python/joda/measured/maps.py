@@ -12,7 +12,7 @@ from joda.measured.gauge import Gauged, static_force
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.pictures.style import COLOURS
-from joda.profile import Joint
+from joda.profile import Joint, Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -124,9 +124,18 @@ def draw_curves(part: "Figure | SubFigure", measured: Measured, curves: Sequence
         axes.set_visible(False)
     pairs = (zip(*axes.get_legend_handles_labels(), strict=True) for axes in plots)
     named = {label: handle for pair in pairs for handle, label in pair}
-    part.legend(
-        named.values(), named, loc="upper right", frameon=False, fontsize=8, ncols=len(named)
-    )
+    place: dict[str, Any] = {"loc": "outside lower right", "ncols": 2}
+    part.legend(named.values(), named, frameon=False, fontsize=8, **place)
+
+
+def draw_models(
+    part: "Figure | SubFigure", measured: Measured, models: Mapping[str, Profile]
+) -> None:
+    """Some of the curves beside each of several models, one model below the other."""
+    parts = part.subfigures(len(models), 1, squeeze=False)[:, 0]
+    for own, (label, profile) in zip(parts, models.items(), strict=True):
+        draw_curves(own, measured.changed(profile), measured.curves[:SHOWN])
+        own.suptitle(label, x=0.01, ha="left", fontsize=10)
 
 
 def _curve(axes: "Axes", measured: Measured, curve: Gauged) -> None:
@@ -141,9 +150,11 @@ def _curve(axes: "Axes", measured: Measured, curve: Gauged) -> None:
     for way, name, towards in WAYS:
         there = curve.direction == way
         dots, line = (f"{what} towards {towards}" for what in ("measured", "model"))
-        axes.plot(s[there], curve.curve.force[there], ".", color=COLOURS[name], ms=size, label=dots)
+        colour = COLOURS[name]
+        if there.any():
+            axes.plot(s[there], curve.curve.force[there], ".", color=colour, ms=size, label=dots)
         force = static_force(measured.profile, measured.context, grid, way)
-        axes.plot(np.linspace(0, 1, 501), force, color=COLOURS[name], lw=1.6, label=line)
+        axes.plot(np.linspace(0, 1, 501), force, color=colour, lw=1.6, label=line)
     axes.axhline(0, color="#bbbbbb", lw=0.8, zorder=0)
     axes.set_title(curve.curve.name, loc="left", fontsize=9, parse_math=False)
     axes.set_xlim(-0.02, 1.02)

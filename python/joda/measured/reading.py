@@ -14,6 +14,7 @@ from joda.measured import smoothing
 from joda.measured.gauge import Gauged, gauged
 from joda.measured.replay import Replayer
 from joda.measured.runs import QuasiStatic, Run, read_measurement
+from joda.measured.slow import as_curve
 from joda.measured.suspicions import suspicions
 from joda.profile import Profile
 from joda.scenes.model import describe_joint, find_joint, joint_name, load
@@ -68,7 +69,22 @@ class Measured:
             else Replayer(self.context, new, self.single, self.timestep),
             runs=tuple(self.runs[k] for k in numbers),
             sigma=tuple(self.sigma[k] for k in numbers),
+            curves=self.curves
+            if profile is None
+            else tuple(curve.against(new, self.context) for curve in self.curves),
         )
+
+    @property
+    def floor(self) -> float:
+        """Noise of the runs' positions, rad or m; of the curves' forces where there are no runs."""
+        noises = self.sigma or tuple(curve.sigma for curve in self.curves)
+        return float(np.sqrt(np.mean(np.square(noises))))
+
+    @property
+    def unit(self) -> str:
+        """Of what a model misses: position, or force where there are only curves."""
+        joint = self.profile.joint
+        return joint.unit if self.runs else joint.force_unit
 
     def paths(self) -> list[Array]:
         """Predicted positions of all runs, rad or m; NaN from where the force is not known."""
@@ -78,6 +94,10 @@ class Measured:
     def with_runs(self, runs: tuple[Run, ...]) -> "Measured":
         """The same joint with parts of its runs, one of each."""
         return replace(self, runs=runs)
+
+    def with_curves(self, curves: Sequence[Gauged]) -> "Measured":
+        """The same joint with some of its curves, or with parts of them."""
+        return replace(self, curves=tuple(curves))
 
 
 def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
@@ -97,17 +117,24 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
         if doubt.fatal:
             raise JodaError(doubt.sentence)
     notes = [doubt.sentence for doubt in doubts]
-    curves = []
-    for curve in read:
-        if isinstance(curve, QuasiStatic):
-            beside, more = gauged(curve, profile, found)
-            curves.append(beside)
-            notes += more
     timed = tuple(run for run in read if isinstance(run, Run))
     noises = [smoothing.noise(run.time, run.position) for run in timed]
     usual = float(np.median(noises)) if noises else 0.0
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
+    sigma = tuple(max(noise, least) for noise in noises)
     own, step = single(found, profile, compiled, number), float(compiled.opt.timestep)
+    static = [curve for curve in read if isinstance(curve, QuasiStatic)]
+    if len(timed) == 1 and (slow := as_curve(timed[0], sigma[0], profile, own.inertia)):
+        timed, sigma, static = (), (), [*static, slow]
+        notes.append(
+            f"{slow.name}: taken as a quasi-static curve, as it goes one way only and so slowly "
+            "that inertia and the model's damping take little of the force."
+        )
+    curves = []
+    for curve in static:
+        beside, more = gauged(curve, profile, found)
+        curves.append(beside)
+        notes += more
     return Measured(
         context=found,
         profile=profile,
@@ -115,7 +142,7 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
         timestep=step,
         replayer=Replayer(found, profile, own, step),
         runs=timed,
-        sigma=tuple(max(noise, least) for noise in noises),
+        sigma=sigma,
         curves=tuple(curves),
         notes=tuple(notes),
     )
