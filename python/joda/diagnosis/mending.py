@@ -28,7 +28,7 @@ STRENGTHS = (1.0, 3.0, 10.0)
 """Of an effect whose place is known: the trials, in units of the usual one."""
 FEWEST = 4
 """Runs or curves from which every fourth is held out; of fewer, parts of each."""
-STRETCHES, SAMPLES = 40, 12
+STRETCHES, SAMPLES = 40, 4
 """In how many stretches a curve is cut at most for that, of how many samples at the least."""
 
 
