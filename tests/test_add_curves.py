@@ -101,3 +101,18 @@ def test_the_error_of_another_profile_is_its_own(tmp_path):
     force = measured.curves[0].curve.force
     assert error(measured, bare).window == pytest.approx(np.sqrt(np.mean(force**2)), rel=0.02)
     assert error(measured).window != pytest.approx(error(measured, bare).window, rel=0.02)
+
+
+def test_to_few_samples_nothing_is_added(tmp_path):
+    gauged(tmp_path, LAWS["spring_return_to_low_end"], noise=NOISE)
+    model, curve, said = (tmp_path / name for name in ("model.xml", "curve.csv", "said.json"))
+    rows = curve.read_text().splitlines()
+    curve.write_text("\n".join(rows[:1] + rows[1:150:25]) + "\n")
+    found = diagnose(model, "door", [curve], json=said)
+    assert found.verdict == "insufficient_data"
+    assert found.next_experiment == (
+        "Measure more: at some 20 places of the whole range or more, in both directions."
+    )
+    effect = "spring_return_to_low_end"
+    assert not add(model, "door", said, [curve], tmp_path / "new.xml", effect=effect).added
+    assert len(improve(model, "door", [curve], tmp_path / "newer.xml").steps) == 1

@@ -8,7 +8,10 @@ import typer
 Force = Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 Model = Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)]
-Runs = Annotated[list[Path], typer.Argument(help="Measured runs (CSV: time, position, force).")]
+Runs = Annotated[
+    list[Path],
+    typer.Argument(help="Measured runs (CSV: time, position, force) or curves (position, force)."),
+]
 Joint = Annotated[
     str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
 ]

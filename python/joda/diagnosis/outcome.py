@@ -73,7 +73,7 @@ def held_out(measured: Measured, held: Measured) -> str:
     if len(held.curves) < len(measured.curves):
         return ", ".join(one.curve.name for one in held.curves)
     if not measured.runs:
-        return "every fourth stretch of " + ("each" if len(held.curves) > 1 else "the curve")
+        return f"every fourth stretch of {'each' if len(held.curves) > 1 else 'the'} curve"
     if len(held.runs) < len(measured.runs):
         return ", ".join(run.name for run in held.runs)
     return "the last quarter of each run" if len(held.runs) > 1 else "the run's last quarter"

@@ -100,7 +100,8 @@ def reshaped(
         if finer and not points:
             return
         for length in (factor * usual_length for factor in longer):
-            told(f"all numbers, {points} control points of the effect, windows of {length:.2g} s")
+            pace = f", windows of {length:.2g} s" if train.runs else ""
+            told(f"all numbers, {points} control points of the effect{pace}")
             profile = refitted(train, profile, length, effect if finer else None)
             yield tried(profile)
 

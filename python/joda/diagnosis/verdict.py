@@ -29,6 +29,11 @@ STRICTLY, LOOSELY = 0.7, 3.0
 SURE = 0.9
 """Probability from which no further experiment is proposed."""
 TOO_SHORT = "The measurements are too short to tell anything."
+RECORD_MORE = (
+    "Record more: move the joint through its whole range in both directions, slowly and fast, with "
+    "the force if it can be measured, for some 20 s in all."
+)
+GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in both directions."
 GAUGE_BACK = "Measure the way back too, as slowly."
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, besides the first those of at least some probability."""
@@ -126,10 +131,7 @@ def _said(
 ) -> Diagnosis:
     joint = measured.profile.joint
     if verdict == "insufficient_data":
-        experiment = (
-            "Record more: move the joint through its whole range in both directions, slowly and "
-            "fast, with the force if it can be measured, for some 20 s in all."
-        )
+        experiment = RECORD_MORE if measured.runs else GAUGE_MORE
     return Diagnosis(
         joint=joint.name,
         verdict=verdict,
