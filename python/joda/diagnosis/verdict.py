@@ -68,6 +68,8 @@ def diagnosed(
     """
     if not usable(windows_for(measured)).any():
         return Diagnosed(_said(measured, "insufficient_data", TOO_SHORT, (), None))
+    if not measured.runs and (why := too_little(measured)):  # nor is their noise known
+        return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     ranking = rank(asked(measured), exclude, told)
     one_way = moved_one_way(measured)
     strictness = LOOSELY if one_way else 1.0
