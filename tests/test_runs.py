@@ -117,3 +117,10 @@ def test_a_file_that_is_neither_is_refused_with_its_place(text, said, tmp_path):
         measurement(tmp_path, text)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_column_that_is_not_there_is_named(tmp_path):
+    (tmp_path / "run.csv").write_text("position\n" + "0.1\n" * 5)
+    said = r"run\.csv: no column 'force'; it has position, and without time it is a quasi-static"
+    with pytest.raises(JodaError, match=said):
+        read_measurement(tmp_path / "run.csv")

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from gauging import SCENE, SPAN
+from gauging import FRICTION, SCENE, SPAN
 
+from joda import simulate
 from joda.measured.reading import read_measured
 from joda.measured.runs import Run, write_run
 
 HELD = 1.0
-"""Force that the pushing hand has to overcome, N·m."""
+"""Force that the pushing hand has to overcome, N·m; the model has 0.2."""
 
 
 def pushed(folder, name="run.csv", seconds=10.0, path=lambda u: u, forced=True, inertia=0.1):
@@ -71,3 +72,12 @@ def test_a_slow_push_stands_beside_a_curve(tmp_path):
     back.write_text("position,force\n" + "\n".join(f"{x},-1" for x in q) + "\n")
     measured = read(tmp_path, back, pushed(tmp_path))
     assert [one.curve.name for one in measured.curves] == ["back.csv", "run.csv"]
+
+
+def test_nor_a_run_that_the_model_follows(tmp_path):
+    """A slow push against the friction that the model has: 1 N·m, damping 0.1 N·m·s/rad."""
+    true = SCENE.replace(f'frictionloss="{FRICTION}"', f'frictionloss="{HELD}"')
+    (tmp_path / "true.xml").write_text(true)
+    done = simulate(tmp_path / "true.xml", "door", open=True, output=tmp_path / "run.csv")
+    assert read(tmp_path, done.csv, scene=true).runs
+    assert read(tmp_path, done.csv).curves

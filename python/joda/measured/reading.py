@@ -123,12 +123,16 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     sigma = tuple(max(noise, least) for noise in noises)
     own, step = single(found, profile, compiled, number), float(compiled.opt.timestep)
+    replayer = Replayer(found, profile, own, step)
     static = [curve for curve in read if isinstance(curve, QuasiStatic)]
-    if len(timed) == 1 and (slow := as_curve(timed[0], sigma[0], profile, own.inertia)):
+    if len(timed) == 1 and (
+        slow := as_curve(timed[0], sigma[0], profile, own.inertia, replayer.whole)
+    ):
         timed, sigma, static = (), (), [*static, slow]
         notes.append(
             f"{slow.name}: taken as a quasi-static curve, as it goes one way only and so slowly "
-            "that inertia and the model's damping take little of the force."
+            "that inertia and the model's damping take little of the force, and the model does not "
+            "follow."
         )
     curves = []
     for curve in static:
@@ -140,7 +144,7 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
         profile=profile,
         single=own,
         timestep=step,
-        replayer=Replayer(found, profile, own, step),
+        replayer=replayer,
         runs=timed,
         sigma=sigma,
         curves=tuple(curves),

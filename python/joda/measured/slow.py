@@ -2,8 +2,10 @@
 
 A push that goes one way, once and slowly, tells force over position and nothing else: what moves
 the joint is then a small difference of the pushing and the resisting force, and the least error of
-either would move a simulated joint elsewhere.
+either moves a simulated joint elsewhere.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ SLOW = 0.1
 """Part of the force that inertia and the model's damping may take."""
 TRAVEL = 0.1
 """Least part of the range that is visited."""
+ASTRAY = 0.1
+"""From which RMS error on, in units of the range, the simulated joint goes elsewhere."""
 PACE = 0.1
 """Time between velocities that tell the acceleration, s."""
 
@@ -46,14 +50,17 @@ def one_way(ways: Array) -> bool:
     return bool(ways.max() > ONE_WAY * ways.sum())
 
 
-def as_curve(run: Run, sigma: float, profile: Profile, inertia: float) -> QuasiStatic | None:
-    """A slow push one way as a quasi-static curve; None of any other run.
+def as_curve(
+    run: Run, sigma: float, profile: Profile, inertia: float, replay: Callable[[Run, float], Array]
+) -> QuasiStatic | None:
+    """A slow push one way that the model cannot follow as a quasi-static curve; else None.
 
     Args:
         run: measured.
         sigma: noise of its position, rad or m.
         profile: of the model.
         inertia: of the model, kg·m² or kg.
+        replay: the model's positions at the run's times, rad or m.
     """
     lo, hi = profile.joint.range
     force = float(np.sqrt(np.mean(run.force**2)))  # NaN where some is not known
@@ -66,5 +73,8 @@ def as_curve(run: Run, sigma: float, profile: Profile, inertia: float) -> QuasiS
     towards = float(np.sign(run.position[-1] - run.position[0]))
     dynamic = inertia * np.gradient(velocity, at), damping(profile, s, towards) * velocity
     if any(np.sqrt(np.mean(one**2)) > SLOW * force for one in dynamic):
+        return None
+    astray = replay(run, sigma) - run.position
+    if not np.sqrt(np.mean(astray**2)) > ASTRAY * (hi - lo):
         return None
     return QuasiStatic(run.name, run.position, run.force)
