@@ -50,6 +50,14 @@ def test_another_run_is_none(tmp_path, kind):
     assert not measured.curves
 
 
+@pytest.mark.parametrize(("seconds", "samples"), [(0.02, 20), (0.15, 20), (0.9, 200)])
+def test_nor_is_one_that_takes_a_moment(tmp_path, seconds, samples):
+    rows = np.linspace([0, 0.1, 1], [seconds, 1.4, 1], samples)
+    table = "\n".join(",".join(map(str, row)) for row in rows)
+    (tmp_path / "run.csv").write_text(f"time,position,force\n{table}\n")
+    assert len(read(tmp_path, tmp_path / "run.csv").runs) == 1
+
+
 def test_inertia_may_not_take_much_of_the_force(tmp_path):
     swing = {"path": lambda u: (1 - np.cos(np.pi * u)) / 2}
     assert read(tmp_path, pushed(tmp_path, seconds=5.0, **swing)).curves

@@ -25,8 +25,8 @@ TRAVEL = 0.1
 """Least part of the range that is visited."""
 ASTRAY = 0.1
 """From which RMS error on, in units of the range, the simulated joint goes elsewhere."""
-PACE = 0.1
-"""Time between velocities that tell the acceleration, s."""
+PACE, LEAST = 0.1, 10
+"""Time between velocities that tell the acceleration, s; fewest of them."""
 
 
 def ways(position: Array, noise: float) -> Array:
@@ -68,6 +68,8 @@ def as_curve(
     if not (force > 0 and travels and one_way(ways(run.position, 6 * sigma))):
         return None
     at = np.arange(run.time[0], run.time[-1], PACE)
+    if len(at) < LEAST:
+        return None
     velocity = smoothing.smooth(run.time, run.position, at, sigma).velocity
     s = (np.interp(at, run.time, run.position) - lo) / (hi - lo)
     towards = float(np.sign(run.position[-1] - run.position[0]))
