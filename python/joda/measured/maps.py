@@ -124,8 +124,9 @@ def draw_curves(part: "Figure | SubFigure", measured: Measured, curves: Sequence
         axes.set_visible(False)
     pairs = (zip(*axes.get_legend_handles_labels(), strict=True) for axes in plots)
     named = {label: handle for pair in pairs for handle, label in pair}
-    place: dict[str, Any] = {"loc": "outside lower right", "ncols": 2}
-    part.legend(named.values(), named, frameon=False, fontsize=8, **place)
+    part.legend(
+        named.values(), named, loc="outside lower right", frameon=False, fontsize=8, ncols=2
+    )
 
 
 def draw_models(
