@@ -5,7 +5,9 @@ python tests/hidden_bench.py                        every line, a table at the e
 python tests/hidden_bench.py forced --cases 50      one line
 python tests/hidden_bench.py forced --seed 7 --out forced.jsonl    goes on where it was stopped
 
-Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, all. Every
+Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
+all. `cover` tells whether the true size and place lie within what is said, of cases in which only
+the true effect is asked for; `sure` the same and how sure the answers are, of forced and free. Every
 run draws a new master seed, from which all cases follow.
 """
 
@@ -32,9 +34,10 @@ from joda.hidden import Case
 from joda.measured.reading import Measured
 
 CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
-CASES |= {"two": 10}
+CASES |= {"two": 10, "cover": 96}
 """Groups of cases, and how many there are unless told."""
-NEEDS = {"all": [group for group in CASES if group != "place"]}
+NEEDS = {"all": [group for group in CASES if group not in ("place", "cover")]}
+NEEDS |= {"sure": ["forced", "free"]}
 NEEDS |= {"confident": ["none", "forced", "free", "hard", "outside"]}
 NEEDS |= {"rose": ["add"], "time": ["add"]} | {group: [group] for group in CASES}
 """Groups of each line."""
@@ -65,7 +68,8 @@ def said(train: Measured, exclude: tuple[str, ...] = ()) -> dict:
     """The diagnosis, in short."""
     begun = time.perf_counter()
     diagnosis = diagnosed(train, exclude).diagnosis
-    keys = ("effect", "probability", "interval", "direction", "indistinguishable_from")
+    keys = ("effect", "probability", "interval", "interval_error", "direction", "magnitude")
+    keys += ("magnitude_error", "held_out_error_after", "indistinguishable_from")
     return {
         "seconds": time.perf_counter() - begun,
         "verdict": diagnosis.verdict,

@@ -79,6 +79,11 @@ def job_of(master: int, group: str, number: int) -> Job:
     if group == "outside":
         effect = turn(EFFECTS, number // 2)
         return replace(one, effect=effect, exclude=(effect,))
+    if group == "cover":
+        forced = number // len(EFFECTS) % 2 == 0
+        effect = turn(EFFECTS)
+        others = tuple(name for name in EFFECTS if name != effect)
+        return replace(one, effect=effect, exclude=others, forced=forced or effect in PUSHED)
     if group == "two":
         families = rng.choice(len(FAMILIES), 2, replace=False)
         effect, second = (str(rng.choice(FAMILIES[k])) for k in families)

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 from hidden_cases import CONTAINED, HARD
+from hidden_coverage import coverage, reliability
 
 SURE = 0.9
 BINS = (0.0, 0.5, 0.7, SURE, 1.0 + 1e-9)
@@ -146,6 +147,9 @@ def figures(rows: list[dict]) -> Iterator[Figure]:
         if changes:
             count = sum(x > 1 for x in changes)
             yield what, "0", f"{count}; at most {max(changes):.3g} times", len(changes)
+    told_of = [row for row in of("cover", "forced", "add", "free") if right(row)]
+    yield from coverage(told_of)
+    yield from reliability([row for row in of("forced", "add", "free") if row.get("named")])
     yield from share("two: both found", "≥ 60 %", of("two"), found)
     floors = [row["floor"] / row["noise"] for row in of("none", "add", "two") if "floor" in row]
     yield from middle("floor: the true model's error, of the noise", "", floors)

@@ -13,7 +13,7 @@ from hidden_model import true_profile
 
 from joda.diagnosis.mending import error, mend, parted
 from joda.hidden import EFFECTS, draw
-from joda.measured.comparison import rms
+from joda.measured.misfit import rms
 
 RELIABLE = (
     "constant_friction_hinge",

@@ -72,7 +72,8 @@ def finding(effect):
 
 def said(verdict, *effects):
     told = SimpleNamespace(verdict=verdict, effects=[*map(finding, effects)], summary="The end.")
-    return SimpleNamespace(diagnosis=told, puzzling=verdict == "unexplained")
+    puzzling = verdict == "unexplained"
+    return SimpleNamespace(diagnosis=told, candidates=told.effects, puzzling=puzzling)
 
 
 @pytest.mark.parametrize(("refused", "there"), [((), BOTH), (BOTH[1:], BOTH[:1]), (BOTH, ())])

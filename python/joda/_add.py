@@ -30,9 +30,11 @@ class Added:
     """What came of adding an effect.
 
     Attributes:
-        scene, composed, picture: the files that were written.
+        scene, composed, picture: the files that were written; None where nothing was added: then
+            nothing is written.
         effect: its name.
-        added: whether the scene has it; it has not where no variant lowers the error.
+        added: whether the scene has it.
+        reason: why it has not, a clause; None if it has.
         before, after: errors on what was held out of the fit.
         noise_floor: of what was measured there.
         unit: of the errors and the noise: rad or m; N·m or N where there are only curves.
@@ -41,11 +43,12 @@ class Added:
         notes: what the user should be told, a sentence each.
     """
 
-    scene: Path
-    composed: Path
-    picture: Path
+    scene: Path | None
+    composed: Path | None
+    picture: Path | None
     effect: str
     added: bool
+    reason: str | None
     before: Error
     after: Error
     noise_floor: float
@@ -57,7 +60,8 @@ class Added:
     def as_json(self) -> dict[str, Any]:
         """The same for JSON, which has no paths."""
         content = asdict(self)
-        return content | {key: str(content[key]) for key in ("scene", "composed", "picture")}
+        paths = {key: content[key] for key in ("scene", "composed", "picture")}
+        return content | {key: path and str(path) for key, path in paths.items()}
 
 
 def add(
@@ -75,7 +79,8 @@ def add(
 
     Of four or more runs every fourth is held out of the fit, of fewer the last quarter of each; of
     fewer quasi-static curves, where there are no runs, every fourth stretch of each.
-    The effect is added only if that lowers the error there.
+    The effect is added only if it is plausible and clearly lowers the error there; else nothing is
+    written.
 
     Args:
         model: MJCF or URDF, with or without a profile on the joint.
@@ -104,15 +109,19 @@ def add(
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
     train, held = parted(measured)
     mended = mend(train, held, name, direction, near, progress)
-    progress("drawing")
-    files, notes = scene_files(Path(model), mended.profile, target, composed)
-    write_together(files | {picture: png(mended_picture(held, mended.profile))})
+    notes: list[str] = []
+    if mended.effect:
+        progress("drawing")
+        files, notes = scene_files(Path(model), mended.profile, target, composed)
+        write_together(files | {picture: png(mended_picture(held, mended.profile))})
+    there = mended.effect is not None
     return Added(
-        scene=target,
-        composed=composed,
-        picture=picture,
+        scene=target if there else None,
+        composed=composed if there else None,
+        picture=picture if there else None,
         effect=name,
-        added=mended.effect is not None,
+        added=there,
+        reason=mended.reason,
         before=mended.before,
         after=mended.after,
         noise_floor=held.floor,
@@ -131,9 +140,9 @@ def sentences(added: Added) -> list[str]:
         out = [f"Added {what}. On what was held out of the fit ({added.held_out}): {errors}."]
     else:
         out = [
-            f"Not added: {what}, as it does not lower the error on what was held out of the fit "
-            f"({added.held_out}): {nearby(added.before)} {added.before.window:.3g} {added.unit}, "
-            f"noise {added.noise_floor:.2g} {added.unit}. The scene behaves as before."
+            f"Not added: {what}, as {added.reason} ({added.held_out}; {nearby(added.before)} "
+            f"{added.before.window:.3g} {added.unit}, noise {added.noise_floor:.2g} {added.unit}). "
+            "Nothing was written."
         ]
     told = parting(added.after, added.noise_floor) if added.added else []
     return [*out, *told, *added.changes, *added.notes]

@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.files import check_target, write_together
-from joda.measured.comparison import (
-    Comparison,
-    failing,
-    sentences,
-    window_rows,
-)
+from joda.measured.adequacy import Adequacy, adequacy
+from joda.measured.comparison import Comparison, sentences
 from joda.measured.curves import curve_error, failing_force
-from joda.measured.errors import errors
+from joda.measured.errors import Errors, errors
+from joda.measured.failing import LENGTHS, Failing, where, window_rows
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
 from joda.measured.reading import Measured, read_measured
 from joda.measured.stepping import timestep_note
+from joda.measured.visited import unvisited
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
 from joda.pictures.style import house_style, png
@@ -64,16 +62,20 @@ def compare(
     measured = read_measured(model, joint, runs)
     found = errors(measured, begin=progress)
     short = window_rows(measured)
+    judged = adequacy(measured, found, short) if found.runs else None
+    places, length = _failing(measured, found, short, judged)
     described = measured.profile.joint
     note = timestep_note(measured, found.window) if found.runs else None
     comparison = Comparison(
         joint=described.name,
         unit=described.unit,
         runs=found.runs,
-        rmse=found.whole if found.runs else None,
-        rmse_window=found.window if found.runs else None,
-        noise_floor=found.noise if found.runs else None,
-        failing=tuple(failing(short)),
+        rmse=found.known(found.whole),
+        rmse_window=found.known(found.window),
+        noise_floor=found.known(found.noise),
+        adequacy=judged,
+        failing=tuple(places),
+        failing_window=length,
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
         failing_force=tuple(failing_force(measured.curves, described)),
         notes=(*measured.notes, *([note] if note else [])),
@@ -91,10 +93,19 @@ def compare(
     return comparison
 
 
+def _failing(
+    measured: Measured, found: Errors, short: Array, judged: Adequacy | None
+) -> tuple[list[Failing], float]:
+    """Where it fails, and the windows' length, s; nothing where the data tell too little."""
+    if judged is None or judged.verdict == "not_enough_data":
+        return [], LENGTHS[0]
+    return where(measured, found.paths, short, judged.verdict == "beyond_noise")
+
+
 def _page(comparison: Comparison, drawn: bytes) -> str:
     unit = comparison.unit
     runs = [
-        (run.file, *(f"{x:.3g} {unit}" for x in (run.rmse, run.rmse_window, run.noise_floor)))
+        (run.file, *(_size(x, unit) for x in (run.rmse, run.rmse_window, run.noise_floor)))
         for run in comparison.runs
     ]
     curves = [
@@ -118,6 +129,10 @@ def _page(comparison: Comparison, drawn: bytes) -> str:
     )
 
 
+def _size(error: float | None, unit: str) -> str:
+    return "not replayed" if error is None else f"{error:.3g} {unit}"
+
+
 def _picture(measured: Measured, paths: Sequence[Array], rows: Array) -> "Figure":
     """The runs above, the curves below."""
     from matplotlib.figure import Figure
@@ -139,6 +154,7 @@ def _picture(measured: Measured, paths: Sequence[Array], rows: Array) -> "Figure
                 right,
                 [Replayed("windows of 0.1 s, \u00b1 2 standard deviations", paths, rows)],
                 joint,
+                unvisited(measured),
             )
             left.suptitle("measured runs and the model's replay", x=0.02, ha="left")
             right.suptitle("where it fails", x=0.02, ha="left")

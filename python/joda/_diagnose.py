@@ -94,7 +94,9 @@ def _candidate(found: Finding) -> str:
 def _after(diagnosis: Diagnosis) -> list[str]:
     """The next experiment, and notes."""
     told = diagnosis.next_experiment
-    return [f"Next experiment: {told}"] * bool(told) + list(diagnosis.notes)
+    parts = " and ".join(f"s = {a:.2f} to {b:.2f}" for a, b in diagnosis.unvisited)
+    away = f"No run visited {parts}: nothing is known of the joint there."
+    return [away] * bool(parts) + [f"Next experiment: {told}"] * bool(told) + list(diagnosis.notes)
 
 
 def _page(diagnosis: Diagnosis, drawn: bytes) -> str:
@@ -136,7 +138,7 @@ def _picture(measured: Measured, profile: Profile | None, diagnosis: Diagnosis) 
         left, right = figure.subfigures(1, 2, squeeze=False)[0]
         joint = measured.profile.joint
         draw_runs(left, measured.runs, {one.label: one.paths for one in models}, joint.unit)
-        draw_maps(right, models, joint)
+        draw_maps(right, models, joint, diagnosis.unvisited)
         left.suptitle("measured runs and replays", x=0.02, ha="left", fontsize=10)
         what = "force too much: windows of 0.1 s, \u00b1 2 standard deviations"
         right.suptitle(what, x=0.02, ha="left", fontsize=10)

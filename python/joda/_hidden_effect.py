@@ -12,7 +12,7 @@ from joda._add import sentences as of_added
 from joda._compare import compare
 from joda._diagnose import diagnose
 from joda._diagnose import sentences as of_diagnosis
-from joda.diagnosis.findings import Diagnosis
+from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import named
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied
@@ -20,6 +20,9 @@ from joda.hidden import EFFECTS, draw, write
 from joda.hidden.cases import PUSHED, VISIBLE
 from joda.measured.comparison import Comparison
 from joda.measured.comparison import sentences as of_comparison
+
+PLACED = 0.5
+"""Least overlap (intersection over union) of the place said and the true one."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class HiddenEffect:
         diagnosis: what was said.
         before, after: the model on runs that no step has seen, as it was and with the effect; None
             where no effect was named.
-        right: whether the first effect named is the hidden one.
+        right: whether name, place, size and the error on unseen runs all agree.
         judgement: on what was said, a sentence.
     """
 
@@ -110,17 +113,13 @@ def hidden_effect(
         say(f"\n3. Add it. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
         added = add(model, joint, written, runs, folder / "new.xml", force=True)
         say(of_added(added)[0])
-        say(f"\n4. Runs that no step has seen. (compare, {folder / 'unseen.html'})")
-        page = folder / "unseen.html"
-        after = compare(folder / "new.xml", joint, unseen, report=page, force=True)
-        unit = after.unit
-        say(
-            f"Whole runs are missed by {before.rmse:.3g} → {after.rmse:.3g} {unit} RMS, windows of "
-            f"0.4 s by {before.rmse_window:.3g} → {after.rmse_window:.3g} {unit}; the noise is "
-            f"{after.noise_floor:.2g} {unit}."
-        )
+        if added.scene:
+            say(f"\n4. Runs that no step has seen. (compare, {folder / 'unseen.html'})")
+            page = folder / "unseen.html"
+            after = compare(added.scene, joint, unseen, report=page, force=True)
+            say(_unseen(before, after))
     say("\nThe seal is opened:")
-    judgement = _judged(diagnosis, effect)
+    judgement, right = _judged(diagnosis, case.seal, before, after)
     say(f"  hidden: {truth}")
     for one in diagnosis.effects[:1]:
         doubt = f" \u00b1 {one.magnitude_error:.2g}"
@@ -135,7 +134,7 @@ def hidden_effect(
         diagnosis=diagnosis,
         before=before,
         after=after,
-        right=bool(diagnosis.effects) and diagnosis.effects[0].effect == effect,
+        right=right,
         judgement=judgement,
     )
 
@@ -150,16 +149,64 @@ def _size(told: dict[str, Any], doubt: str = "") -> str:
     return f"{told['magnitude']:.3g}{doubt}{of}"
 
 
-def _judged(diagnosis: Diagnosis, effect: str) -> str:
-    """What was said against what is true."""
+def _unseen(before: Comparison, after: Comparison) -> str:
+    """The errors on runs that no step has seen."""
+    unit = after.unit
+    errors = [
+        f"{what} by {old:.3g} → {new:.3g} {unit}"
+        for what, old, new in (
+            ("whole runs", before.rmse, after.rmse),
+            ("windows of 0.4 s", before.rmse_window, after.rmse_window),
+        )
+        if old is not None and new is not None
+    ]
+    return f"Missed are {', '.join(errors)}; the noise is {after.noise_floor:.2g} {unit}."
+
+
+def _judged(
+    diagnosis: Diagnosis, seal: dict[str, Any], before: Comparison, after: Comparison | None
+) -> tuple[str, bool]:
+    """What was said against what is true, a sentence; and whether all of it is right."""
+    effect = seal["effect"]
     said = [one.effect for one in diagnosis.effects]
     if not said:
-        return f"Missed: no effect was named (verdict: {diagnosis.verdict})."
+        return f"Missed: no effect was named (verdict: {diagnosis.verdict}).", False
     if said[0] == effect:
-        return "Right."
+        wrong = _off(diagnosis.effects[0], seal, before, after)
+        if not wrong:
+            return "Right.", True
+        return f"The name is right, but not all else: {'; '.join(wrong)}.", False
     if effect in diagnosis.effects[0].indistinguishable_from:
-        return "Not the first one named, but one of those that these data cannot tell apart."
+        return "Not the first one named, but one of those that these data cannot tell apart.", False
     if effect in said:
         one = diagnosis.effects[said.index(effect)]
-        return f"Wrong: the hidden effect was named too, with {100 * one.probability:.0f} %."
-    return "Wrong: the hidden effect was not among those named."
+        share = f"{100 * one.probability:.0f} %"
+        return f"Wrong: the hidden effect was named too, with {share}.", False
+    return "Wrong: the hidden effect was not among those named.", False
+
+
+def _off(
+    one: Finding, seal: dict[str, Any], before: Comparison, after: Comparison | None
+) -> list[str]:
+    """What is wrong of an effect with the right name, a clause each."""
+    out = []
+    if one.direction != seal["direction"]:
+        out.append(f"the direction is {seal['direction']}, not {one.direction}")
+    (a, b), (c, d) = one.interval, seal["interval"]
+    overlap = max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c))
+    if overlap < PLACED:
+        out.append(f"the places overlap by {100 * overlap:.0f} % only")
+    off = abs(one.magnitude - seal["magnitude"])
+    if off > one.magnitude_error:
+        out.append(
+            f"the size is off by {off / one.magnitude_error:.1f} times its \N{PLUS-MINUS SIGN}"
+        )
+    if after is None:
+        out.append("nothing was added")
+    elif not (_less(after.rmse_window, before.rmse_window) and _less(after.rmse, before.rmse)):
+        out.append("unseen runs are not missed by less with it")
+    return out
+
+
+def _less(after: float | None, before: float | None) -> bool:
+    return after is not None and before is not None and after < before

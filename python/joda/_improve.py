@@ -14,6 +14,7 @@ from joda.diagnosis.phrases import named
 from joda.files import check_target, write_together
 from joda.measured.maps import draw_maps, draw_models, replayed
 from joda.measured.reading import Measured
+from joda.measured.visited import unvisited
 from joda.pictures.changes import changes
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
@@ -28,7 +29,8 @@ class Improved:
     """What an improvement did.
 
     Attributes:
-        scene, composed, picture: the files that were written.
+        scene, composed, picture: the files that were written; None where no effect was added: then
+            only the report is.
         joint: its name.
         steps: the model as it was, then with one effect more each.
         why: it ended, a sentence.
@@ -39,9 +41,9 @@ class Improved:
         notes: what the user should be told, a sentence each.
     """
 
-    scene: Path
-    composed: Path
-    picture: Path
+    scene: Path | None
+    composed: Path | None
+    picture: Path | None
     joint: str
     steps: tuple[Step, ...]
     why: str
@@ -89,11 +91,15 @@ def improve(
     steps, why = improved(measured, progress)
     progress("drawing")
     last, (_, held) = steps[-1].profile, parted(measured)
-    files, notes = scene_files(Path(model), last, target, composed)
+    there = len(steps) > 1
+    files: dict[Path, bytes | str] = {}
+    notes: list[str] = []
+    if there:
+        files, notes = scene_files(Path(model), last, target, composed)
     result = Improved(
-        scene=target,
-        composed=composed,
-        picture=picture,
+        scene=target if there else None,
+        composed=composed if there else None,
+        picture=picture if there else None,
         joint=last.joint.name,
         steps=steps,
         why=why,
@@ -103,10 +109,12 @@ def improve(
         changes=tuple(changes(measured.profile, last)),
         notes=(*measured.notes, *notes),
     )
-    drawn = png(_picture(result, measured, held))
-    files[picture] = drawn
-    if report:
-        files[Path(report)] = _page(result, drawn)
+    if there or report:
+        drawn = png(_picture(result, measured, held))
+        if there:
+            files[picture] = drawn
+        if report:
+            files[Path(report)] = _page(result, drawn)
     write_together(files)
     return result
 
@@ -134,7 +142,7 @@ def _ending(result: Improved) -> list[str]:
     unchanged = len(result.steps) == 1
     return [
         *_explanations(result),
-        *["No effect was added; the scene behaves as before."] * unchanged,
+        *["No effect was added, and no scene was written."] * unchanged,
         result.why,
         *[f"Next experiment: {told}"] * bool(told),
         *result.changes,
@@ -206,7 +214,7 @@ def _picture(result: Improved, measured: Measured, held: Measured) -> "Figure":
         models = {"before": measured.profile} | ({"after": last} if len(result.steps) > 1 else {})
         if measured.runs:
             maps = [replayed(label, measured.changed(own)) for label, own in models.items()]
-            draw_maps(right, maps, last.joint)
+            draw_maps(right, maps, last.joint, unvisited(measured))
             what = "force too much: windows of 0.1 s, \u00b1 2 standard deviations"
             right.suptitle(what, x=0.02, ha="left", fontsize=10)
         else:

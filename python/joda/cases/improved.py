@@ -18,6 +18,7 @@ from joda._improve import improve
 from joda.cases.base import Case, bundled
 from joda.cases.subject import Subject
 from joda.component import Component
+from joda.errors import JodaError
 from joda.measured.runs import Run, write_run
 from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scenes.model import load_model
@@ -123,6 +124,8 @@ def measure(trial: Predicted, seed: int, folder: Path) -> tuple[list[Motion], li
 def improved(case: Case, runs: Sequence[Path], folder: Path) -> Profile:
     """The profile of scene.xml improved by runs; leaves improved.xml. Raises JodaError."""
     made = improve(folder / "scene.xml", case.joint, runs, folder / SCENE, force=True)
+    if made.composed is None:
+        raise JodaError(f"{folder / 'scene.xml'}: {made.why}")
     return Profile.read(made.composed)
 
 

@@ -64,8 +64,8 @@ def add(
 ) -> None:
     """Add the effect that a diagnosis names, if that helps.
 
-    It helps if it lowers the error on runs held out. Leaves, beside the scene, its .composed.json
-    and .png. Example:
+    It helps if it is plausible and clearly lowers the error on runs held out; else nothing is
+    written. Leaves, beside the scene, its .composed.json and .png. Example:
 
         joda add hidden/model.xml hidden/run?.csv --joint joint --diagnosis diagnosis.json -o new.xml
     """  # noqa: E501
@@ -81,7 +81,7 @@ def add(
         return
     for sentence in sentences(added):
         print(sentence)
-    for path in (added.scene, added.composed, added.picture):
+    for path in filter(None, (added.scene, added.composed, added.picture)):
         print(path)
 
 
@@ -95,7 +95,8 @@ def improve(
 ) -> None:
     """Diagnose and add until the data support nothing more.
 
-    Leaves, beside the scene, its .composed.json and .png. Example:
+    Leaves, beside the scene, its .composed.json and .png; without an effect to add, nothing but the
+    report. Example:
 
         joda improve hidden/model.xml hidden/run?.csv --joint joint -o improved.xml
     """

@@ -17,10 +17,12 @@ class Finding:
     Attributes:
         effect: its name.
         interval: where it acts, in normalised position.
+        interval_error: one standard deviation of either end.
         probability: that it is the missing one, 0 to 1.
         direction: both, positive or negative.
         magnitude: how large it is.
-        magnitude_error: its standard deviation.
+        magnitude_error: one standard deviation that covers: about 68 % of true values lie within
+            it, 95 % within two (`joda.diagnosis.uncertainty`).
         unit: of the magnitude.
         explanation: for a person.
         held_out_error_before, held_out_error_after: RMS misfit of windows that were held out of the
@@ -30,6 +32,7 @@ class Finding:
 
     effect: str
     interval: tuple[float, float]
+    interval_error: tuple[float, float]
     probability: float
     direction: Literal["both", "positive", "negative"]
     magnitude: float
@@ -51,6 +54,7 @@ class Diagnosis:
             effect explains; the data tell nothing.
         summary: the verdict in a sentence.
         effects: the most likely first.
+        unvisited: where no run has been, in normalised position.
         noise_floor: of the measured positions, or of the forces of curves.
         unit: of that noise and of the errors held out.
         next_experiment: that would decide what is open; None if nothing is.
@@ -61,6 +65,7 @@ class Diagnosis:
     verdict: Verdict
     summary: str
     effects: tuple[Finding, ...]
+    unvisited: tuple[tuple[float, float], ...]
     noise_floor: float
     unit: str
     next_experiment: str | None

@@ -10,7 +10,7 @@ from joda.diagnosis.baseline import joined
 from joda.diagnosis.guessing import Guess
 from joda.diagnosis.judge import Judge, Make, Unknowns
 from joda.diagnosis.windows import Windows
-from joda.measured.comparison import rms
+from joda.measured.misfit import rms
 
 Array = NDArray[np.float64]
 

@@ -86,7 +86,7 @@ def _next(parts: Parts, last: Step, asked: Diagnosed, told: Told) -> list[Step]:
     one of the best pair, and with it the second if that lowers the error further.
     """
     known = asked.diagnosis.verdict == "missing_effect"
-    found: Sequence[Sequence[Finding]] = [[one] for one in asked.diagnosis.effects]
+    found: Sequence[Sequence[Finding]] = [[one] for one in asked.candidates]
     if asked.puzzling and not last.added:
         train = parts[0].changed(last.profile)
         known, found = False, pairs(train, asked.puzzling, told)

@@ -59,6 +59,11 @@ class Unknowns:
         low, high, step, mean, doubt = (np.concatenate(pair) for pair in pairs)
         return Unknowns(low, high, step, mean, doubt)
 
+    def some(self, kept: NDArray[np.bool_]) -> "Unknowns":
+        """Some of them, without what else must hold."""
+        low, high, step, mean, doubt = (part[kept] for part in _parts(self))
+        return Unknowns(low, high, step, mean, doubt)
+
     def penalty(self, x: Array) -> float:
         """What the numbers lose by being off what was known."""
         return float(np.sum(((x - self.mean) / self.doubt) ** 2))
@@ -133,6 +138,16 @@ class Linear:
         """The normal equations of the numbers: matrix and gradient."""
         gradient = self.products(self.r[:, :, None], self.J, self.z[:, :, None])[0]
         return self.products(self.J, self.J), gradient
+
+    def normals(self) -> tuple[Array, Array]:
+        """Each window's part of the normal equations: shapes (m, k, k) and (m, k)."""
+        w = self.weight[:, None, None]
+        across = self.S.transpose(0, 2, 1)
+        SJ, Jt = across @ self.J, self.J.transpose(0, 2, 1)
+        Sr = across @ self.r[:, :, None] + self.z[:, :, None]
+        H = Jt @ self.J - SJ.transpose(0, 2, 1) @ self.inverse @ SJ
+        g = Jt @ self.r[:, :, None] - SJ.transpose(0, 2, 1) @ self.inverse @ Sr
+        return np.asarray(w * H), np.asarray((w * g)[:, :, 0])
 
     def follow(self, move: Array) -> Array:
         """How the starts move, in doubts, when the numbers do; shape (m, 2)."""

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.asking import asked
+from joda.diagnosis.better import worse
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS
+from joda.diagnosis.plausible import implausible, unseen_place
 from joda.diagnosis.reshaping import Likelihood, checked, reshaped
-from joda.measured.comparison import rms
-from joda.measured.errors import errors
+from joda.measured.errors import Errors, errors
 from joda.measured.gauge import Gauged
+from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.profile import Profile
@@ -53,12 +55,14 @@ class Mended:
         profile: the whole one (`joda.scenes.native`).
         effect: that was added; None if nothing did better than the model as it was.
         before, after: errors on runs held out of the fit.
+        reason: why nothing was added, a clause; None if something was.
     """
 
     profile: Profile
     effect: str | None
     before: Error
     after: Error
+    reason: str | None = None
 
 
 def parted(measured: Measured) -> tuple[Measured, Measured]:
@@ -103,11 +107,16 @@ def _cut(run: Run, part: slice) -> Run:
 
 def error(measured: Measured, profile: Profile | None = None) -> Error:
     """How far the model, or another profile, is off: of runs, in MuJoCo with the plugin."""
+    return _replayed(measured, profile)[0]
+
+
+def _replayed(measured: Measured, profile: Profile | None = None) -> tuple[Error, Errors | None]:
+    """The same, and the replays; None where there are only curves."""
     model = measured if profile is None else measured.changed(profile)
     if not model.runs:
-        return Error(None, rms(np.concatenate([curve.excess for curve in model.curves])))
+        return Error(None, rms(np.concatenate([curve.excess for curve in model.curves]))), None
     found = errors(model)
-    return Error(found.whole, found.window)
+    return Error(found.whole, found.window), found
 
 
 def mend(
@@ -118,9 +127,10 @@ def mend(
     near: tuple[float, float] | None = None,
     told: Callable[[str], None] = lambda what: None,
 ) -> Mended:
-    """Adds an effect, if that lowers the error on runs held out.
+    """Adds an effect, if that is plausible and runs held out are clearly better with it.
 
-    Of what is tried, the likeliest is taken that makes those runs likelier and their error less.
+    Of what is tried, the likeliest is taken that makes those runs likelier, their error less in
+    windows (a paired test) and not more in whole runs, and exerts no force that nothing needs.
 
     Args:
         train: the joint, its profile as it is, and runs to fit.
@@ -130,19 +140,27 @@ def mend(
         near: where it is, in normalised position, if that is known.
         told: what is being done.
     """
-    before = error(held)
+    before, replays = _replayed(held)
+    if reason := unseen_place(train, near):
+        return Mended(train.profile, None, before, before, reason)
     told("the effect's own numbers")
     with threadpool_limits(1, BLAS):
         profile = _guessed(train, effect, direction, near)
         tried = list(reshaped(train, held, profile, effect, told)) if profile else []
-    most = NEARLY * Likelihood(held).loss(train.profile)
+        most = NEARLY * Likelihood(held).loss(train.profile)
+    reasons = []
     for one in sorted(tried, key=lambda one: one.score):
-        if (
-            one.unseen < most
-            and (after := error(held, one.profile)).window < NEARLY * before.window
-        ):
+        after, anew = _replayed(held, one.profile)
+        reason = implausible(train, one.profile, effect)
+        if not reason and (one.unseen >= most or after.window >= NEARLY * before.window):
+            reason = "it does not lower the error on what was held out of the fit"
+        if not reason and replays and anew:
+            reason = worse(replays, anew)
+        if not reason:
             return Mended(one.profile, effect, before, after)
-    return Mended(train.profile, None, before, before)
+        reasons.append(reason)
+    reason = reasons[0] if reasons else "these data can tell nothing of it"
+    return Mended(train.profile, None, before, before, reason)
 
 
 def _guessed(

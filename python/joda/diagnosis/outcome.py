@@ -10,8 +10,9 @@ import numpy as np
 from joda._attach import attached
 from joda.diagnosis.mending import Error
 from joda.files import check_target
-from joda.measured.maps import draw_models, draw_runs
+from joda.measured.maps import draw_models, draw_runs, shade
 from joda.measured.reading import Measured, read_measured
+from joda.measured.visited import unvisited
 from joda.pictures.changes import draw_channels
 from joda.pictures.style import house_style
 from joda.profile import Profile
@@ -109,7 +110,10 @@ def draw_mended(part: "Figure | SubFigure", held: Measured, after: Profile) -> N
     panels = left.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
     gravity = np.array(found.positions), -np.array(found.gravity_force)
     draw_channels(panels, held.profile, after, gravity if np.any(gravity[1]) else None)
+    lo, hi = joint.range
+    away = [(lo + a * (hi - lo), lo + b * (hi - lo)) for a, b in unvisited(held)]
     for axes in panels:
+        shade(axes, away)
         if not axes.dataLim.height:
             axes.set(ylim=(-1, 1), yticks=[0])
     panels[0].legend(frameon=False, fontsize=8, ncols=3)

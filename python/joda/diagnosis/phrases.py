@@ -73,6 +73,7 @@ def explained(
     effect: str,
     direction: str,
     interval: tuple[float, float],
+    unvisited: tuple[tuple[float, float], ...],
     size: tuple[float, float, str],
     errors: tuple[float, float, float],
     error_unit: str,
@@ -84,6 +85,7 @@ def explained(
         effect: its name.
         direction: both, positive or negative.
         interval: where it acts, in normalised position.
+        unvisited: what of that no run has visited.
         size: magnitude, its standard deviation and unit.
         errors: of held-out windows before and after, and the noise.
         error_unit: of these.
@@ -97,10 +99,18 @@ def explained(
     name = named(effect)
     return (
         f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} "
-        f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}: {shows}. "
+        f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}: {shows}. {_extrapolated(unvisited)}"
         f"With it, windows held out of the fit are missed by {after:.2g} "
         f"instead of {before:.2g} {error_unit} (noise {noise:.2g} {error_unit})."
     )
+
+
+def _extrapolated(unvisited: tuple[tuple[float, float], ...]) -> str:
+    """That it is not known where no run has been, as a sentence; nothing if all was visited."""
+    if not unvisited:
+        return ""
+    where = " and ".join(f"s = {a:.2f} to {b:.2f}" for a, b in unvisited)
+    return f"No run visited {where}: there it is extrapolated. "
 
 
 def _lower(sentence: str) -> str:

@@ -9,6 +9,12 @@ MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
 OFF = 0.05
 """By how much a strength must be off to be worth a word."""
+EVEN = 0.5
+"""Probability above which an answer is more likely than not."""
+SAME = (
+    ": the joint was moved in one direction only, where a resistance and a force over position are "
+    "the same"
+)
 SUREST = 0.99
 """Highest probability that is said."""
 
@@ -24,32 +30,51 @@ def strengths_off(ranking: Ranking) -> str:
 
 
 def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool) -> str:
-    """The verdict in a sentence, where something is missing; bouncy: the ends, as in `Ranking`."""
+    """The verdict in a sentence, where something is missing; bouncy: the ends, as in `Ranking`.
+
+    "Missing is" is said only of an answer that is more likely than not, and with which the error on
+    windows held out of the fit falls.
+    """
     name = phrases.named(first.effect)
     others = " or ".join(map(phrases.named, first.indistinguishable_from))
     either = f"{name} or {others}" if others else name
-    same = (
-        ": the joint was moved in one direction only, where a resistance and a force over position "
-        "are the same"
-        if one_way and others
-        else ""
-    )
+    helps = first.held_out_error_after < first.held_out_error_before
     if weighed.verdict == "unexplained":
-        if bouncy and weighed.excess[0] < MUCH:
-            return (
-                "The ends of the range throw the joint back more than the model's: not explained."
-            )
-        share = 100 * min(weighed.share, 1.0)
-        part = f"{share:.0f} %" if share > 1 else "less than 1 %"
-        if share < MOST:
-            return (
-                f"Missing is {either if one_way else name}, but not only that{same}; it leaves "
-                f"{part} of the misfit, which no known effect explains."
-            )
+        return _unexplained(either if one_way else name, weighed, one_way, bouncy)
+    likely = f"probability {100 * min(first.probability, SUREST):.0f} %"
+    if not helps:
         return (
-            f"Something is missing that no known effect explains: the best of them, {name}, leaves "
-            f"{part} of the misfit."
+            f"Something is missing that no known effect explains. Best guess: {name} ({likely}); "
+            "but with it windows held out of the fit are missed as much."
         )
     if others:
-        return f"Missing is {either}{same or ': these data cannot tell which'}."
-    return f"Missing is {name} (probability {100 * min(first.probability, SUREST):.0f} %)."
+        why = SAME if one_way else ": these data cannot tell which"
+        return f"{_head(_sum(first, weighed))} {either}{why}."
+    return f"{_head(first.probability)} {name} ({likely})."
+
+
+def _head(probability: float) -> str:
+    return "Missing is" if probability > EVEN else "Best guess:"
+
+
+def _sum(first: Finding, weighed: Weighed) -> float:
+    """Probability that it is the first or one that these data cannot tell from it."""
+    alike = (first.effect, *first.indistinguishable_from)
+    return sum(p for name, p in weighed.named if name in alike)
+
+
+def _unexplained(what: str, weighed: Weighed, one_way: bool, bouncy: bool) -> str:
+    if bouncy and weighed.excess[0] < MUCH:
+        return "The ends of the range throw the joint back more than the model's: not explained."
+    share = 100 * min(weighed.share, 1.0)
+    part = f"{share:.0f} %" if share > 1 else "less than 1 %"
+    if share < MOST:
+        same = SAME if one_way and " or " in what else ""
+        return (
+            f"Best guess: {what}, but not only that{same}; it leaves {part} of the misfit, which "
+            "no known effect explains."
+        )
+    return (
+        f"Something is missing that no known effect explains: the best of them, {what}, leaves "
+        f"{part} of the misfit."
+    )

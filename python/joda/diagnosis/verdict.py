@@ -9,15 +9,16 @@ from joda.diagnosis.asking import asked
 from joda.diagnosis.baseline import joined, usable, windows_for
 from joda.diagnosis.coverage import moved_one_way, too_little
 from joda.diagnosis.findings import Diagnosis, Finding
-from joda.diagnosis.guessing import Guess
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
 from joda.diagnosis.ranking import Ranking, Told, rank
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import strengths_off, summarised
-from joda.diagnosis.weighing import Verdict, Weighed, weigh
+from joda.diagnosis.uncertainty import uncertainty
+from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, weigh
 from joda.measured.reading import Measured
+from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
 
 LONGER, LONGEST = 9.0, 1.5
@@ -35,8 +36,8 @@ RECORD_MORE = (
 )
 GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in both directions."
 GAUGE_BACK = "Measure the way back too, as slowly."
-NAMED, WORTH_NAMING = 5, 0.01
-"""How many effects are named, besides the first those of at least some probability."""
+NAMED, WORTH_NAMING, LEAST_NAMED = 5, 0.01, 0.005
+"""How many effects are named, the first and the others only of at least some probability."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,13 @@ class Diagnosed:
     Attributes:
         diagnosis: for the user.
         profile: with the likeliest effect; None if there is none.
+        candidates: what may be tried, the likeliest first, also what is too unlikely to be named.
         puzzling: the first look's ranking, where no effect explained the runs; else None.
     """
 
     diagnosis: Diagnosis
     profile: Profile | None = None
+    candidates: tuple[Finding, ...] = ()
     puzzling: Ranking | None = None
 
 
@@ -98,9 +101,13 @@ def diagnosed(
     )
     profile = ranking.guesses[0].written(ranking.asked.base)
     experiment = _next(measured, ranking, weighed, one_way)
-    summary = summarised(findings[0], weighed, one_way, ranking.bouncy)
-    said = _said(measured, weighed.verdict, summary, findings, experiment)
-    return Diagnosed(said, profile, puzzling)
+    first = findings[0]
+    helps = first.held_out_error_after < first.held_out_error_before
+    verdict = weighed.verdict if helps else "unexplained"
+    summary = summarised(first, weighed, one_way, ranking.bouncy)
+    likely = tuple(one for one in findings if one.probability >= LEAST_NAMED)
+    said = _said(measured, verdict, summary, likely, experiment)
+    return Diagnosed(said, profile if likely else None, findings, puzzling)
 
 
 def _looked_again(
@@ -139,6 +146,7 @@ def _said(
         verdict=verdict,
         summary=summary,
         effects=effects,
+        unvisited=unvisited(measured),
         noise_floor=measured.floor,
         unit=measured.unit,
         next_experiment=experiment,
@@ -168,22 +176,25 @@ def finding(
     hypothesis, x = guess.hypothesis, guess.x
     before, after = held.errors(guess)
     magnitude = hypothesis.magnitude(x)
-    doubt = _doubt(ranking, guess)
+    own, left = weighed.excess
+    doubt = uncertainty(ranking.asked, guess, left[number] / max(own, LITTLE))
     interval = hypothesis.interval(x)
     joint = measured.profile.joint
     return Finding(
         effect=hypothesis.effect,
         interval=interval,
+        interval_error=doubt.ends,
         probability=weighed.probabilities[number],
         direction=hypothesis.direction,
         magnitude=magnitude,
-        magnitude_error=doubt,
+        magnitude_error=doubt.magnitude,
         unit=hypothesis.unit,
         explanation=explained(
             hypothesis.effect,
             hypothesis.direction,
             interval,
-            (magnitude, doubt, hypothesis.unit),
+            unvisited_part(measured, interval),
+            (magnitude, doubt.magnitude, hypothesis.unit),
             (before, after, measured.floor),
             measured.unit,
             joint,
@@ -192,24 +203,6 @@ def finding(
         held_out_error_after=after,
         indistinguishable_from=alike,
     )
-
-
-def _doubt(ranking: Ranking, found: Guess) -> float:
-    """Standard deviation of an effect's magnitude, from the curvature of the loss."""
-    make, unknowns = joined(ranking.asked.base, found.hypothesis)
-    x = found.fit.x
-    H = ranking.asked.judge.linear(make, unknowns, x, found.fit.start).normal()[0]
-    H = H + np.diag(unknowns.doubt**-2.0) + 1e-9 * np.diag(np.maximum(np.diag(H), 1e-12))
-    covariance = np.linalg.pinv(H)
-    n = len(ranking.asked.base.places)
-    slope = np.zeros(len(x))
-    for k in range(n, len(x)):
-        step = 1e-4 * (np.arange(len(x)) == k)
-        ends = (found.hypothesis.magnitude((x + way)[n:]) for way in (step, -step))
-        slope[k] = (next(ends) - next(ends)) / 2e-4
-    samples = max(ranking.asked.judge.samples, 1.0)
-    worse = max(float(found.fit.squares[ranking.asked.judge.counts].sum()) / samples, 1.0)
-    return float(np.sqrt(max(float(slope @ covariance @ slope), 0.0) * worse))
 
 
 def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool) -> str | None:

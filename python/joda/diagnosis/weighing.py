@@ -44,11 +44,18 @@ class Weighed:
         verdict: on the model.
         probabilities: of the guesses, in their order.
         excess: per sample, of the model as it is and of each guess.
+        effects: the guesses' names.
     """
 
     verdict: Verdict
     probabilities: tuple[float, ...]
     excess: tuple[float, tuple[float, ...]]
+    effects: tuple[str, ...] = ()
+
+    @property
+    def named(self) -> tuple[tuple[str, float], ...]:
+        """Effects and their probabilities."""
+        return tuple(zip(self.effects, self.probabilities, strict=True))
 
     @property
     def share(self) -> float:
@@ -98,4 +105,5 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
         said = "unexplained"
     else:
         said = "missing_effect"
-    return Weighed(said, tuple(map(float, likely)), (own, tuple(map(float, left))))
+    names = tuple(guess.hypothesis.effect for guess in guesses)
+    return Weighed(said, tuple(map(float, likely)), (own, tuple(map(float, left))), names)

@@ -1,62 +1,16 @@
 """A model against measurements: its errors against the noise, and where it fails."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from json import dumps
-from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from joda.measured.adequacy import MULTIPLE, Adequacy
 from joda.measured.curves import CurveError, FailingForce, told
-from joda.measured.places import BINS, places
-from joda.measured.reading import Measured
-from joda.measured.replay import Window
+from joda.measured.errors import Missed, RunError
+from joda.measured.failing import Failing
 
-Array = NDArray[np.float64]
-By = Literal["position", "velocity", "direction", "time", "load"]
-
-SHORT = 0.1
-"""Length of the windows that tell where a model fails, s."""
-
-
-@dataclass(frozen=True)
-class RunError:
-    """Errors of one run, rad or m.
-
-    Attributes:
-        file: its name.
-        rmse: of an open-loop replay of the whole run from its measured start.
-        rmse_window: of windows of 0.4 s from fresh measured starts.
-        noise_floor: the measurement's noise: no model gets below it.
-    """
-
-    file: str
-    rmse: float
-    rmse_window: float
-    noise_floor: float
-
-
-@dataclass(frozen=True)
-class Failing:
-    """Where the model fails.
-
-    Attributes:
-        by: what is told apart.
-        interval: of it: normalised position, rad/s or m/s, -1 to 0 or 0 to 1 (direction), s, N·m
-            or N.
-        error: RMS position error of windows of 0.1 s there, rad or m.
-        force: mean force that the model has too much there, N·m or N.
-        share: of the sum of squared errors beyond the noise, 0 to 1.
-        significant: whether noise alone would hardly ever make such an error.
-    """
-
-    by: By
-    interval: tuple[float, float]
-    error: float
-    force: float
-    share: float
-    significant: bool
+SAID = 6
+"""Most places that are told."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +22,9 @@ class Comparison:
         unit: of position, rad or m.
         runs: errors by run.
         rmse, rmse_window, noise_floor: of all runs together, rad or m; None without a run.
+        adequacy: whether the runs show a fault of the model; None without a run.
         failing: where it fails, the largest share first.
+        failing_window: length of the windows that show it, s; 0: pieces of whole runs.
         curves: errors by quasi-static curve.
         failing_force: where its quasi-static force fails, the largest share first.
         notes: what is suspicious about the data, a sentence each.
@@ -80,7 +36,9 @@ class Comparison:
     rmse: float | None
     rmse_window: float | None
     noise_floor: float | None
+    adequacy: Adequacy | None
     failing: tuple[Failing, ...]
+    failing_window: float
     curves: tuple[CurveError, ...]
     failing_force: tuple[FailingForce, ...]
     notes: tuple[str, ...]
@@ -92,12 +50,14 @@ class Comparison:
             "unit": self.unit,
             "runs": [vars(run) for run in self.runs],
             **{key: getattr(self, key) for key in ("rmse", "rmse_window", "noise_floor")},
+            "adequacy": asdict(self.adequacy) if self.adequacy else None,
             "failing": [vars(place) for place in self.failing],
+            "failing_window": self.failing_window,
             "curves": [vars(curve) for curve in self.curves],
             "failing_force": [vars(place) for place in self.failing_force],
             "notes": list(self.notes),
         }
-        return dumps(content, indent=2, ensure_ascii=False) + "\n"
+        return dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def sentences(comparison: Comparison) -> list[str]:
@@ -108,14 +68,67 @@ def sentences(comparison: Comparison) -> list[str]:
 
 def _of_runs(comparison: Comparison) -> list[str]:
     unit, floor = comparison.unit, comparison.noise_floor
-    out = [
-        f"Whole runs are missed by {comparison.rmse:.3g} {unit} RMS, windows of 0.4 s by "
-        f"{comparison.rmse_window:.3g} {unit}; the measurement's noise is {floor:.2g} {unit}."
-    ]
-    if not comparison.failing:
-        out.append("Nothing beyond the noise: these runs show no fault of the model.")
+    missed = {"Whole runs": comparison.rmse, "windows of 0.4 s": comparison.rmse_window}
+    parts = [f"{what} by {error:.3g} {unit}" for what, error in missed.items() if error is not None]
+    if parts:
+        first, *more = parts
+        by = ", ".join([first.replace(" by", " are missed by") + " RMS", *more])
+        noise = f"the measurement's noise is {floor:.2g} {unit}."
+        out = [f"{by[0].upper()}{by[1:]}; {noise}"]
+    else:
+        out = ["No run could be replayed."]
+    out += [f"{run.file}: {run.reason}." for run in comparison.runs if run.reason]
+    return [*out, *_verdict(comparison), *_places(comparison)]
+
+
+def _verdict(comparison: Comparison) -> Iterator[str]:
+    """The all-clear, or why there is none."""
+    found = comparison.adequacy
+    assert found is not None
+    if found.verdict == "within_noise":
+        yield (
+            f"Nothing beyond the noise: every run and every window is missed by less than "
+            f"{MULTIPLE:g} times the noise, and the residual force has no pattern; these runs show "
+            "no fault of the model."
+        )
+    elif found.verdict == "not_enough_data":
+        yield (
+            "Not enough to tell whether the model is right: too few samples, or too little motion "
+            "in them."
+        )
+    worst = [_worst(one) for one in (found.run, found.segment) if one and one.multiple >= MULTIPLE]
+    if worst:
+        yield f"Beyond the noise: {', and '.join(worst)}."
+    elif found.verdict == "beyond_noise" and found.pattern is not None:
+        yield (
+            f"Small, but not noise: every run and window is missed by less than {MULTIPLE:g} times "
+            "the noise, yet the signs of the residual force have a pattern that noise makes in "
+            f"{_rarely(found.pattern)}."
+        )
+    if found.verdict == "beyond_noise" and not comparison.failing:
+        yield "The data do not show where in position, speed, direction, load or time it fails."
+
+
+def _worst(one: Missed) -> str:
+    much = (
+        f"{one.multiple:.2g} times the noise" if one.multiple < 1e6 else "more than a million times"
+    )
+    if one.time is None:
+        return f"{one.file} as a whole is missed by {much}"
+    first, last = one.time
+    return f"its window at {first:.3g} to {last:.3g} s".replace("its", f"{one.file}'s") + (
+        f" by {much}"
+    )
+
+
+def _rarely(probability: float) -> str:
+    return f"1 of {1 / probability:.0f} cases" if probability > 1e-4 else "hardly any case"
+
+
+def _places(comparison: Comparison) -> Iterator[str]:
+    unit = comparison.unit
     force = "N·m" if unit == "rad" else "N"
-    for place in comparison.failing[:6]:
+    for place in comparison.failing[:SAID]:
         a, b = place.interval
         where = {
             "position": f"at s = {a:.2f} to {b:.2f}",
@@ -124,97 +137,12 @@ def _of_runs(comparison: Comparison) -> list[str]:
             "time": f"at {a:.3g} to {b:.3g} s",
             "load": f"under a load of {a:.3g} to {b:.3g} {force}",
         }[place.by]
-        much = "much" if place.force > 0 else "little"
-        out.append(
-            f"By {place.by}: {100 * place.share:.0f} % of the error is {where}, where the model "
-            f"pushes {abs(place.force):.2g} {force} too {much} towards +q in the mean."
-        )
-    return out
-
-
-def failing(rows: Array) -> list[Failing]:
-    """Where windows are missed by more than noise, the largest share first.
-
-    Args:
-        rows: of `window_rows`.
-    """
-    if not len(rows):
-        return []
-    values, found = rows[:, :5], rows[:, 5:]
-    beyond = np.maximum(found[:, 2] - found[:, 1], 0.0)
-    out = []
-    for column, by in enumerate(("position", "velocity", "direction", "time", "load")):
-        out += _by(by, values[:, column], found, beyond)  # type: ignore[arg-type]
-    return sorted(out, key=lambda place: (not place.significant, -place.share))
-
-
-FORCE = 8
-"""Column of `_rows`: force too much; the next is its standard deviation."""
-
-
-def window_rows(measured: Measured) -> Array:
-    """A row per window of 0.2 s.
-
-    Columns: normalised position, velocity, direction / 2, time, load; RMS misfit, samples, sum of
-    squares in units of the noise, force too much, its standard deviation.
-    """
-    lo, hi = measured.profile.joint.range
-    found = measured.context
-    rows = []
-    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        for window in measured.replayer.windows(run, sigma, SHORT):
-            ends = window.samples[[0, -1]]
-            middle = run.position[window.samples].mean()
-            speed = float(np.diff(run.position[ends])[0] / np.diff(run.time[ends])[0])
-            gravity = np.interp(middle, found.positions, found.gravity_force)
-            load = run.force[window.samples].mean() + gravity
-            place = (middle - lo) / (hi - lo)
-            square = np.sum(window.misfit**2) / sigma**2
-            row = [place, speed, np.sign(speed) * 0.5, run.time[ends].mean(), load]
-            row += [rms(window.misfit), len(window.misfit), square, window.force, window.doubt]
-            rows.append(row)
-    return np.array(rows).reshape(-1, 10)
-
-
-def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
-    """Neighbouring bins of one quantity that fail, as intervals."""
-    edges = _edges(by, values)
-    if not beyond.sum():
-        return []
-    out = []
-    for interval, inside in places(edges, values, found, apart=by in ("velocity", "load")):
-        rows = found[inside]
-        out.append(
-            Failing(
-                by=by,
-                interval=interval,
-                error=float(np.sqrt(np.average(rows[:, 0] ** 2, weights=rows[:, 1]))),
-                force=float(np.average(rows[:, 3], weights=rows[:, 4] ** -2.0)),
-                share=float(beyond[inside].sum() / beyond.sum()),
-                significant=True,
+        if place.force is None:
+            how = "in either direction of force, by turns"
+        else:
+            much = "much" if place.force > 0 else "little"
+            how = (
+                f"where the model pushes {abs(place.force):.2g} {force} too {much} towards +q in "
+                "the mean"
             )
-        )
-    return out
-
-
-def _edges(by: By, values: Array) -> Array:
-    """Of the bins: even, and never on both sides of zero where the sign is a direction."""
-    if by == "direction":
-        return np.array([-1.0, 0.0, 1.0])
-    if by == "position":
-        return np.linspace(0, 1, BINS + 1)
-    lo, hi = float(values.min()), float(values.max()) + 1e-9
-    if by == "time" or lo * hi >= 0:
-        return np.linspace(lo, hi, BINS + 1)
-    below = min(max(round(BINS * lo / (lo - hi)), 1), BINS - 1)
-    return np.concatenate([np.linspace(lo, 0, below + 1), np.linspace(0, hi, BINS - below + 1)[1:]])
-
-
-def joined(windows: Sequence[Window]) -> Array:
-    """The misfits of all windows."""
-    return np.concatenate([window.misfit for window in windows] or [np.zeros(0)])
-
-
-def rms(values: Array) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+        yield f"By {place.by}: {100 * place.share:.0f} % of the error is {where}, {how}."

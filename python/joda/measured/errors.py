@@ -1,15 +1,52 @@
 """All measured runs replayed, whole and in windows: how far a model is off."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.measured.comparison import RunError, joined, rms
+from joda.measured.misfit import joined, rms
 from joda.measured.reading import Measured
+from joda.measured.replay import Window
+from joda.measured.runs import Run
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RunError:
+    """Errors of one run, rad or m.
+
+    Attributes:
+        file: its name.
+        rmse: of an open-loop replay of the whole run from its measured start; None if it could not
+            be replayed.
+        rmse_window: of windows of 0.4 s from fresh measured starts; None likewise.
+        noise_floor: the measurement's noise: no model gets below it.
+        reason: why something could not be replayed; None if all was.
+    """
+
+    file: str
+    rmse: float | None
+    rmse_window: float | None
+    noise_floor: float
+    reason: str | None = None
+
+
+@dataclass(frozen=True)
+class Missed:
+    """How much a whole run, or a window of it, is missed by.
+
+    Attributes:
+        file: of the run.
+        multiple: RMS error in units of the run's noise; infinite if the simulation went astray.
+        time: of the window, s from and to; None for the whole run.
+    """
+
+    file: str
+    multiple: float
+    time: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -19,14 +56,20 @@ class Errors:
     Attributes:
         paths: the model's positions at each run's times, rad or m.
         runs: by run.
+        missed: every whole run and every window that was replayed.
         whole, window, noise: of all runs together, as those of a `RunError`.
     """
 
     paths: tuple[Array, ...]
     runs: tuple[RunError, ...]
+    missed: tuple[Missed, ...]
     whole: float
     window: float
     noise: float
+
+    def known(self, error: float) -> float | None:
+        """None for what is not a number: there was nothing to replay."""
+        return _known(error)
 
 
 def errors(
@@ -42,19 +85,51 @@ def errors(
         windows: whether the errors of windows, which take longer, are wanted.
         begin: told the name of each run before its replay.
     """
-    paths, rows = [], []
-    missed, left = [np.zeros(0)], [np.zeros(0)]
+    paths, rows, missed = [], [], []
+    off, left = [np.zeros(0)], [np.zeros(0)]
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         begin(run.name)
         paths.append(measured.replayer.whole(run, sigma))
-        off = paths[-1] - run.position
-        missed.append(off[~np.isnan(off)])
-        left.append(joined(measured.replayer.windows(run, sigma) if windows else ()))
-        rows.append(RunError(run.name, rms(missed[-1]), rms(left[-1]), sigma))
+        misfit = paths[-1] - run.position
+        off.append(misfit[~np.isnan(paths[-1])])
+        pieces = measured.replayer.windows(run, sigma) if windows else []
+        left.append(joined(pieces))
+        whole = rms(off[-1])
+        if len(off[-1]):
+            missed.append(Missed(run.name, _multiple(whole, sigma)))
+        missed += [_missed(run, sigma, piece) for piece in pieces]
+        reason = _reason(run, whole, pieces) if windows else None
+        rows.append(RunError(run.name, _known(whole), _known(rms(left[-1])), sigma, reason))
     return Errors(
         paths=tuple(paths),
         runs=tuple(rows),
-        whole=rms(np.concatenate(missed)),
+        missed=tuple(missed),
+        whole=rms(np.concatenate(off)),
         window=rms(np.concatenate(left)),
         noise=rms(np.array(measured.sigma)),
     )
+
+
+def _multiple(error: float, sigma: float) -> float:
+    return error / sigma if np.isfinite(error) else float("inf")
+
+
+def _missed(run: Run, sigma: float, window: Window) -> Missed:
+    first, last = run.time[window.samples[[0, -1]]]
+    multiple = _multiple(rms(window.misfit), sigma)
+    return Missed(run.name, multiple, (float(first), float(last)))
+
+
+def _known(error: float) -> float | None:
+    return error if np.isfinite(error) else None
+
+
+def _reason(run: Run, whole: float, windows: Sequence[Window]) -> str | None:
+    """Why a run could not be replayed, as a clause."""
+    if np.isnan(run.force).all():
+        return "its force is unknown throughout"
+    if not np.isfinite(whole):
+        return "its force is unknown from near its beginning, so only windows of it are replayed"
+    if not windows:
+        return "no window of 0.4 s has enough samples of known force"
+    return None

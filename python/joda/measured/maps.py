@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.measured.comparison import FORCE, window_rows
+from joda.measured.failing import FORCE, window_rows
 from joda.measured.gauge import Gauged, static_force
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
+from joda.measured.visited import Interval
 from joda.pictures.style import COLOURS
 from joda.profile import Joint, Profile
 
@@ -24,6 +25,8 @@ UNCLEAR = 5.0
 """A force is not drawn if its standard deviation is so many times the median one."""
 SHOWN = 4
 """How many runs, and how many curves, a picture shows."""
+NOBODY = "#ececec"
+"""Colour of where no run has been."""
 DOTS = 800.0
 """Size of a curve's dots times their number, points; within limits."""
 WAYS = ((1, "friction", "+q"), (-1, "damping", "\N{MINUS SIGN}q"))
@@ -81,13 +84,26 @@ def draw_runs(
     plots[-1].set_xlabel("time (s)")
 
 
-def draw_maps(part: "Figure | SubFigure", models: Sequence[Replayed], joint: Joint) -> None:
-    """The force that each model has too much, by position above and by velocity below."""
+def draw_maps(
+    part: "Figure | SubFigure",
+    models: Sequence[Replayed],
+    joint: Joint,
+    unvisited: Sequence[Interval],
+) -> None:
+    """The force that each model has too much, by position above and by velocity below.
+
+    Args:
+        part: of a figure.
+        models: what each makes of the runs.
+        joint: of which they are.
+        unvisited: parts of the range where no run was, in normalised position; drawn grey.
+    """
     force = joint.force_unit
     panels = part.subplots(2, len(models), squeeze=False, sharey=True, sharex="row")
     for column, model in zip(panels.T, models, strict=True):
         for axes, x in zip(column, (0, 1), strict=True):
             _map(axes, model.rows, x)
+        shade(column[0], unvisited)
         column[0].set_title(model.label, loc="left", fontsize=9)
         column[0].set_xlabel("normalised position s")
         column[1].set_xlabel(f"velocity ({joint.unit}/s)")
@@ -95,6 +111,12 @@ def draw_maps(part: "Figure | SubFigure", models: Sequence[Replayed], joint: Joi
         axes.set_ylabel(f"force too much ({force})")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     part.legend(handles, labels, loc="outside lower right", frameon=False, fontsize=8, ncols=2)
+
+
+def shade(axes: "Axes", intervals: Sequence[Interval]) -> None:
+    """Greys parts of the horizontal axis where no run has been; one label for all."""
+    for number, (a, b) in enumerate(intervals):
+        axes.axvspan(a, b, color=NOBODY, lw=0, zorder=-1, label="" if number else "not visited")
 
 
 def _map(axes: "Axes", rows: Array, x: int) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.measured.comparison import joined, rms
+from joda.measured.misfit import joined, rms
 from joda.measured.reading import Measured
 from joda.measured.replay import Replayer
 

@@ -22,6 +22,7 @@ from joda.diagnosis.hypotheses.base import (
     unit_of,
     unknowns_of,
 )
+from joda.diagnosis.hypotheses.intervals import felt
 from joda.effects import (
     AddedInertia,
     AnyEffect,
@@ -41,6 +42,8 @@ Way = Literal["positive", "negative"]
 
 KNOTS = 9
 """Control points of a free curve."""
+RAISED = 0.1
+"""Part of its rise above its least value from which a free curve is told to act."""
 VARIED = 0.5
 """How much a curve varies at least that differs along the way, in units of its mean."""
 TINY = 1e-12
@@ -68,13 +71,18 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
             channel, Component(label=effect, interval=(0, 1), x=knots, y=y)
         )
 
+    def raised(x: Array) -> tuple[float, float]:
+        """Where the curve is above its least value."""
+        y = tuple(np.pad(x - np.min(x) + TINY, beyond, mode="edge"))
+        return felt(Component(label=effect, interval=(0, 1), x=knots, y=y), RAISED, to_ends=False)
+
     return Hypothesis(
         effect,
         "both",
         unknowns_of(*[STRENGTH] * KNOTS),
         np.full((1, KNOTS), 0.5 * TRIAL),
         write,
-        everywhere,
+        raised,
         lambda x: unit * float(np.ptp(x)),
         unit_of(units, power),
         remains=FREE_CURVE,

@@ -2,11 +2,19 @@
 
 import numpy as np
 
+from joda.component import Component
 from joda.diagnosis.hypotheses.base import Array, Bounds
+from joda.field import merge
+from joda.profile import Channel
 
 WIDTHS = (0.08, 0.13, 0.2, 0.3, 0.42, 0.6)
 """Of the intervals that are tried, in normalised position."""
 NARROWEST = 0.02
+FELT = 0.2
+"""Part of its largest force from which a force is felt: where an effect that runs out slowly
+ends."""
+GRID = 401
+"""Points on which that is looked for."""
 END = (0.0, 1.0, 0.004)
 """Bounds and step of an end of an interval."""
 
@@ -35,3 +43,19 @@ def places(place: str, widest: float = 1.0) -> tuple[Bounds, list[tuple[float, .
         return [(1 - widest, 1 - NARROWEST, 0.004)], [(1 - w,) for w in widths]
     begins = [(float(a), w) for w in WIDTHS for a in np.arange(0, 1 - w + 1e-9, w / 3)]
     return [END, END], [(a, a + w) for a, w in begins]
+
+
+def felt(part: Component, level: float = FELT, to_ends: bool = True) -> tuple[float, float]:
+    """Where a curve is at least so large a part of its largest value, in normalised position.
+
+    Args:
+        part: the curve.
+        level: the part of its largest value.
+        to_ends: whether an end of the range that is one of the curve's interval stays one.
+    """
+    a, b = part.interval
+    grid = np.linspace(a, b, GRID)
+    value = np.abs(merge(Channel(components=(part,)))(grid)[0])
+    there = grid[value >= level * value.max()]
+    low, high = float(there[0]), float(there[-1])
+    return a if to_ends and a <= 0.0 else low, b if to_ends and b >= 1.0 else high

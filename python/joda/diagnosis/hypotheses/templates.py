@@ -17,7 +17,7 @@ from joda.diagnosis.hypotheses.base import (
     unit_of,
     unknowns_of,
 )
-from joda.diagnosis.hypotheses.intervals import ends, places
+from joda.diagnosis.hypotheses.intervals import FELT, ends, felt, places
 from joda.profile import Profile
 from joda.template import Template
 
@@ -83,7 +83,7 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
     zeros = np.arange(parts // 2 + 1) * 2 / parts
     centres = np.array(CENTRES[parts // 2 - 1])
 
-    def write(profile: Profile, x: Array) -> Profile:
+    def part(x: Array) -> Component:
         half = float(x[1]) / parts
         tops = np.stack([centres - half, centres + half], axis=1).ravel()
         tails = np.array([tops[0] / 2, (1 + tops[-1]) / 2])
@@ -91,11 +91,13 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
         order = np.argsort(at)
         still = np.zeros(len(zeros) + len(centres))
         y = np.concatenate([still, lobes, [TAIL * lobes[0], TAIL * lobes[-1]]])[order]
-        interval = ends("anywhere", x)
         own = tuple(units.force * x[0] * y)
-        part = Component(label=name, interval=interval, x=tuple(at[order]), y=own)
+        return Component(label=name, interval=ends("anywhere", x), x=tuple(at[order]), y=own)
+
+    def write(profile: Profile, x: Array) -> Profile:
         most = units.force * x[0] * x[2]
-        return _caught(profile.with_component("conservative", part), name, interval, most)
+        drawn = profile.with_component("conservative", part(x))
+        return _caught(drawn, name, ends("anywhere", x), most)
 
     bounds, tries = places("anywhere")
     return Hypothesis(
@@ -104,7 +106,7 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
         unknowns_of(STRENGTH, (0.2, 0.7, 0.02), CATCH, *bounds),
         np.array([(TRIAL, 0.45, 0.0, *t) for t in tries]),
         write,
-        lambda x: ends("anywhere", x),
+        lambda x: felt(part(np.array([TRIAL, *x[1:]]))),
         lambda x: units.force * float(x[0]),
         unit_of(units),
         len(bounds),
@@ -130,9 +132,9 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         part = Component(label=name, interval=interval, x=tuple(at), y=tuple(y))
         most = units.force * x[0] * x[1]
         pulled = profile.with_component("conservative", part)
-        return _caught(pulled, name, felt(x), most)
+        return _caught(pulled, name, near(x), most)
 
-    def felt(x: Array) -> tuple[float, float]:
+    def near(x: Array) -> tuple[float, float]:
         reach = min(SEEN * float(x[2]), 1.0)
         return (0.0, reach) if low else (1 - reach, 1.0)
 
@@ -142,7 +144,7 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         unknowns_of(STRENGTH, CATCH, (0.004, 0.4, 0.002)),
         np.array(list(product((2 * TRIAL,), (0.0, 0.12), (0.02, 0.04, 0.08, 0.16)))),
         write,
-        felt,
+        near,
         lambda x: units.force * float(x[0]),
         unit_of(units),
         rarity=RARE,
@@ -186,17 +188,22 @@ def _snap(units: Units, name: str) -> Hypothesis:
     low = name.endswith("low_end")
     place = "low" if low else "high"
 
-    def write(profile: Profile, x: Array) -> Profile:
+    def part(x: Array) -> Component:
         hold, share, end, tip, most = (float(value) for value in x[:5])
         barrier, rest = share * hold, 1 - tip
         at = np.array((0.0, most * tip, tip, tip + 0.33 * rest, tip + 0.66 * rest, 1.0))
         y = units.force * np.array((-end * hold, -hold, 0.0, barrier, TAIL * barrier, 0.0))
         if not low:
             at, y = 1 - at[::-1], -y[::-1]
-        interval = ends(place, x)
-        part = Component(label=name, interval=interval, x=tuple(at), y=tuple(y))
-        rubs = units.force * max(hold, barrier) * float(x[5])
-        return _caught(profile.with_component("conservative", part), name, interval, rubs)
+        return Component(label=name, interval=ends(place, x), x=tuple(at), y=tuple(y))
+
+    def write(profile: Profile, x: Array) -> Profile:
+        rubs = units.force * float(x[0] * max(1.0, x[1]) * x[5])
+        drawn = profile.with_component("conservative", part(x))
+        return _caught(drawn, name, ends(place, x), rubs)
+
+    def reach(x: Array) -> tuple[float, float]:
+        return felt(part(np.array([TRIAL, *x[1:]])), FELT * min(1.0, float(x[1])))
 
     bounds, tries = places(place, WIDEST)
     own = [STRENGTH, BARRIER, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), (0.15, 0.7, 0.02), CATCH]
@@ -206,7 +213,7 @@ def _snap(units: Units, name: str) -> Hypothesis:
         unknowns_of(*own, *bounds),
         np.array([(TRIAL, 0.8, 0.5, tip, 0.45, 0.0, *t) for t in tries for tip in (0.4, 0.6)]),
         write,
-        lambda x: ends(place, x),
+        reach,
         lambda x: units.force * float(x[0]) * max(1.0, float(x[1])),
         unit_of(units),
         len(bounds),
@@ -261,6 +268,12 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
             part = Component(label=name, interval=interval, x=at, y=(first, y, y, last))
             return profile.with_component(channel, part)
 
+        def between(x: Array) -> tuple[float, float]:
+            """From the middle of one edge to that of the other."""
+            a, b = ends(place, x)
+            edge = 0.0 if whole else 0.5 * float(x[1]) * (b - a)
+            return a if a <= 0.0 else a + edge, b if b >= 1.0 else b - edge
+
         bounds, tries = places(place)
         soft = [] if whole else [EDGE]
         same = whole and channel == "conservative" and not units.hinge
@@ -270,7 +283,7 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
             unknowns_of(STRENGTH, *soft, *bounds),
             np.array([(TRIAL, *[EDGE[0]] * len(soft), *t) for t in tries]),
             write,
-            lambda x: ends(place, x),
+            between,
             lambda x: abs(float(unit)) * float(x[0]),
             unit_of(units, int(channel == "damping")),
             len(bounds),

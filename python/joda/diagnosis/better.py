@@ -1,0 +1,68 @@
+"""Whether a model is better than another on runs that neither was fitted to: a paired test."""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.measured.errors import Errors
+
+Array = NDArray[np.float64]
+
+SIGNIFICANT = 0.05
+"""Largest probability of as clear an improvement by chance."""
+CHANGED = 0.5
+"""By how much a window's error must change to count, in units of the noise."""
+FEWEST = 5
+"""Of fewer windows that change, none may become worse."""
+EXACT, DRAWS = 12, 4000
+"""Windows up to which all signs are gone through; else so many are drawn."""
+WORSE = 1.05
+"""How much the geometric mean of whole runs' errors may rise."""
+
+
+def worse(before: Errors, after: Errors) -> str | None:
+    """Why a model is not better than before on runs held out, as a clause; None if it is.
+
+    Windows are paired; whole runs must not be missed by more.
+    """
+    pairs = [
+        np.array([one.multiple for one in found.missed if (one.time is None) == whole])
+        for whole in (False, True)
+        for found in (before, after)
+    ]
+    if not improves(pairs[0], pairs[1]):
+        return "windows held out of the fit are not missed by clearly less with it (paired test)"
+    if risen(pairs[2], pairs[3]) > WORSE:
+        return "whole runs held out of the fit, replayed from their starts, are missed by more"
+    return None
+
+
+def improves(before: Array, after: Array) -> bool:
+    """Whether windows are missed by less, beyond chance.
+
+    A sign-flip test (Fisher 1935) of the mean change of log(1 + error²), in units of the noise, so
+    that no single window decides.
+
+    Args:
+        before, after: errors of the same windows in units of the noise, shape (n,).
+    """
+    finite = np.isfinite(before) | np.isfinite(after)
+    before, after = (np.minimum(x[finite], 1e6) for x in (before, after))
+    changed = np.abs(before - after) > CHANGED
+    gain = (np.log1p(before**2) - np.log1p(after**2))[changed]
+    if len(gain) < FEWEST:
+        return bool(len(gain) and (gain > 0).all())
+    if len(gain) <= EXACT:
+        signs = np.array(list(product((-1.0, 1.0), repeat=len(gain))))
+    else:
+        signs = np.random.default_rng(0).choice((-1.0, 1.0), (DRAWS, len(gain)))
+    return bool(np.mean(signs @ gain >= gain.sum() - 1e-12) < SIGNIFICANT)
+
+
+def risen(before: Array, after: Array) -> float:
+    """Geometric mean of the ratios of errors, those below the noise counting as the noise."""
+    if not len(before):
+        return 1.0
+    ratios = [np.log(np.clip(x, 1.0, 1e6)) for x in (after, before)]
+    return float(np.exp(np.mean(ratios[0] - ratios[1])))

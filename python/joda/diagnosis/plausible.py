@@ -1,0 +1,138 @@
+"""What an added effect may be: no more force than the runs can need, and where runs have been."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.diagnosis.baseline import windows_for
+from joda.effects import (
+    AddedInertia,
+    AnyEffect,
+    DirectionDependentDamping,
+    GravityOffset,
+    LoadDependentFriction,
+    QuadraticDamping,
+)
+from joda.effects.base import CurveEffect
+from joda.field import merge
+from joda.measured import smoothing
+from joda.measured.reading import Measured
+from joda.measured.visited import visited_share
+from joda.profile import CHANNELS, Channels, Profile
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+EXCESS = 10.0
+"""How many times what the runs can need an effect's force may be at most."""
+VISITED = 0.25
+"""Least part of an effect's interval that runs must have visited."""
+GRID = 201
+"""Positions at which a curve's largest value is looked for."""
+
+
+def implausible(measured: Measured, profile: Profile, effect: str) -> str | None:
+    """Why a profile with an effect more cannot be meant, as a clause; None if it can.
+
+    Args:
+        measured: the joint, its profile without the effect, and its runs.
+        profile: with the effect.
+        effect: its name.
+    """
+    if not measured.runs:
+        return None
+    needs = Needs(measured)
+    force = needs.largest(profile, effect)
+    if force <= EXCESS * needs.force:
+        return None
+    unit = measured.profile.joint.force_unit
+    return (
+        f"it would exert up to {force:.2g} {unit}, {force / needs.force:.0f} times the "
+        f"{needs.force:.2g} {unit} that the runs' accelerations, the inertia, gravity, the "
+        "recorded forces and the model's own can need together"
+    )
+
+
+def unseen_place(measured: Measured, interval: Interval | None) -> str | None:
+    """Why nothing can be added at an interval, as a clause; None if runs have been there."""
+    if interval is None or visited_share(measured, interval) >= VISITED:
+        return None
+    a, b = interval
+    return f"hardly any run visited s = {a:.2f} to {b:.2f}, where it acts"
+
+
+class Needs:
+    """The largest motion and force of measured runs.
+
+    Attributes:
+        speed: rad/s or m/s.
+        acceleration: rad/s² or m/s².
+        force: what the runs can need: inertia times acceleration, the recorded force, gravity, and
+            what the model has already; N·m or N.
+        visited: from where to where runs have been, in normalised position.
+    """
+
+    def __init__(self, measured: Measured) -> None:
+        """Looks through all runs."""
+        lo, hi = measured.profile.joint.range
+        position = np.concatenate([run.position for run in measured.runs])
+        first, last = np.clip((np.array([position.min(), position.max()]) - lo) / (hi - lo), 0, 1)
+        self.visited = float(first), float(last)
+        self.speed = max(_speed(run.time, run.position) for run in measured.runs)
+        travel = max(float(np.ptp(run.position)) for run in measured.runs)
+        self.acceleration = max(_acceleration(measured), self.speed**2 / (2 * travel))
+        applied = max(float(np.nanmax(np.abs(run.force), initial=0.0)) for run in measured.runs)
+        gravity = max(map(abs, measured.context.gravity_force))
+        inertia = measured.single.inertia * self.acceleration
+        self.force = inertia + applied + gravity + self._exerted(measured.profile)
+
+    def largest(self, profile: Profile, effect: str) -> float:
+        """Largest force of what a profile has of an effect, where and as fast as runs went."""
+        channels = {}
+        for name in CHANNELS:
+            channel = getattr(profile.channels, name)
+            own = tuple(part for part in channel.components if part.label == effect)
+            channels[name] = channel.model_copy(update={"components": own})
+        own_effects = tuple(one for one in profile.effects if one.effect == effect)
+        return self._exerted(
+            profile.model_copy(update={"channels": Channels(**channels), "effects": own_effects})
+        )
+
+    def _exerted(self, profile: Profile) -> float:
+        grid = np.linspace(*self.visited, GRID)
+        total = 0.0
+        for name in CHANNELS:
+            channel = getattr(profile.channels, name)
+            if channel.components:
+                most = float(np.abs(merge(channel)(grid)[0]).max())
+                total += most * (self.speed if name == "damping" else 1.0)
+        return total + self._of(profile.effects)
+
+    def _of(self, effects: Sequence[AnyEffect]) -> float:
+        total = 0.0
+        for one in effects:
+            if isinstance(one, CurveEffect):
+                power = {DirectionDependentDamping: 1, QuadraticDamping: 2}.get(type(one), 0)
+                total += max(one.y) * self.speed**power
+            elif isinstance(one, AddedInertia):
+                total += one.inertia * self.acceleration
+            elif isinstance(one, GravityOffset):
+                total += abs(one.force) + float(np.hypot(one.sin, one.cos))
+            elif isinstance(one, LoadDependentFriction):
+                total += one.coefficient * getattr(self, "force", 0.0)
+        return total
+
+
+def _speed(time: Array, position: Array) -> float:
+    """Largest over a few samples, so that noise hardly counts."""
+    n = min(smoothing.LEAST, len(time) - 1)
+    return float(np.max(np.abs(position[n:] - position[:-n]) / (time[n:] - time[:-n])))
+
+
+def _acceleration(measured: Measured) -> float:
+    """Largest from one window of the runs to the next."""
+    windows = windows_for(measured)
+    same = ~windows.fresh[1:]
+    change = np.abs(np.diff(windows.start[:, 1]))[same] / (np.diff(windows.at)[same] * windows.h)
+    return float(change.max(initial=0.0))

@@ -1,0 +1,243 @@
+"""How well an effect's size and place are known: how far what fits the runs as well may be off.
+
+Three parts, as one number each would be too sure of itself:
+
+- the profile likelihood (Venzon and Moolgavkar, J. R. Stat. Soc. C 37 (1988) 87): each number of
+  the effect is moved off its best value, all others are fitted again, and what still fits counts;
+- a block bootstrap over runs (Künsch, Ann. Stat. 17 (1989) 1217), one Gauss-Newton step from the
+  best fit each: residuals are correlated within a run;
+- a floor: what an approximate law of the effect leaves of the misfit may hide as large a part of
+  its size, and what no run has visited is extrapolated.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._core import Solo
+from joda.diagnosis.asking import RESTITUTION, Asked
+from joda.diagnosis.baseline import joined
+from joda.diagnosis.guessing import Guess
+from joda.diagnosis.hypotheses.base import FREE_CURVE, KNOWN_LAW, KNOWN_SHAPE, STRENGTH, TRIAL
+from joda.diagnosis.hypotheses.intervals import GRID
+from joda.diagnosis.judge import BEND, Judge, Make, Unknowns
+from joda.field import merge
+from joda.profile import CHANNELS, Profile
+
+Array = NDArray[np.float64]
+
+STEPS = (1.0, 2.0, 4.0)
+"""How far a number is moved off its best value, in its standard deviations by curvature."""
+ITERATIONS = 3
+"""Of the fit of all others there."""
+RISE = 4.0
+"""Rise of the loss, in overdispersions, from which a point is no longer as good (2 standard
+deviations)."""
+DRAWS = 200
+"""Bootstrap samples."""
+FEW_RUNS = 5
+"""Of fewer runs, segments are drawn instead."""
+
+
+SHAPE = {KNOWN_LAW: 0.01, FREE_CURVE: 0.05, KNOWN_SHAPE: 0.05}
+"""Part of its size by which an effect's law may differ from its kind, by what is known of it."""
+SATURATING = {"bistable_mechanism": 0.12}
+"""The same of laws whose force goes on growing outside the range: its largest one is not there."""
+DEFINITION = 0.08
+"""Part of its interval's width by which what counts as its end may differ."""
+HIDDEN = 0.5
+"""Part of the size that may hide in what is left, by the root of the share of the misfit left."""
+FARTHEST = 5.0
+"""Largest doubt of what is extrapolated, in units of the magnitude."""
+STRETCHED = 0.25
+"""Doubt of an extrapolated effect's ends, by that of its magnitude, in units of the width."""
+PLAUSIBLE = 2.0
+"""How much larger a strength may be than the effect's largest, a priori (one standard
+deviation)."""
+HARDLY = 0.005
+"""Part of the samples at either end of what was visited that do not count as visited."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """One standard deviation each.
+
+    Attributes:
+        magnitude: of the effect's magnitude, in its unit.
+        ends: of its interval's two ends, in normalised position.
+    """
+
+    magnitude: float
+    ends: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A fitted effect: the estimator, the numbers, and what is to be told of them."""
+
+    judge: Judge
+    make: Make
+    unknowns: Unknowns
+    found: Guess
+    x: Array
+
+    @property
+    def own(self) -> NDArray[np.intp]:
+        """Numbers of the effect itself."""
+        return np.arange(len(self.x) - len(self.found.x), len(self.x))
+
+    def told(self, x: Array) -> Array:
+        """Magnitude and ends of the interval, shape (3,)."""
+        numbers = np.clip(x, self.unknowns.low, self.unknowns.high)[self.own]
+        hypothesis = self.found.hypothesis
+        return np.array([hypothesis.magnitude(numbers), *hypothesis.interval(numbers)])
+
+
+def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
+    """How well a fitted effect is known.
+
+    Args:
+        asked: the model and its runs.
+        found: the effect, fitted.
+        left: share of the model's misfit beyond the noise that it leaves, 0 to 1.
+    """
+    fitted = _fitted(asked, found)
+    best, data = fitted.told(fitted.x), from_data(fitted)
+    magnitude, a, b = best
+    shape = SATURATING.get(found.hypothesis.effect, SHAPE[found.hypothesis.remains])
+    part = shape + HIDDEN * float(np.sqrt(np.clip(left, 0.0, 1.0)))
+    seen, visited = _seen(asked, found)
+    beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
+    size = np.linalg.norm([data[0], part * magnitude, beyond * magnitude])
+    width = max(DEFINITION, part, STRETCHED * beyond) * (b - a)
+    ends = tuple(
+        float(np.linalg.norm([spread, width * (0.0 < end < 1.0), gap]))
+        for end, spread, gap in zip((a, b), data[1:], _gaps((a, b), visited), strict=True)
+    )
+    return Uncertainty(float(size), (ends[0], ends[1]))
+
+
+def from_data(fitted: _Fitted) -> Array:
+    """Standard deviations of magnitude and ends as the runs alone tell them, shape (3,)."""
+    judge, unknowns, x = fitted.judge, fitted.unknowns, fitted.x
+    about = judge.linear(fitted.make, unknowns, x, fitted.found.fit.start)
+    H, slopes = about.normals()
+    prior = _prior(fitted)
+    worse = _overdispersion(fitted)
+    covariance = worse * np.linalg.pinv(H.sum(axis=0) + prior)
+    rng = np.random.default_rng(0)
+    normal = rng.multivariate_normal(x, covariance, DRAWS, method="svd")
+    drawn = _bootstrap(fitted, H, slopes, prior, rng)
+    profiled = _profiled(fitted, covariance, worse)
+    parts = np.stack([_spread(fitted, normal), _spread(fitted, drawn), profiled])
+    return np.asarray(parts.max(axis=0))
+
+
+def _prior(fitted: _Fitted) -> Array:
+    """Precision of what is known of the numbers before the data, shape (k, k)."""
+    unknowns, own = fitted.unknowns, fitted.own
+    wide = np.full(len(fitted.x), np.inf)
+    wide[own] = (unknowns.high - unknowns.low)[own] / np.sqrt(12)
+    strengths = own[unknowns.high[own] == STRENGTH[1]]
+    wide[strengths] = PLAUSIBLE * max(np.abs(fitted.x[strengths]).max(initial=0.0), TRIAL)
+    return np.diag(unknowns.doubt**-2.0 + wide**-2.0)
+
+
+def _seen(asked: Asked, found: Guess) -> tuple[float, tuple[float, float]]:
+    """The effect's size where runs were, and where that is, in normalised position."""
+    windows, joint = asked.judge.windows, asked.base.profile.joint
+    lo, hi = joint.range
+    rows = windows.rows[asked.judge.counts]
+    s = (windows.position[rows[rows >= 0]] - lo) / (hi - lo)
+    low, high = np.clip(np.quantile(s, (HARDLY, 1 - HARDLY)), 0.0, 1.0) if len(s) else (0.0, 1.0)
+    bare = found.hypothesis.write(Profile(joint=joint), found.x)
+    magnitude = found.hypothesis.magnitude(found.x)
+    drawn = (getattr(bare.channels, name) for name in CHANNELS)
+    if first := next((one for one in drawn if one.components), None):
+        here, all_over = (
+            float(np.abs(merge(first)(np.linspace(a, b, GRID))[0]).max())
+            for a, b in ((low, high), (0.0, 1.0))
+        )
+        magnitude *= here / all_over if all_over > 0 else 1.0
+    return magnitude, (float(low), float(high))
+
+
+def _gaps(interval: tuple[float, float], visited: tuple[float, float]) -> list[float]:
+    """How far the ends may be off as they are where no run was: uniform between there and here."""
+    low, high = visited
+    return [max(low - end, end - high, 0.0) / 3**0.5 for end in interval]
+
+
+def _fitted(asked: Asked, found: Guess) -> _Fitted:
+    judge, base, hypothesis = asked.judge, asked.base, found.hypothesis
+    if hypothesis.effect != RESTITUTION:
+        return _Fitted(judge, *joined(base, hypothesis), found, found.fit.x)
+    windows = judge.windows
+    profile = base.written(found.fit.x[: len(base.places)])
+
+    def make(x: Array) -> Solo:
+        return base.single.solo(hypothesis.write(profile, x), base.h)
+
+    knocks = Judge(windows, windows.knocks & (windows.count > 0))
+    return _Fitted(knocks, make, hypothesis.unknowns, found, found.x)
+
+
+def _overdispersion(fitted: _Fitted) -> float:
+    """Robust mean square residual, 1 at least."""
+    judge = fitted.judge
+    loss = judge.loss(fitted.found.fit.squares)
+    return max(loss / max(judge.samples, 1.0) / (BEND * float(np.log1p(1 / BEND))), 1.0)
+
+
+def _bootstrap(
+    fitted: _Fitted, H: Array, g: Array, prior: Array, rng: np.random.Generator
+) -> Array:
+    """Numbers that samples of runs, drawn with replacement, would have given; shape (draws, k)."""
+    judge = fitted.judge
+    run = judge.windows.run
+    runs = np.unique(run[judge.counts])
+    block = run if len(runs) >= FEW_RUNS else np.arange(len(run))
+    blocks = np.unique(block[judge.counts])
+    Hb = np.stack([H[block == b].sum(axis=0) for b in blocks])
+    gb = np.stack([g[block == b].sum(axis=0) for b in blocks])
+    drawn = rng.multinomial(len(blocks), np.full(len(blocks), 1 / len(blocks)), DRAWS)
+    normal = np.tensordot(drawn, Hb, 1) + prior
+    slope = (drawn - 1) @ gb  # at the best fit the slopes of all, and of what is known, cancel
+    return np.asarray(fitted.x - np.linalg.solve(normal, slope[:, :, None])[:, :, 0])
+
+
+def _spread(fitted: _Fitted, draws: Array) -> Array:
+    """Standard deviations of what is told, robustly, shape (3,)."""
+    told = np.stack([fitted.told(x) for x in draws])
+    low, high = np.quantile(told, (0.16, 0.84), axis=0)
+    best = fitted.told(fitted.x)
+    return np.asarray(np.maximum(high - best, best - low))
+
+
+def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Array:
+    """Standard deviations by the profile likelihood of each of the effect's numbers, shape (3,)."""
+    judge, unknowns, start = fitted.judge, fitted.unknowns, fitted.found.fit.start
+    best, x = fitted.told(fitted.x), fitted.x
+    least = judge.loss(fitted.found.fit.squares) + unknowns.penalty(x)
+    out = np.zeros(3)
+    for k in fitted.own:
+        rest = np.arange(len(x)) != k
+        others = unknowns.some(rest)
+        step = max(float(np.sqrt(covariance[k, k])), float(unknowns.step[k]))
+        for way in (-1.0, 1.0):
+            y, near = x[rest], start
+            for far in STEPS:
+                value = float(np.clip(x[k] + way * far * step, unknowns.low[k], unknowns.high[k]))
+
+                def make(y: Array, value: float = value, k: int = int(k)) -> Solo:
+                    return fitted.make(np.insert(y, k, value))
+
+                fit = judge.fit(make, others, y, near, ITERATIONS)
+                y, near = fit.x, fit.start
+                rise = max(fit.loss - least, 0.0) / overdispersion
+                moved = np.abs(fitted.told(np.insert(y, k, value)) - best)
+                out = np.maximum(out, moved / np.sqrt(max(rise, 1.0)))
+                if rise > RISE or value in (unknowns.low[k], unknowns.high[k]):
+                    break
+    return out

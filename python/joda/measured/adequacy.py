@@ -1,0 +1,130 @@
+"""Whether a model is within the noise of what was measured: all of it, and without a pattern.
+
+An all-clear is a claim on every run and every segment. It takes three things: each whole run and
+each segment is missed by less than a stated multiple of the noise; the residual force of successive
+windows has no pattern; and there is enough motion for a fault to show.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binomtest, norm
+
+from joda.measured.errors import Errors, Missed
+from joda.measured.failing import FORCE, LENGTHS
+from joda.measured.reading import Measured
+
+Array = NDArray[np.float64]
+Adequate = Literal["within_noise", "beyond_noise", "not_enough_data"]
+
+MULTIPLE = 3.0
+"""Largest RMS error of a whole run or of a segment that an all-clear allows, in units of the
+noise."""
+CHANCE = 0.005
+"""Probability, for a true model, of a pattern in the residual as clear as one that is told."""
+SEGMENT = LENGTHS[0]
+"""Length of the windows whose residual force may have a pattern, s."""
+SAMPLES = 30
+"""Fewest samples that tell anything."""
+WINDOWS, MOVES = 4, 8.0
+"""Fewest windows in which the joint moves by so many times the noise that tell anything."""
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """Whether the model is within the noise of the runs.
+
+    Attributes:
+        verdict: within it; beyond it; or too few data to tell.
+        run, segment: what is missed by most; None if there is none.
+        pattern: probability that a true model leaves as clear a pattern of residual force (Wald and
+            Wolfowitz's runs test and a sign test, Bonferroni-corrected); None with too few windows.
+    """
+
+    verdict: Adequate
+    run: Missed | None
+    segment: Missed | None
+    pattern: float | None
+
+
+def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
+    """The verdict on a model.
+
+    Args:
+        measured: the joint and its runs.
+        found: errors of their replays.
+        rows: of `joda.measured.failing.window_rows`.
+    """
+    whole = [one for one in found.missed if one.time is None]
+    pieces = [one for one in found.missed if one.time is not None]
+    run, segment = (max(some, key=_multiple, default=None) for some in (whole, pieces))
+    pattern = residual_pattern(rows)
+    samples = sum(len(run.time) for run in measured.runs)
+    complete = len(whole) == len(measured.runs) and bool(pieces)
+    verdict: Adequate = "within_noise"
+    if samples < SAMPLES or not found.missed:
+        verdict = "not_enough_data"
+    elif max(map(_multiple, found.missed)) >= MULTIPLE or (pattern or 1.0) < CHANCE:
+        verdict = "beyond_noise"
+    elif not complete or pattern is None or _moving(measured) < WINDOWS:
+        verdict = "not_enough_data"
+    return Adequacy(verdict, run, segment, pattern)
+
+
+def _multiple(one: Missed) -> float:
+    return one.multiple
+
+
+def _moving(measured: Measured) -> int:
+    """In how many windows of the runs the joint moves by clearly more than the noise."""
+    count = 0
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        window = ((run.time - run.time[0]) / SEGMENT).astype(int)
+        first = np.flatnonzero(np.diff(window, prepend=-1))
+        travel = np.maximum.reduceat(run.position, first) - np.minimum.reduceat(run.position, first)
+        count += int(np.sum(travel > MOVES * sigma))
+    return count
+
+
+def residual_pattern(rows: Array) -> float | None:
+    """Probability of signs of the residual force as uneven as these, were the model true.
+
+    Noise makes either sign as often, in each direction of motion, in any order: over time,
+    position and velocity.
+
+    Args:
+        rows: of `joda.measured.failing.window_rows`, in the order of time.
+
+    Returns:
+        Bonferroni-corrected p-value of the runs tests (Wald and Wolfowitz, Ann. Math. Stat. 11
+        (1940) 147) and sign tests; None for fewer than `WINDOWS` windows.
+    """
+    force, doubt = rows[:, FORCE], rows[:, FORCE + 1]
+    rows = rows[np.isfinite(force) & np.isfinite(doubt) & (doubt > 0) & (force != 0)]
+    if len(rows) < WINDOWS:
+        return None
+    sign = rows[:, FORCE] > 0
+    values = [_sign_test(sign[way]) for way in (rows[:, 2] > 0, rows[:, 2] < 0)]
+    values += [
+        _runs_test(sign[np.argsort(key, kind="stable")])
+        for key in (np.arange(len(rows)), rows[:, 0], rows[:, 1])
+    ]
+    return float(min(1.0, len(values) * min(values)))
+
+
+def _sign_test(sign: NDArray[np.bool_]) -> float:
+    return float(binomtest(int(sign.sum()), len(sign)).pvalue) if len(sign) else 1.0
+
+
+def _runs_test(sign: NDArray[np.bool_]) -> float:
+    """One-sided, normal approximation: fewer runs of one sign than by chance."""
+    n, a = len(sign), int(sign.sum())
+    b = n - a
+    if min(a, b) < 2:
+        return 1.0
+    runs = 1 + int(np.sum(sign[1:] != sign[:-1]))
+    mean = 1 + 2 * a * b / n
+    variance = (mean - 1) * (mean - 2) / (n - 1)
+    return float(norm.cdf((runs + 0.5 - mean) / np.sqrt(variance))) if variance > 0 else 1.0

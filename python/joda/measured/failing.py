@@ -1,0 +1,190 @@
+"""Where a model fails: windows sorted by position, velocity, direction, time and load."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.measured import smoothing
+from joda.measured.places import BINS, places
+from joda.measured.reading import Measured
+from joda.measured.replay import Window
+from joda.measured.runs import Run
+
+Array = NDArray[np.float64]
+By = Literal["position", "velocity", "direction", "time", "load"]
+
+LENGTHS = (0.1, 0.4, 1.6)
+"""Windows that tell where a model fails, s: longer ones where shorter ones show nothing, as a small
+force needs time to move a joint."""
+PIECES = 10
+"""Of a whole run's replay, where no window shows what its end does."""
+LONGEST = 10.0
+"""Of a run whose mean residual force is told from its start, s."""
+AGREE = 0.8
+"""Part of the evidence that must have the sign of the mean force for that force to be told."""
+FORCE = 8
+"""Column of the rows: residual force; the next is its standard deviation."""
+COLUMNS = 10
+
+
+@dataclass(frozen=True)
+class Failing:
+    """Where the model fails.
+
+    Attributes:
+        by: what is told apart.
+        interval: of it: normalised position, rad/s or m/s, -1 to 0 or 0 to 1 (direction), s, N·m
+            or N.
+        error: RMS position error of windows there, rad or m.
+        force: mean force that the model has too much there, N·m or N; None where it changes its
+            sign there, or is not known.
+        share: of the sum of squared errors beyond the noise, 0 to 1.
+        significant: whether noise alone would hardly ever make such an error.
+    """
+
+    by: By
+    interval: tuple[float, float]
+    error: float
+    force: float | None
+    share: float
+    significant: bool
+
+
+def where(
+    measured: Measured, paths: Sequence[Array], short: Array, beyond: bool
+) -> tuple[list[Failing], float]:
+    """Where the model fails, by the shortest windows that show it.
+
+    Args:
+        measured: the joint and its runs.
+        paths: the model's positions at each run's times.
+        short: rows of the shortest windows.
+        beyond: whether the model is beyond the noise: then longer windows and whole runs are
+            searched where these show nothing.
+
+    Returns:
+        intervals, the largest share first; and the length of the windows that told, s, 0 for
+        pieces of whole runs.
+    """
+    found = failing(short)
+    if found or not beyond:
+        return found, LENGTHS[0]
+    for length in LENGTHS[1:]:
+        if found := failing(window_rows(measured, length)):
+            return found, length
+    return failing(_whole_rows(measured, paths)), 0.0
+
+
+def failing(rows: Array) -> list[Failing]:
+    """Where windows are missed by more than noise, the largest share first.
+
+    Args:
+        rows: of `window_rows`.
+    """
+    if not len(rows):
+        return []
+    values, found = rows[:, :5], rows[:, 5:]
+    beyond = np.maximum(found[:, 2] - found[:, 1], 0.0)
+    out = []
+    for column, by in enumerate(("position", "velocity", "direction", "time", "load")):
+        out += _by(by, values[:, column], found, beyond)  # type: ignore[arg-type]
+    return sorted(out, key=lambda place: (not place.significant, -place.share))
+
+
+def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
+    """A row per window; slow sampling makes windows longer.
+
+    Columns: normalised position, velocity, direction / 2, time, load; RMS misfit, samples, sum of
+    squares in units of the noise, residual force, its standard deviation.
+    """
+    rows = []
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        least = (smoothing.LEAST + 1) * float(np.median(np.diff(run.time)))
+        for window in measured.replayer.windows(run, sigma, max(length, least)):
+            rows.append(_row(measured, run, sigma, window))
+    return np.array(rows).reshape(-1, COLUMNS)
+
+
+def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
+    """The same of pieces of whole runs; the force is the whole run's, NaN if that is long."""
+    rows = []
+    for run, sigma, path in zip(measured.runs, measured.sigma, paths, strict=True):
+        there = np.flatnonzero(~np.isnan(path))
+        duration = float(np.ptp(run.time))
+        force = doubt = float("nan")
+        if duration <= LONGEST and len(there) == len(run.time):
+            whole = measured.replayer.windows(run, sigma, duration)
+            force, doubt = (whole[0].force, whole[0].doubt) if len(whole) == 1 else (force, doubt)
+        for samples in np.array_split(there, PIECES):
+            if len(samples) > 1:
+                misfit = path[samples] - run.position[samples]
+                rows.append(_row(measured, run, sigma, Window(samples, misfit, force, doubt)))
+    return np.array(rows).reshape(-1, COLUMNS)
+
+
+def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[float]:
+    lo, hi = measured.profile.joint.range
+    found = measured.context
+    ends = window.samples[[0, -1]]
+    middle = float(run.position[window.samples].mean())
+    speed = float(np.diff(run.position[ends])[0] / np.diff(run.time[ends])[0])
+    gravity = float(np.interp(middle, found.positions, found.gravity_force))
+    load = float(run.force[window.samples].mean()) + gravity
+    square = float(np.sum((window.misfit / sigma) ** 2))
+    error = float(np.sqrt(np.mean(window.misfit**2)))
+    place = (middle - lo) / (hi - lo)
+    row = [place, speed, 0.5 * float(np.sign(speed)), float(run.time[ends].mean()), load]
+    return [*row, error, len(window.misfit), square, window.force, window.doubt]
+
+
+def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
+    """Neighbouring bins of one quantity that fail, as intervals."""
+    if not beyond.sum() or (by not in ("direction", "time") and np.ptp(values) == 0):
+        return []
+    out = []
+    for interval, inside in places(
+        _edges(by, values), values, found, apart=by in ("velocity", "load")
+    ):
+        rows = found[inside]
+        force, alike = _force(rows[:, 3], rows[:, 4])
+        if by == "direction" and not alike:
+            continue  # what changes its sign within a direction is not the direction's
+        out.append(
+            Failing(
+                by=by,
+                interval=interval,
+                error=float(np.sqrt(np.average(rows[:, 0] ** 2, weights=rows[:, 1]))),
+                force=force if alike else None,
+                share=float(beyond[inside].sum() / beyond.sum()),
+                significant=True,
+            )
+        )
+    return out
+
+
+def _force(force: Array, doubt: Array) -> tuple[float, bool]:
+    """Mean residual force, weighted by how well it is known, and whether most have its sign."""
+    known = np.isfinite(force) & np.isfinite(doubt) & (doubt > 0)
+    if not known.any():
+        return float("nan"), False
+    force, weight = force[known], (doubt[known] / doubt[known].min()) ** -2.0
+    mean = float(np.average(force, weights=weight))
+    evidence = weight * np.abs(force)
+    alike = float(evidence[np.sign(force) == np.sign(mean)].sum())
+    return mean, alike >= AGREE * float(evidence.sum())
+
+
+def _edges(by: By, values: Array) -> Array:
+    """Of the bins: even, and never on both sides of zero where the sign is a direction."""
+    if by == "direction":
+        return np.array([-1.0, 0.0, 1.0])
+    if by == "position":
+        return np.linspace(0, 1, BINS + 1)
+    lo, hi = float(values.min()), float(values.max()) + 1e-9
+    if by == "time" or lo * hi >= 0:
+        return np.linspace(lo, hi, BINS + 1)
+    below = min(max(round(BINS * lo / (lo - hi)), 1), BINS - 1)
+    return np.concatenate([np.linspace(lo, 0, below + 1), np.linspace(0, hi, BINS - below + 1)[1:]])

@@ -1,0 +1,20 @@
+"""Sizes of what a model misses."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.measured.replay import Window
+
+Array = NDArray[np.float64]
+
+
+def joined(windows: Sequence[Window]) -> Array:
+    """The misfits of all windows."""
+    return np.concatenate([window.misfit for window in windows] or [np.zeros(0)])
+
+
+def rms(values: Array) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
