@@ -6,9 +6,9 @@ python tests/hidden_bench.py forced --cases 50      one line
 python tests/hidden_bench.py forced --seed 7 --out forced.jsonl    goes on where it was stopped
 
 Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
-all. `cover` tells whether the true size and place lie within what is said, of cases in which only
-the true effect is asked for; `sure` the same and how sure the answers are, of forced and free. Every
-run draws a new master seed, from which all cases follow.
+all. `cover`: whether the true size and place lie within what is said, where only the true effect is
+asked for. `sure`: forced and free, the same and how sure the answers are. Every run draws a new
+master seed, from which all cases follow.
 """
 
 import argparse
