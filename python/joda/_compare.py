@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from joda.files import check_target, write_together
 from joda.measured.comparison import (
+    SHORT,
     Comparison,
     failing,
     sentences,
@@ -18,6 +19,7 @@ from joda.measured.curves import curve_error, failing_force
 from joda.measured.errors import errors
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
 from joda.measured.reading import Measured, read_measured
+from joda.measured.replay import left_out
 from joda.measured.stepping import timestep_note
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
@@ -76,7 +78,7 @@ def compare(
         failing=tuple(failing(short)),
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
         failing_force=tuple(failing_force(measured.curves, described)),
-        notes=(*measured.notes, *([note] if note else [])),
+        notes=(*measured.notes, *left_out(measured.runs, SHORT), *([note] if note else [])),
     )
     files: dict[Path, bytes | str] = {}
     if json:
