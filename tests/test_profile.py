@@ -160,7 +160,11 @@ def test_each_mistake_in_a_file_has_its_sentence(tmp_path, sentence, edits):
         (b"{joint: 1}", "not JSON (key must be a string at line 1 column 2)."),
         (b"", "not JSON (EOF while parsing a value at line 1 column 0)."),
         (b"[]", "must be an object."),
-        (b'{"a": "\xff"}', "not a UTF-8 text file (byte 7)."),
+        (
+            b'{"a": "\xff"}',
+            "not a UTF-8 text file (byte 7, line 1); if it is text, in Latin-1 or Windows-1252 "
+            "perhaps, save it as UTF-8.",
+        ),
     ],
 )
 def test_what_is_no_json_document_has_its_sentence(tmp_path, content, sentence):

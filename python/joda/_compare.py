@@ -15,6 +15,7 @@ from joda.measured.errors import Errors, errors
 from joda.measured.failing import LENGTHS, Failing, where, window_rows
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
 from joda.measured.reading import Measured, read_measured
+from joda.measured.replay import left_out
 from joda.measured.stepping import timestep_note
 from joda.measured.visited import unvisited
 from joda.pictures.page import page, paragraph, table
@@ -78,7 +79,7 @@ def compare(
         failing_window=length,
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
         failing_force=tuple(failing_force(measured.curves, described)),
-        notes=(*measured.notes, *([note] if note else [])),
+        notes=(*measured.notes, *left_out(measured.runs, LENGTHS[0]), *([note] if note else [])),
     )
     files: dict[Path, bytes | str] = {}
     if json:

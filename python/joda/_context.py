@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from joda.profile import Joint
+from joda.scenes.angles import range_doubt
 from joda.scenes.model import describe_joint, find_joint, load_model, moves_with
 from joda.scenes.motion import gravity_force
 
@@ -72,6 +73,11 @@ class Context(BaseModel):
     names: tuple[str, ...]
     around: tuple[str, ...]
 
+    @property
+    def doubt(self) -> str:
+        """A sentence on what cannot be meant as it stands in the model; else nothing."""
+        return range_doubt(self.joint)
+
     def describe(self) -> str:
         """The context in a few lines for a person."""
         joint, hinge = self.joint, self.joint.type == "hinge"
@@ -93,6 +99,7 @@ class Context(BaseModel):
             **({"driven by": "an actuator"} if self.driven else {}),
             "names": ", ".join(self.names[:12]),
             "part of": ", ".join(self.around),
+            **({"doubtful": self.doubt} if self.doubt else {}),
         }
         return "\n".join(f"{name + ':':12} {text}" for name, text in rows.items())
 

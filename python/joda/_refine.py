@@ -15,6 +15,8 @@ from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
 from joda.files import check_target, write_together
 from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
+from joda.measured.excerpts import excerpts
+from joda.measured.reading import checked
 from joda.measured.runs import QuasiStatic, Run, read_measurement
 from joda.pictures.changes import changes
 from joda.pictures.style import png
@@ -128,16 +130,20 @@ def refine(
     spec, compiled = load(source)
     number = find_joint(compiled, joint)
     name = joint_name(compiled, number)
+    found = context(source, name)
+    notes = checked([*measured, *held_out], found, float(compiled.opt.timestep))
     profiles = profiles_of(spec, compiled)
     if name not in profiles:
         raise JodaError(
             f"{source}: joint '{name}' carries no profile; make one with joda generate, or attach "
             "one with joda attach."
         )
-    before, found = profiles[name], context(source, name)
-    begin = before
+    before = begin = profiles[name]
     for _ in range(finer):
         begin = resolved(begin)
+    timed = [one for one in measured if isinstance(one, Run)]
+    parts, _, cut = excerpts(timed)
+    measured, notes = [*parts] if timed else measured, [*notes, *cut]
     unit = gravity_scale(found, begin)
     parameters = Parameters(begin, fit, keep_shape=keep_shape, gravity=unit)
     if not len(parameters.start):
@@ -149,14 +155,14 @@ def refine(
     after = parameters.written(result.theta)
     errors = problem.rms(parameters.start), problem.rms(result.theta)
     windows = problem.windows(result.theta)
-    checked = None
+    apart = None
     if held_out:
         other = _problem(found, compiled, number, parameters, held_out)
-        checked = other.rms(parameters.start), other.rms(result.theta)
+        apart = other.rms(parameters.start), other.rms(result.theta)
     hidden = unseen(begin, parameters, result.covariance)
-    also, said = _beyond(parameters, result.theta, compiled, number, found)
-    scene, notes = attached(source, after, target, joint=name, also=also)
-    notes += [*said, *problem.notes]
+    also, more = _beyond(parameters, result.theta, compiled, number, found)
+    scene, said = attached(source, after, target, joint=name, also=also)
+    notes += [*said, *more, *problem.notes]
     balance = np.array(found.positions), -np.array(found.gravity_force)
     figure = picture(before, after, balance, problem, result, hidden)
     write_together(
@@ -164,7 +170,7 @@ def refine(
             target: scene,
             beside["composed.json"]: after.to_json(),
             beside["png"]: png(figure),
-            beside["history.json"]: history(result, errors, problem.sigma, checked, hidden),
+            beside["history.json"]: history(result, errors, problem.sigma, apart, hidden),
         }
     )
     if windows and errors[1] > PARTED * max(windows[1], problem.sigma):
@@ -184,7 +190,7 @@ def refine(
         after=errors[1],
         windows=windows,
         noise=problem.sigma,
-        checked=checked,
+        checked=apart,
         unseen=hidden,
         iterations=len(result.history),
         notes=tuple(notes),

@@ -3,10 +3,15 @@
 import os
 import tempfile
 from collections.abc import Mapping
+from io import BytesIO, TextIOWrapper
 from itertools import count
 from pathlib import Path
+from typing import TextIO
 
 from joda.errors import JodaError
+
+UTF16 = (b"\xff\xfe", b"\xfe\xff")
+"""Byte order marks; UTF-32 begins so too."""
 
 
 def cache_folder() -> Path:
@@ -16,14 +21,43 @@ def cache_folder() -> Path:
 
 def read_text(path: Path) -> str:
     """Text of a UTF-8 file; raises JodaError if it is missing, unreadable or not text."""
+    return _readable(path).decode("utf-8").removeprefix("\ufeff")
+
+
+def text_lines(path: Path) -> TextIO:
+    """The same line by line, whatever ends a line: for large tables."""
+    return TextIOWrapper(BytesIO(_readable(path)), "utf-8-sig", newline=None)
+
+
+def _readable(path: Path) -> bytes:
+    """Content of a UTF-8 file; raises JodaError if it is missing, unreadable or not text."""
     if path.is_char_device():  # it may never end
         raise JodaError(f"{path}: cannot be read (a device, no file).")
     try:
-        return path.read_bytes().decode("utf-8")
+        raw = path.read_bytes()
+        raw.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise JodaError(f"{path}: not a UTF-8 text file (byte {error.start}).") from None
+        raise JodaError(f"{path}: {_no_text(raw, error.start)}.") from None
     except OSError as error:
         raise JodaError(f"{path}: cannot be read ({error.strerror}).") from None
+    if (at := raw.find(b"\0")) >= 0:
+        raise JodaError(f"{path}: {_no_text(raw, at)}.")
+    return raw
+
+
+def _no_text(raw: bytes, at: int) -> str:
+    """What a file is that is not UTF-8 from some byte on, and what to do."""
+    some = raw[:4096]
+    if raw.startswith(UTF16) or max(some[::2].count(0), some[1::2].count(0)) > len(some) / 4:
+        return "not a UTF-8 text file, it looks like UTF-16; save it as UTF-8"
+    line = raw.count(b"\n", 0, at) + 1
+    place = f"(byte {at}, line {line})"
+    if b"\0" in raw:
+        return f"not a text file, or damaged: there is a NUL byte {place}; write it anew"
+    return (
+        f"not a UTF-8 text file {place}; if it is text, in Latin-1 or Windows-1252 perhaps, save "
+        "it as UTF-8"
+    )
 
 
 def check_target(path: Path, force: bool) -> None:

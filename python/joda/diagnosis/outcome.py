@@ -10,6 +10,7 @@ import numpy as np
 from joda._attach import attached
 from joda.diagnosis.mending import Error
 from joda.files import check_target
+from joda.measured.excerpts import excerpts
 from joda.measured.maps import draw_models, draw_runs, shade
 from joda.measured.reading import Measured, read_measured
 from joda.measured.visited import unvisited
@@ -25,7 +26,9 @@ PARTED = 5.0
 
 
 def read_runs(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
-    """As `joda.measured.reading.read_measured`; notes that curves beside runs say nothing.
+    """As `joda.measured.reading.read_measured`, but of long runs only parts.
+
+    It is noted where that is so, and that curves beside runs say nothing.
 
     Raises:
         JodaError: a file cannot be read, or what it holds cannot be of this joint.
@@ -36,7 +39,13 @@ def read_runs(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Meas
         for one in measured.curves
         if measured.runs
     )
-    return replace(measured, notes=measured.notes + ignored)
+    parts, of, cut = excerpts(measured.runs)
+    return replace(
+        measured,
+        runs=parts,
+        sigma=tuple(measured.sigma[k] for k in of),
+        notes=(*measured.notes, *ignored, *cut),
+    )
 
 
 def beside(scene: Path, force: bool) -> tuple[Path, Path]:

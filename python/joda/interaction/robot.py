@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
-from joda.measured.runs import read_columns
+from joda.measured.table import check_filled, check_increasing, read_table
 
 Array = NDArray[np.float64]
 
@@ -51,19 +51,15 @@ def read_targets(path: str | Path, model: mujoco.MjModel) -> Targets:
     names = [model.actuator(k).name for k in range(model.nu)]
     listed = ", ".join(f"'{name}'" for name in names if name) or "none"
     expected = f"time and actuators of the scene ({listed})"
-    lines, columns = read_columns(path, ["time", *filter(None, names)], expected)
+    table = read_table(path, ["time", *filter(None, names)], expected)
+    columns = table.columns
     driven = [name for name in columns if name != "time"]
-    if "time" not in columns or not driven or not lines:
-        has = ", ".join(columns) or "none"
-        raise JodaError(f"{path}: it needs {expected}; of these it has {has}, {len(lines)} rows.")
-    for name, column in columns.items():
-        missing = np.flatnonzero(np.isnan(column))
-        if len(missing):
-            raise JodaError(f"{path}, line {lines[missing[0]]}: {name} is empty; fill it in.")
-    back = np.flatnonzero(np.diff(columns["time"]) <= 0)
-    if len(back):
-        line = lines[back[0] + 1]
-        raise JodaError(f"{path}, line {line}: time does not increase; sort the rows by time.")
+    if "time" not in columns or not driven or not len(table.lines):
+        raise JodaError(
+            f"{path}: it needs {expected}; it has {table.has}, and {len(table.lines)} rows."
+        )
+    check_filled(table, list(columns), "fill it in")
+    check_increasing(table)
     return Targets(
         time=columns["time"],
         actuators=tuple(names.index(name) for name in driven),

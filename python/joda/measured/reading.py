@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 FINEST = 1e-6
 """Least noise, in units of the range."""
+STEPS = 5_000_000
+"""Most timesteps of a run that are simulated."""
 LEAST = 0.3
 """The same of a run, in units of the runs' usual noise: one encoder measured them all."""
 
@@ -100,6 +102,30 @@ class Measured:
         return replace(self, curves=tuple(curves))
 
 
+def checked(read: Sequence[Run | QuasiStatic], found: Context, timestep: float) -> list[str]:
+    """What is suspicious about measurements of a joint, a sentence each.
+
+    Args:
+        read: the measurements.
+        found: the joint.
+        timestep: of its scene, s.
+
+    Raises:
+        JodaError: they cannot be of this joint as they stand, or cannot be replayed.
+    """
+    doubts = [doubt for run in read for doubt in suspicions(run, found)]
+    for doubt in doubts:
+        if doubt.fatal:
+            raise JodaError(" ".join(filter(None, (doubt.sentence, found.doubt))))
+    for run in read:
+        if isinstance(run, Run) and (steps := np.ptp(run.time) / timestep) > STEPS:
+            raise JodaError(
+                f"{run.name}: {np.ptp(run.time):.4g} s are {steps:.2g} of the scene's timesteps of "
+                f"{timestep:g} s, which is too long to replay; cut the run into shorter ones."
+            )
+    return [*filter(None, [found.doubt]), *(doubt.sentence for doubt in doubts)]
+
+
 def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
     """Reads a joint and what was measured; raises JodaError, also for what cannot be of it."""
     if not runs:
@@ -111,18 +137,15 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
     found = context(source, name)
     bare = Profile(joint=describe_joint(compiled, number))
     profile = whole_profile(compiled, number, profiles_of(spec, compiled).get(name, bare))
+    step = float(compiled.opt.timestep)
     read = [read_measurement(path) for path in runs]
-    doubts = [doubt for run in read for doubt in suspicions(run, found)]
-    for doubt in doubts:
-        if doubt.fatal:
-            raise JodaError(doubt.sentence)
-    notes = [doubt.sentence for doubt in doubts]
+    notes = checked(read, found, step)
     timed = tuple(run for run in read if isinstance(run, Run))
     noises = [smoothing.noise(run.time, run.position) for run in timed]
     usual = float(np.median(noises)) if noises else 0.0
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     sigma = tuple(max(noise, least) for noise in noises)
-    own, step = single(found, profile, compiled, number), float(compiled.opt.timestep)
+    own = single(found, profile, compiled, number)
     replayer = Replayer(found, profile, own, step)
     static = [curve for curve in read if isinstance(curve, QuasiStatic)]
     if len(timed) == 1 and (

@@ -3,6 +3,7 @@
 The joint is simulated by itself (`joda.joints.rig`) under the measured force, from measured starts.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -21,12 +22,27 @@ Array = NDArray[np.float64]
 
 WINDOW = 0.4
 """Length of a window, s."""
+MOST = 1000
+"""Most windows of a run that are replayed."""
+AT_ONCE = 100_000
+"""Steps of a whole run that are held in memory together."""
 TRIES = 5
 """Replays, each from a better start than the best before, or nearer to it."""
 START = 3.0
 """How far a start may be from the measured one, in its standard deviations."""
 FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 APPLIED = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+
+
+def left_out(runs: Sequence[Run], shortest: float) -> list[str]:
+    """A sentence for each run of which not every window of this length (s) is replayed."""
+    lasting = [(run.name, float(np.ptp(run.time))) for run in runs]
+    return [
+        f"{name}: {duration:.4g} s are replayed as a whole, and in at most {MOST} windows of each "
+        "length, evenly spread."
+        for name, duration in lasting
+        if duration > MOST * shortest
+    ]
 
 
 @dataclass(frozen=True)
@@ -70,24 +86,32 @@ class Replayer:
         begun = smoothing.smooth(run.time[known], run.position[known], run.time[:1], sigma)
         rests = smoothing.begins_at_rest(run.time[known], run.position[known], sigma)
         start = np.array([[begun.position[0], 0.0 if rests else begun.velocity[0]]])
-        time = run.time[known] - run.time[0]
+        time, force = run.time[known] - run.time[0], run.force[known]
         steps = int(np.ceil(time[-1] / self.h)) + 1
-        forces = np.interp(self.h * np.arange(steps), time, run.force[known])
         mujoco.mj_resetData(self.model, self.data)
-        path = self._roll(start, forces[None])[0][0]
-        out[known] = np.interp(time, self.h * np.arange(steps + 1), path)
+        for first in range(0, steps, AT_ONCE):
+            at = self.h * np.arange(first, min(first + AT_ONCE, steps) + 1)
+            paths, last = self._roll(start, np.interp(at[:-1], time, force)[None])
+            mujoco.mj_setState(self.model, self.data, last[0], FULL)
+            start = np.array([[self.data.qpos[0], self.data.qvel[0]]])
+            own = slice(*np.searchsorted(time, (at[0], at[-1])))
+            out[own] = np.interp(time[own], at, paths[0])
         return out
 
     def windows(self, run: Run, sigma: float, length: float = WINDOW) -> list[Window]:
-        """The run in windows one after another; where the force is unknown there are none."""
+        """The run in windows one after another; where the force is unknown there are none.
+
+        Of more than `MOST` windows so many are replayed, evenly spread over the run.
+        """
         steps = max(round(length / self.h), 2)
         length = steps * self.h
         count = int((run.time[-1] - run.time[0]) / length + 1e-9)
-        begins = run.time[0] + length * np.arange(max(count, 1))
+        begins = run.time[0] + length * _spread(max(count, 1))
         pieces, kept = [], []
-        for begin in begins:
-            inside = (run.time >= begin - 1e-9) & (run.time <= begin + length + 1e-9)
-            samples = np.flatnonzero(inside)
+        first = np.searchsorted(run.time, begins - 1e-9)
+        last = np.searchsorted(run.time, begins + length + 1e-9, side="right")
+        for begin, a, b in zip(begins, first, last, strict=True):
+            samples = np.arange(a, b)
             if len(samples) >= smoothing.LEAST and not np.isnan(run.force[samples]).any():
                 pieces.append(samples)
                 kept.append(begin)
@@ -104,10 +128,10 @@ class Replayer:
         least, best = np.full(len(kept), np.inf), dict[int, Window]()
         for _ in range(TRIES):
             tried = np.clip(near + step, -START, START)
-            paths = self._nearby(starts + doubts * tried, doubts, forces, push)
-            for k, samples in enumerate(pieces):
+            nearby = self._nearby(starts + doubts * tried, doubts, forces, push)
+            for k, (samples, paths) in enumerate(zip(pieces, nearby, strict=True)):
                 place = (run.time[samples] - at[k]) / self.h
-                path = np.stack([np.interp(place, np.arange(steps + 1), p) for p in paths[:, k]])
+                path = np.stack([np.interp(place, np.arange(steps + 1), p) for p in paths])
                 misfit = path[0] - run.position[samples]
                 square = np.sum((misfit / sigma) ** 2) + np.sum(tried[k] ** 2)
                 if k not in best or square < least[k]:
@@ -118,22 +142,21 @@ class Replayer:
                     step[k] /= 4
         return [best[k] for k in range(len(kept))]
 
-    def _nearby(self, starts: Array, doubts: Array, forces: Array, push: float) -> Array:
+    def _nearby(self, starts: Array, doubts: Array, forces: Array, push: float) -> Iterator[Array]:
         """Paths from the starts, from starts one doubt off, and under another constant force.
 
         What has a memory (friction, play) keeps it from one window to the next.
 
-        Returns:
-            shape (4, windows, steps + 1).
+        Yields:
+            of each window, shape (4, steps + 1).
         """
         off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
         pushed = np.array([0.0, 0.0, 0.0, push])
-        out = np.empty((4, len(starts), forces.shape[1] + 1))
         mujoco.mj_resetData(self.model, self.data)
-        for k, (start, doubt, force) in enumerate(zip(starts, doubts, forces, strict=True)):
-            out[:, k], last = self._roll(start + doubt * off, force + pushed[:, None])
+        for start, doubt, force in zip(starts, doubts, forces, strict=True):
+            paths, last = self._roll(start + doubt * off, force + pushed[:, None])
             mujoco.mj_setState(self.model, self.data, last[0], FULL)
-        return out
+            yield paths
 
     def _roll(self, starts: Array, forces: Array) -> tuple[Array, Array]:
         """Positions from starts (k, 2) under forces (k, steps), with the memory in `data`.
@@ -149,6 +172,11 @@ class Replayer:
             self.model, self.data, initial, forces[:, :, None], control_spec=APPLIED
         )
         return np.hstack([starts[:, :1], states[:, :, 1]]), states[:, -1]
+
+
+def _spread(count: int) -> Array:
+    """At most `MOST` of the numbers below `count`, evenly."""
+    return np.round(np.linspace(0, count - 1, min(count, MOST)))
 
 
 def _fitted(

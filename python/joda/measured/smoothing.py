@@ -78,14 +78,17 @@ def departures(time: Array, position: Array) -> Array:
     Returns:
         about the samples from the third to the last but two, in their unit; shape (n - 4,).
     """
-    n = len(time)
-    t = np.stack([time[k : n - 4 + k] for k in range(5)], axis=1)
-    y = np.stack([position[k : n - 4 + k] for k in range(5)], axis=1)
-    gaps = t[:, :, None] - t[:, None, :]
-    np.einsum("nkk->nk", gaps)[:] = 1.0
-    weights = 1 / gaps.prod(axis=2)
-    weights /= np.sqrt((weights**2).sum(axis=1, keepdims=True))
-    return np.asarray((weights * y).sum(axis=1))
+    n = len(time) - 4
+    t = [time[k : n + k] for k in range(5)]
+    difference, square = np.zeros(n), np.zeros(n)
+    for k in range(5):
+        weight = np.ones(n)
+        for other in range(5):
+            if other != k:
+                weight /= t[k] - t[other]
+        difference += weight * position[k : n + k]
+        square += weight**2
+    return difference / np.sqrt(square)
 
 
 def resolution(position: Array) -> float:
@@ -116,7 +119,11 @@ def smooth(time: Array, position: Array, at: Array, sigma: float) -> Smooth:
     Returns:
         arrays of shape (m,).
     """
-    return Smooth(*np.array([_local(time, position, t0, sigma) for t0 in at]).T)
+    low = np.maximum(np.searchsorted(time, at - 1.01 * WINDOWS[-1]) - LEAST, 0)
+    high = np.searchsorted(time, at + 1.01 * WINDOWS[-1]) + LEAST
+    near = [slice(a, b) for a, b in zip(low, high, strict=True)]  # what no window reaches is left
+    pairs = zip(near, at, strict=True)
+    return Smooth(*np.array([_local(time[k], position[k], t0, sigma) for k, t0 in pairs]).T)
 
 
 def begins_at_rest(time: Array, position: Array, sigma: float) -> bool:

@@ -8,7 +8,9 @@ from joda._context import Context
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.smoothing import resolution
 from joda.measured.suspicions.base import Kind, Suspicion, suspect
-from joda.measured.suspicions.force import balance_of_curve, balance_of_run, wrong_sign
+from joda.measured.suspicions.clock import too_slow, wrong_clock
+from joda.measured.suspicions.columns import counted, unread
+from joda.measured.suspicions.force import balance_of_curve, balance_of_run, too_large, wrong_sign
 from joda.measured.suspicions.position import coarse, hardly_moved, noise, placed
 from joda.measured.suspicions.timing import gapped, repeated, slowly_sampled, uneven
 from joda.measured.suspicions.velocity import wrong_velocity
@@ -32,13 +34,19 @@ def suspicions(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
     if n < least:
         told = f"{n} samples are too few to tell anything; record at least {least}"
         return [suspect(run, "short", told)]
+    if isinstance(run, Run) and (told := wrong_clock(run)):
+        return [suspect(run, "clock", told)]
+    if told := too_large(run, context):
+        return [suspect(run, "force_size", told)]
     found, position = placed(run, context)
     step, sigma = resolution(position), noise(run, position)
-    sentences: dict[Kind, str] = {}
+    sentences: dict[Kind, str] = {"unread": unread(run)}
     if still := hardly_moved(position, context, step, sigma):
-        sentences = {"still": still}
+        sentences |= {"still": still}
     elif isinstance(run, Run):
-        sentences = {
+        sentences |= {
+            "origin": counted(run),
+            "clock": too_slow(run, position, context),
             "resolution": coarse(position, step, sigma, unit),
             "uneven_time": uneven(run),
             "gap": gapped(run),
@@ -48,5 +56,5 @@ def suspicions(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
             "force_sign": wrong_sign(balance_of_run(run, position, sigma, context)),
         }
     else:
-        sentences = {"force_sign": wrong_sign(balance_of_curve(run, position))}
+        sentences |= {"force_sign": wrong_sign(balance_of_curve(run, position))}
     return found + [suspect(run, kind, told) for kind, told in sentences.items() if told]

@@ -14,6 +14,11 @@ Kind = Literal[
     "zero",
     "outside",
     "resolution",
+    "clock",
+    "origin",
+    "unread",
+    "ticks",
+    "force_size",
     "uneven_time",
     "gap",
     "stale",
@@ -22,7 +27,7 @@ Kind = Literal[
     "force_sign",
 ]
 
-FATAL = {"short", "degrees", "millimetres", "sign", "zero"}
+FATAL = {"short", "clock", "degrees", "millimetres", "ticks", "sign", "zero", "force_size"}
 
 
 @dataclass(frozen=True)

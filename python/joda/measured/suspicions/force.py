@@ -1,5 +1,6 @@
 """Whether a measured force has the sign of what was applied, from the balance of forces."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -14,6 +15,11 @@ Array = NDArray[np.float64]
 
 HATS = 24
 """Most functions of which a force that depends on position is made up."""
+
+
+THROWN, SOON = 1e6, 0.01
+"""Ranges that a joint at rest would fly between two samples under a force that can't be meant; the
+time between samples where there is none, s."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +45,9 @@ def balance_of_run(run: Run, position: Array, sigma: float, context: Context) ->
         return None
     spacing = max(0.05, 5 * np.median(np.diff(time)), (time[-1] - time[0]) / 200)
     edge = np.unique(np.searchsorted(time[:-1], np.arange(time[0], time[-1], spacing)))
-    place, velocity, doubt = _smooth(time, position, edge, sigma)
-    slow = 3 * np.median(doubt) + 0.01 * np.abs(velocity).max()
+    smooth = smoothing.smooth(time, position, time[edge], sigma)
+    velocity = smooth.velocity
+    slow = 3 * np.median(smooth.velocity_error) + 0.01 * np.abs(velocity).max()
     middle, steps = (position[1:] + position[:-1]) / 2, np.diff(time)
 
     def impulses(values: Array) -> Array:
@@ -52,24 +59,13 @@ def balance_of_run(run: Run, position: Array, sigma: float, context: Context) ->
     gravity = np.interp(position, context.positions, context.gravity_force)
     friction = np.tanh(np.interp(time, time[edge], velocity) / max(slow, 1e-12))
     momentum = context.equivalent_inertia * np.diff(velocity)
-    opposing = [momentum - impulses(gravity), impulses(friction), np.diff(place)]
+    opposing = [momentum - impulses(gravity), impulses(friction), np.diff(smooth.position)]
     use = impulses((~known).astype(float)) == 0
     return Balance(
         impulses(np.nan_to_num(run.force))[use],
         np.stack(opposing, axis=1)[use],
-        impulses(_hats(middle, min(HATS, len(edge) // 4)))[use],
+        np.stack([impulses(hat)[use] for hat in _hats(middle, len(edge) // 4)], axis=1),
     )
-
-
-def _smooth(time: Array, position: Array, edge: NDArray[np.intp], sigma: float) -> Array:
-    """Position, velocity and its error at some samples, each from those near it."""
-    wide, out = smoothing.WINDOWS[-1], []
-    for t in time[edge]:
-        low, high = np.searchsorted(time, (t - wide, t + wide))
-        near = slice(max(low - smoothing.LEAST, 0), high + smoothing.LEAST)
-        one = smoothing.smooth(time[near], position[near], np.array([t]), sigma)
-        out.append((one.position[0], one.velocity[0], one.velocity_error[0]))
-    return np.array(out).T
 
 
 def _one_way(position: Array) -> bool:
@@ -77,6 +73,21 @@ def _one_way(position: Array) -> bool:
     some = position[:: max(len(position) // 200, 1)]
     back = np.clip(np.diff(some), 0, None).sum(), np.clip(-np.diff(some), 0, None).sum()
     return bool(min(back) < 0.5 * np.ptp(position))
+
+
+def too_large(run: Run | QuasiStatic, context: Context) -> str:
+    """Speaks where the largest force can't be one: within a sample it throws the joint away."""
+    largest = float(np.nanmax(np.abs(run.force), initial=0.0))
+    lo, hi = context.joint.range
+    interval = float(np.median(np.diff(run.time))) if isinstance(run, Run) else SOON
+    if largest / context.equivalent_inertia * interval**2 < THROWN * (hi - lo):
+        return ""
+    unit = context.joint.force_unit
+    return (
+        f"the force is up to {largest:.3g} {unit}, which would throw a joint with an inertia of "
+        f"{context.equivalent_inertia:.3g} {'kg·m²' if unit == 'N·m' else 'kg'} away at once; "
+        f"correct it, in {unit}"
+    )
 
 
 def balance_of_curve(run: QuasiStatic, position: Array) -> Balance | None:
@@ -87,14 +98,15 @@ def balance_of_curve(run: QuasiStatic, position: Array) -> Balance | None:
     k = np.arange(len(position))
     ahead, behind = np.minimum(k + m, k[-1]), np.maximum(k - m, 0)
     travel = np.sign(position[ahead] - position[behind])[:, None]
-    return Balance(run.force, travel, _hats(position, min(HATS, len(position) // 4)))
+    return Balance(run.force, travel, np.stack([*_hats(position, len(position) // 4)], axis=1))
 
 
-def _hats(position: Array, count: int) -> Array:
-    """Piecewise linear functions that add up to one over what was visited; shape (n, count)."""
-    nodes = np.linspace(position.min(), position.max(), max(count, 2))
-    away = np.abs(position[:, None] - nodes) / (nodes[1] - nodes[0])
-    return np.asarray(np.maximum(1 - away, 0.0))
+def _hats(position: Array, most: int) -> Iterator[Array]:
+    """Piecewise linear functions that add up to one over what was visited; shape (n,) each."""
+    count = max(min(HATS, most), 2)
+    nodes, apart = np.linspace(position.min(), position.max(), count, retstep=True)
+    for node in nodes:
+        yield np.maximum(1 - np.abs(position - node) / apart, 0.0)
 
 
 def wrong_sign(balance: Balance | None) -> str:

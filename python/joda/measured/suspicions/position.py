@@ -32,6 +32,8 @@ def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], A
     if 0 < np.sum(position != run.position) <= max(FEW * len(position), 3):
         return glitches, position
     found, position = _unit(run, context)
+    if any(one.kind == "ticks" for one in found):
+        return found, position
     if _fits(run, position, context):
         return found, position
     lo, hi = context.joint.range
@@ -59,14 +61,29 @@ def _unit(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], Ar
     far, many = (3.0, 180 / np.pi) if hinge else (10.0, 1000.0)
     position = run.position / many
     fits = np.ptp(position) <= hi - lo + 2 * _room(run, position, context)
-    if np.ptp(run.position) < far * (hi - lo) or not fits:
+    if np.ptp(run.position) < far * (hi - lo):
         return [], run.position
+    if not fits:
+        return _ticks(run, context), run.position
     kind: Kind = "degrees" if hinge else "millimetres"
+    remedy = "multiply them by π/180" if hinge else "divide them by 1000 (centimetres: by 100)"
     told = (
         f"positions {_from_to(run.position)} are far beyond {_range(context)} and look like "
-        f"{kind}; {'multiply them by π/180' if hinge else 'divide them by 1000'}"
+        f"{kind}; {remedy}"
     )
     return [suspect(run, kind, told)], position
+
+
+def _ticks(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
+    """Whether the positions are counts of an encoder."""
+    if np.any(run.position != np.round(run.position)):
+        return []
+    full = "2π" if context.joint.type == "hinge" else "the way of one turn in m"
+    told = (
+        f"positions {_from_to(run.position)} are whole numbers far beyond {_range(context)} and "
+        f"look like an encoder's ticks; multiply them by {full} and divide by its ticks per turn"
+    )
+    return [suspect(run, "ticks", told)]
 
 
 def _outside(
