@@ -82,7 +82,7 @@ def windows_of(
             same = np.full(many, number)
             parts.append((force, step + begins, fresh, start, doubts, same))
             window = np.where(enough[window] & _thinned(window), window + count, -1)
-            noise = spread, _rough(time, run.force[piece], run.forced)
+            noise = spread, smoothing.force_error(time, run.force[piece], run.forced)
             samples.append((step + index, place - index, position, time, window, *noise))
             step, count = step + steps, count + many
     force, at, fresh, start, doubts, run_of = (np.concatenate(x) for x in zip(*parts, strict=True))
@@ -142,15 +142,6 @@ def _spread(time: Array, position: Array, sigma: float) -> Array:
     own = smoothing.deviation(smoothing.departures(time, position)[fast[2:-2]])
     late = np.sqrt(max(own**2 - (CLEAR * sigma) ** 2, 0.0)) / np.median(smooth[fast])
     return np.asarray(np.hypot(sigma, late * smooth))
-
-
-def _rough(time: Array, force: Array, forced: bool) -> Array:
-    """Standard deviations of the force: its noise, and what it does between samples."""
-    if not forced:
-        return np.zeros(len(time))
-    bends = np.zeros(len(force))
-    bends[1:-1] = np.abs(np.diff(force, 2)) / 8  # a line through a parabola misses it by as much
-    return np.hypot(smoothing.noise(time, force), np.maximum(bends, np.roll(bends, -1)))
 
 
 def _whitener(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:

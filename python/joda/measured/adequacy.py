@@ -22,6 +22,8 @@ Adequate = Literal["within_noise", "beyond_noise", "not_enough_data"]
 MULTIPLE = 3.0
 """Largest RMS error of a whole run or of a segment that an all-clear allows, in units of the
 noise."""
+EXPLAINED = 3.0
+"""So many times what errors of the measured start and force make may be these errors' still."""
 CHANCE = 0.005
 """Probability, for a true model, of a pattern in the residual as clear as one that is told."""
 SEGMENT = LENGTHS[0]
@@ -38,7 +40,8 @@ class Adequacy:
 
     Attributes:
         verdict: within it; beyond it; or too few data to tell.
-        run, segment: what is missed by most; None if there is none.
+        run, segment: the whole run and the window that are missed by most, those first that the
+            measurement's own errors do not explain; None if there is none.
         pattern: probability that a true model leaves as clear a pattern of residual force (Wald and
             Wolfowitz's runs test and a sign test, Bonferroni-corrected); None with too few windows.
     """
@@ -59,22 +62,36 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     """
     whole = [one for one in found.missed if one.time is None]
     pieces = [one for one in found.missed if one.time is not None]
-    run, segment = (max(some, key=_multiple, default=None) for some in (whole, pieces))
+    run, segment = (max(some, key=_beyond, default=None) for some in (whole, pieces))
     pattern = residual_pattern(rows)
     samples = sum(len(run.time) for run in measured.runs)
     complete = len(whole) == len(measured.runs) and bool(pieces)
     verdict: Adequate = "within_noise"
     if samples < SAMPLES or not found.missed:
         verdict = "not_enough_data"
-    elif max(map(_multiple, found.missed)) >= MULTIPLE or (pattern or 1.0) < CHANCE:
+    elif any(map(_fault, found.missed)) or (pattern is not None and pattern < CHANCE):
         verdict = "beyond_noise"
-    elif not complete or pattern is None or _moving(measured) < WINDOWS:
+    elif (
+        not complete
+        or max(map(_multiple, found.missed)) >= MULTIPLE
+        or pattern is None
+        or _moving(measured) < WINDOWS
+    ):
         verdict = "not_enough_data"
     return Adequacy(verdict, run, segment, pattern)
 
 
 def _multiple(one: Missed) -> float:
     return one.multiple
+
+
+def _beyond(one: Missed) -> tuple[bool, float]:
+    return _fault(one), one.multiple
+
+
+def _fault(one: Missed) -> bool:
+    """Whether it is missed by more than the measurement's own errors make."""
+    return one.multiple >= MULTIPLE and one.multiple > EXPLAINED * one.explained
 
 
 def _moving(measured: Measured) -> int:

@@ -91,14 +91,17 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
             f"{MULTIPLE:g} times the noise, and the residual force has no pattern; these runs show "
             "no fault of the model."
         )
+    worst = [one for one in (found.run, found.segment) if one and one.multiple >= MULTIPLE]
+    if found.verdict == "not_enough_data" and worst:
+        told = ", and ".join(map(_explained, worst))
+        yield f"Not enough to tell whether the model is right: {told}."
     elif found.verdict == "not_enough_data":
         yield (
             "Not enough to tell whether the model is right: too few samples, or too little motion "
             "in them."
         )
-    worst = [_worst(one) for one in (found.run, found.segment) if one and one.multiple >= MULTIPLE]
-    if worst:
-        yield f"Beyond the noise: {', and '.join(worst)}."
+    elif found.verdict == "beyond_noise" and worst:
+        yield f"Beyond the noise: {', and '.join(map(_worst, worst))}."
     elif found.verdict == "beyond_noise" and found.pattern is not None:
         yield (
             f"Small, but not noise: every run and window is missed by less than {MULTIPLE:g} times "
@@ -110,14 +113,20 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
 
 
 def _worst(one: Missed) -> str:
-    much = (
-        f"{one.multiple:.2g} times the noise" if one.multiple < 1e6 else "more than a million times"
-    )
     if one.time is None:
-        return f"{one.file} as a whole is missed by {much}"
+        return f"{one.file} as a whole is missed by {_much(one)}"
     first, last = one.time
-    return f"its window at {first:.3g} to {last:.3g} s".replace("its", f"{one.file}'s") + (
-        f" by {much}"
+    return f"the window of {one.file} at {first:.3g} to {last:.3g} s by {_much(one)}"
+
+
+def _much(one: Missed) -> str:
+    return f"{one.multiple:.2g} times the noise" if one.multiple < 1e6 else "more than can be told"
+
+
+def _explained(one: Missed) -> str:
+    return (
+        f"{_worst(one)}, of which errors of the measured start and force alone can make "
+        f"{one.explained:.2g} times the noise"
     )
 
 

@@ -41,11 +41,13 @@ class Missed:
     Attributes:
         file: of the run.
         multiple: RMS error in units of the run's noise; infinite if the simulation went astray.
+        explained: what errors of the measured start and force alone make of it, in the same units.
         time: of the window, s from and to; None for the whole run.
     """
 
     file: str
     multiple: float
+    explained: float = 0.0
     time: tuple[float, float] | None = None
 
 
@@ -96,7 +98,8 @@ def errors(
         left.append(joined(pieces))
         whole = rms(off[-1])
         if len(off[-1]):
-            missed.append(Missed(run.name, _multiple(whole, sigma)))
+            scatter = measured.replayer.scatter(run, sigma) if windows else 0.0
+            missed.append(Missed(run.name, _multiple(whole, sigma), scatter / sigma))
         missed += [_missed(run, sigma, piece) for piece in pieces]
         reason = _reason(run, whole, pieces) if windows else None
         rows.append(RunError(run.name, _known(whole), _known(rms(left[-1])), sigma, reason))
@@ -117,7 +120,7 @@ def _multiple(error: float, sigma: float) -> float:
 def _missed(run: Run, sigma: float, window: Window) -> Missed:
     first, last = run.time[window.samples[[0, -1]]]
     multiple = _multiple(rms(window.misfit), sigma)
-    return Missed(run.name, multiple, (float(first), float(last)))
+    return Missed(run.name, multiple, window.scatter / sigma, (float(first), float(last)))
 
 
 def _known(error: float) -> float | None:

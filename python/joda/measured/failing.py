@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.measured import smoothing
+from joda.measured.misfit import rms
 from joda.measured.places import BINS, places
 from joda.measured.reading import Measured
 from joda.measured.replay import Window
@@ -23,6 +24,9 @@ PIECES = 10
 """Of a whole run's replay, where no window shows what its end does."""
 LONGEST = 10.0
 """Of a run whose mean residual force is told from its start, s."""
+BLIND = 3.0
+"""Error, in units of the noise and of what errors of start and force make, up to which they are
+not enough to blame the model."""
 AGREE = 0.8
 """Part of the evidence that must have the sign of the mean force for that force to be told."""
 FORCE = 8
@@ -103,9 +107,15 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
     rows = []
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         least = (smoothing.LEAST + 1) * float(np.median(np.diff(run.time)))
-        for window in measured.replayer.windows(run, sigma, max(length, least)):
-            rows.append(_row(measured, run, sigma, window))
+        windows = measured.replayer.windows(run, sigma, max(length, least))
+        rows += [_row(measured, run, sigma, window) for window in windows if _tells(window, sigma)]
     return np.array(rows).reshape(-1, COLUMNS)
+
+
+def _tells(window: Window, sigma: float) -> bool:
+    """Whether its misfit is more than errors of its start and force can make, or near the noise."""
+    error = rms(window.misfit)
+    return error < BLIND * sigma or error > BLIND * window.scatter
 
 
 def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
@@ -134,10 +144,9 @@ def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[flo
     gravity = float(np.interp(middle, found.positions, found.gravity_force))
     load = float(run.force[window.samples].mean()) + gravity
     square = float(np.sum((window.misfit / sigma) ** 2))
-    error = float(np.sqrt(np.mean(window.misfit**2)))
     place = (middle - lo) / (hi - lo)
     row = [place, speed, 0.5 * float(np.sign(speed)), float(run.time[ends].mean()), load]
-    return [*row, error, len(window.misfit), square, window.force, window.doubt]
+    return [*row, rms(window.misfit), len(window.misfit), square, window.force, window.doubt]
 
 
 def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:

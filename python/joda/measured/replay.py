@@ -4,7 +4,7 @@ The joint is simulated by itself (`joda.joints.rig`) under the measured force, f
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -26,6 +26,10 @@ MOST = 1000
 """Most windows of a run that are replayed."""
 AT_ONCE = 100_000
 """Steps of a whole run that are held in memory together."""
+HORIZON = 2.0
+"""How much of a whole run, s, tells its start."""
+ENSEMBLE = 8
+"""Replays that tell how far errors of the start and the force move a whole run."""
 TRIES = 5
 """Replays, each from a better start than the best before, or nearer to it."""
 START = 3.0
@@ -54,13 +58,15 @@ class Window:
         misfit: predicted minus measured positions, rad or m, shape (n,), from the start that suits
             best within its measurement's error.
         force: how much force the model has too much on the whole, N·m or N.
-        doubt: its standard deviation from the position's noise.
+        doubt: its standard deviation from the noise of position and force.
+        scatter: RMS by which errors of the start and of the force alone move the replay, rad or m.
     """
 
     samples: NDArray[np.intp]
     misfit: Array
     force: float
     doubt: float
+    scatter: float = 0.0
 
 
 class Replayer:
@@ -77,26 +83,84 @@ class Replayer:
 
     def whole(self, run: Run, sigma: float) -> Array:
         """Predicted positions at the run's times, from its start; NaN where force is unknown on."""
-        unknown = np.flatnonzero(np.isnan(run.force))
-        end = int(unknown[0]) if len(unknown) else len(run.time)
         out = np.full(len(run.time), np.nan)
-        if end < smoothing.LEAST:
-            return out
-        known = slice(0, end)
-        begun = smoothing.smooth(run.time[known], run.position[known], run.time[:1], sigma)
-        rests = smoothing.begins_at_rest(run.time[known], run.position[known], sigma)
-        start = np.array([[begun.position[0], 0.0 if rests else begun.velocity[0]]])
+        if known := _known(run):
+            time, force = run.time[known] - run.time[0], run.force[known]
+            start = self._start(time, run.position[known], force, sigma)[0]
+            out[known] = self._replay(time, start[None], force[None])[0]
+        return out
+
+    def scatter(self, run: Run, sigma: float) -> float:
+        """RMS by which errors of the measured start and force alone move a whole run's replay.
+
+        An ensemble of replays: from starts within their errors, under forces with their noise. Near
+        a barrier, or over minutes, it may be far more than the position's noise.
+        """
+        known = _known(run)
+        if not known:
+            return 0.0
         time, force = run.time[known] - run.time[0], run.force[known]
+        start, spread = self._start(time, run.position[known], force, sigma)
+        rng = np.random.default_rng(0)
+        starts = start + rng.standard_normal((ENSEMBLE, 2)) @ spread.T
+        off = smoothing.force_error(time, force, run.forced)
+        forces = force + off * rng.standard_normal((ENSEMBLE, len(time)))
+        paths = self._replay(time, np.vstack([start, starts]), np.vstack([force, forces]))
+        return float(np.sqrt(np.mean((paths[1:] - paths[0]) ** 2)))
+
+    def _replay(self, time: Array, starts: Array, forces: Array) -> Array:
+        """Positions at some times from starts (k, 2), under forces (k, n); shape (k, n).
+
+        Args:
+            time: s, from 0 on, shape (n,).
+            starts: position and velocity.
+            forces: at these times.
+        """
+        out = np.empty(forces.shape)
         steps = int(np.ceil(time[-1] / self.h)) + 1
         mujoco.mj_resetData(self.model, self.data)
+        states = self._placed(starts)
         for first in range(0, steps, AT_ONCE):
             at = self.h * np.arange(first, min(first + AT_ONCE, steps) + 1)
-            paths, last = self._roll(start, np.interp(at[:-1], time, force)[None])
-            mujoco.mj_setState(self.model, self.data, last[0], FULL)
-            start = np.array([[self.data.qpos[0], self.data.qvel[0]]])
+            applied = np.stack([np.interp(at[:-1], time, force) for force in forces])
+            paths, states = self._roll(states, applied)
             own = slice(*np.searchsorted(time, (at[0], at[-1])))
-            out[own] = np.interp(time[own], at, paths[0])
+            out[:, own] = np.stack([np.interp(time[own], at, path) for path in paths])
         return out
+
+    def _start(
+        self, time: Array, position: Array, force: Array, sigma: float
+    ) -> tuple[Array, Array]:
+        """Position and velocity at the beginning, shape (2,), and a factor of their covariance.
+
+        Those of the smoothed samples, moved within their errors to where the model follows the
+        first `HORIZON` seconds best: a velocity that is a little off is a position that is far off
+        at the end of a run.
+        """
+        begun = smoothing.smooth(time, position, time[:1], sigma)
+        rests = smoothing.begins_at_rest(time, position, sigma)
+        first = np.array([begun.position[0], 0.0 if rests else begun.velocity[0]])
+        doubt = np.array([begun.position_error[0], 0.0 if rests else begun.velocity_error[0]])
+        early = time <= HORIZON
+        forces = np.tile(force[early], (3, 1))
+        off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+        covariance = np.eye(2)
+        near, step = np.zeros(2), np.zeros(2)
+        least = np.inf
+        for _ in range(TRIES):
+            tried = np.clip(near + step, -START, START)
+            found = self._replay(time[early], first + doubt * (tried + off), forces) / sigma
+            misfit = found[0] - position[early] / sigma
+            square = float(misfit @ misfit + tried @ tried)
+            if square >= least or not np.isfinite(found).all():
+                step = step / 4
+                continue
+            least, near = square, tried
+            rows = np.vstack([(found[1:] - found[0]).T, np.eye(2)])
+            wanted = np.concatenate([misfit, tried])
+            step = np.linalg.lstsq(rows, -wanted, rcond=None)[0]
+            covariance = np.linalg.inv(rows.T @ rows)
+        return first + doubt * near, doubt[:, None] * np.linalg.cholesky(covariance)
 
     def windows(self, run: Run, sigma: float, length: float = WINDOW) -> list[Window]:
         """The run in windows one after another; where the force is unknown there are none.
@@ -140,7 +204,9 @@ class Replayer:
                     step[k], best[k] = _fitted(samples, misfit, slopes, near[k], sigma, push)
                 else:
                     step[k] /= 4
-        return [best[k] for k in range(len(kept))]
+        if not run.forced:
+            return [best[k] for k in range(len(kept))]
+        return [_with_force(best[k], run, self.inertia) for k in range(len(kept))]
 
     def _nearby(self, starts: Array, doubts: Array, forces: Array, push: float) -> Iterator[Array]:
         """Paths from the starts, from starts one doubt off, and under another constant force.
@@ -154,24 +220,36 @@ class Replayer:
         pushed = np.array([0.0, 0.0, 0.0, push])
         mujoco.mj_resetData(self.model, self.data)
         for start, doubt, force in zip(starts, doubts, forces, strict=True):
-            paths, last = self._roll(start + doubt * off, force + pushed[:, None])
+            states = self._placed(start + doubt * off)
+            paths, last = self._roll(states, force + pushed[:, None])
             mujoco.mj_setState(self.model, self.data, last[0], FULL)
             yield paths
 
-    def _roll(self, starts: Array, forces: Array) -> tuple[Array, Array]:
-        """Positions from starts (k, 2) under forces (k, steps), with the memory in `data`.
+    def _placed(self, starts: Array) -> Array:
+        """Full states at starts (k, 2), with the memory in `data`; shape (k, size)."""
+        out = np.empty((len(starts), mujoco.mj_stateSize(self.model, FULL)))
+        for row, (position, velocity) in zip(out, starts, strict=True):
+            self.data.qpos[0], self.data.qvel[0] = position, velocity
+            mujoco.mj_getState(self.model, self.data, row, FULL)
+        return out
+
+    def _roll(self, initial: Array, forces: Array) -> tuple[Array, Array]:
+        """Positions from full states under forces (k, steps).
 
         Returns:
             positions, shape (k, steps + 1), and the last full states.
         """
-        initial = np.empty((len(starts), mujoco.mj_stateSize(self.model, FULL)))
-        for row, (position, velocity) in zip(initial, starts, strict=True):
-            self.data.qpos[0], self.data.qvel[0] = position, velocity
-            mujoco.mj_getState(self.model, self.data, row, FULL)
         states, _ = rollout.rollout(
             self.model, self.data, initial, forces[:, :, None], control_spec=APPLIED
         )
-        return np.hstack([starts[:, :1], states[:, :, 1]]), states[:, -1]
+        return np.hstack([initial[:, 1:2], states[:, :, 1]]), states[:, -1]
+
+
+def _known(run: Run) -> slice | None:
+    """From the beginning to where the force is unknown; None if that is too short."""
+    unknown = np.flatnonzero(np.isnan(run.force))
+    end = int(unknown[0]) if len(unknown) else len(run.time)
+    return slice(0, end) if end >= smoothing.LEAST else None
 
 
 def _spread(count: int) -> Array:
@@ -208,4 +286,23 @@ def _fitted(
         misfit=misfit,
         force=float(-push * all_three[2]),
         doubt=float(push * np.sqrt(inverse[2, 2])),
+        scatter=float(sigma * np.sqrt(np.mean(np.sum(slopes[:, :2] ** 2, axis=1)))),
+    )
+
+
+def _with_force(window: Window, run: Run, inertia: float) -> Window:
+    """The window, with what errors of the recorded force add to its doubt and scatter.
+
+    White noise of acceleration moves a free joint by a random walk of its velocity: a variance of
+    noise² gap t³ / 3 after a time t.
+    """
+    time = run.time[window.samples]
+    error = smoothing.force_error(time, run.force[window.samples], forced=True)
+    off = float(np.sqrt(np.mean(error**2)))
+    length, count = float(np.ptp(time)), len(time)
+    moved = off / inertia * float(np.sqrt(length**4 / (12 * max(count - 1, 1))))
+    return replace(
+        window,
+        doubt=float(np.hypot(window.doubt, off / np.sqrt(count))),
+        scatter=float(np.hypot(window.scatter, moved)),
     )

@@ -62,6 +62,24 @@ def noise(time: Array, position: Array) -> float:
     return max(white, resolution(position) / 12**0.5)
 
 
+def force_error(time: Array, force: Array, forced: bool) -> Array:
+    """Standard deviations of a recorded force: its noise, and what it does between samples.
+
+    Args:
+        time: s, shape (n,).
+        force: N·m or N, known, shape (n,).
+        forced: whether it was recorded; else there is none.
+
+    Returns:
+        shape (n,).
+    """
+    if not forced:
+        return np.zeros(len(time))
+    bends = np.zeros(len(force))
+    bends[1:-1] = np.abs(np.diff(force, 2)) / 8  # a line through a parabola misses it by as much
+    return np.hypot(noise(time, force), np.maximum(bends, np.roll(bends, -1)))
+
+
 def deviation(values: Array) -> float:
     """Standard deviation of noise about zero, from the median, which outliers hardly move."""
     # Median of |x| of a normal distribution is 0.6745 of its standard deviation.
