@@ -20,7 +20,7 @@ By = Literal["position", "velocity", "direction", "time", "load"]
 LENGTHS = (0.1, 0.4, 1.6)
 """Windows that tell where a model fails, s: longer ones where shorter ones show nothing, as a small
 force needs time to move a joint."""
-PIECES = 10
+PIECES = 40
 """Of a whole run's replay, where no window shows what its end does."""
 LONGEST = 10.0
 """Of a run whose mean residual force is told from its start, s."""

@@ -32,7 +32,7 @@ def suspicions(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
     timed, unit = isinstance(run, Run), context.joint.unit
     n, least = len(run.position), LEAST_RUN if timed else LEAST_CURVE
     if n < least:
-        told = f"{n} samples are too few to tell anything; record at least {least}"
+        told = f"{n} samples are not enough to tell anything; record at least {least}"
         return [suspect(run, "short", told)]
     if isinstance(run, Run) and (told := wrong_clock(run)):
         return [suspect(run, "clock", told)]

@@ -1,0 +1,84 @@
+"""The paired test of held-out windows and runs, and what is implausible to add."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_compare import door, runs_of, scene_of
+
+from joda.component import Component
+from joda.diagnosis.better import improves, risen
+from joda.diagnosis.plausible import EXCESS, Needs, implausible, unseen_place
+from joda.effects import StribeckFriction
+from joda.measured.reading import read_measured
+from joda.measured.visited import unvisited, unvisited_part, visited_share
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "better"),
+    [
+        ([9.0] * 6, [1.0] * 6, True),  # 1 of 64 sign patterns is as good
+        ([9.0] * 4 + [1.0], [1.0] * 4 + [9.0], False),  # as good in 2 of 32 and more
+        ([9.0] * 3, [1.0] * 3, True),  # few, but none is worse
+        ([9.0] * 3, [1.0] * 2 + [20.0], False),
+        ([1.0] * 50, [1.1] * 50, False),  # within the noise nothing counts
+        ([50.0] + [1.0] * 9, [1.0] + [3.0] * 9, False),  # one window decides nothing
+        ([np.inf] * 6, [1.0] * 6, True),
+    ],
+)
+def test_windows_are_better_only_beyond_chance(before, after, better):
+    assert improves(np.array(before), np.array(after)) == better
+
+
+def test_of_many_windows_chance_is_rarely_called_better():
+    rng = np.random.default_rng()
+    pairs = rng.lognormal(1.0, 1.0, (300, 2, 30))
+    assert np.mean([improves(*pair) for pair in pairs]) < 0.1  # 5 %, and chance
+
+
+def test_the_geometric_mean_of_whole_runs():
+    assert risen(np.array([2.0, 8.0]), np.array([4.0, 4.0])) == pytest.approx(1.0)
+    assert risen(np.array([0.1, 0.2]), np.array([0.9, 1.0])) == 1.0  # below the noise
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plausible")
+    return read_measured(scene_of(door(), folder), "joint", runs_of(door(), folder, 4))
+
+
+def test_a_force_that_nothing_needs_is_refused(measured):
+    needs = Needs(measured).force
+    assert 1.0 < needs < 200.0  # pushes of some N·m
+    for force, refused in ((2 * needs, False), (2 * EXCESS * needs, True)):
+        effect = StribeckFriction(velocity=0.1, y=(force, force))
+        reason = implausible(measured, measured.profile.with_effect(effect), "stribeck_friction")
+        assert bool(reason) == refused, reason
+        part = Component(
+            label="detent_internal", interval=(0.3, 0.6), x=(0, 0.5, 1), y=(0, force, 0)
+        )
+        profile = measured.profile.with_component("conservative", part)
+        assert bool(implausible(measured, profile, "detent_internal")) == refused
+
+
+def test_where_no_run_was_is_told_in_closed_form(measured):
+    lo, hi = measured.profile.joint.range
+    ends = [(run.position.min(), run.position.max()) for run in measured.runs]
+    first = (min(a for a, _ in ends) - lo) / (hi - lo)
+    last = (max(b for _, b in ends) - lo) / (hi - lo)
+    cut = measured.with_runs(tuple(measured.runs[:1]))
+    away = unvisited(measured)
+    assert all(b <= first + 1e-9 or a >= last - 1e-9 for a, b in away)
+    assert sum(b - a for a, b in unvisited(cut)) >= sum(b - a for a, b in away)
+
+
+def test_an_effect_is_not_placed_where_nobody_was(measured):
+    lo, hi = measured.profile.joint.range
+    own = measured.runs[0]
+    high = lo + (hi - lo) * np.linspace(0.6, 0.9, len(own.time))
+    near = measured.with_runs((replace(own, position=high),))
+    a, b = unvisited_part(near, (0.0, 0.3))[0]
+    assert (a, b) == (0.0, 0.3)
+    assert visited_share(near, (0.0, 0.3)) == 0.0
+    assert "hardly any run visited s = 0.00 to 0.30" in unseen_place(near, (0.0, 0.3))
+    assert unseen_place(measured, None) is None
