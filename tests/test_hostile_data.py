@@ -14,10 +14,12 @@ import pytest
 
 import joda
 from joda import JodaError
+from joda.component import Component
 from joda.diagnosis.outcome import read_runs
 from joda.measured.excerpts import DURATION, SAMPLES
 from joda.measured.reading import read_measured
 from joda.measured.runs import read_measurement
+from joda.profile import Channels, Profile, Resistance
 
 SCENE = """<mujoco{angle}><option timestep="{step}"/><worldbody><body>
   <joint name="door" {joint} damping="{damping}" frictionloss="{friction}"/>
@@ -73,8 +75,14 @@ def simulated(xml, seconds=6.0, hertz=100.0, force=1.5, slow=1.0, seed=1) -> Log
 
 @pytest.fixture(scope="module")
 def door(tmp_path_factory):
-    path = tmp_path_factory.mktemp("door") / "door.xml"
-    path.write_text(scene())
+    folder = tmp_path_factory.mktemp("door")
+    plain, profile, path = (folder / name for name in ("plain.xml", "door.json", "door.xml"))
+    plain.write_text(scene())
+    flat = Component(label="hinge", interval=(0, 1), x=(0, 1), y=(0.05, 0.05))
+    joint = joda.context(plain, "door").joint
+    channels = Channels(damping=Resistance(components=(flat,)))
+    profile.write_text(Profile(joint=joint, channels=channels).to_json())
+    joda.attach(plain, [profile], path)
     return path
 
 
