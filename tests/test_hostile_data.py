@@ -14,10 +14,12 @@ import pytest
 
 import joda
 from joda import JodaError
+from joda.component import Component
 from joda.diagnosis.outcome import read_runs
 from joda.measured.excerpts import DURATION, SAMPLES
 from joda.measured.reading import read_measured
 from joda.measured.runs import read_measurement
+from joda.profile import Channels, Profile, Resistance
 
 SCENE = """<mujoco{angle}><option timestep="{step}"/><worldbody><body>
   <joint name="door" {joint} damping="{damping}" frictionloss="{friction}"/>
@@ -51,7 +53,7 @@ def scene(joint=DOOR, step=0.002, damping=0.3, friction=0.1, mass=8.0, angle="")
     )
 
 
-def simulated(xml, seconds=6.0, hertz=100.0, force=1.5, slow=1.0, seed=1) -> Log:
+def simulated(xml, seconds=6.0, hertz=100.0, force=1.5, slow=1.0, wave=True) -> Log:
     """MuJoCo's own motion under a force to and fro about the middle of the range."""
     model = mujoco.MjModel.from_xml_string(xml)
     data, h = mujoco.MjData(model), model.opt.timestep
@@ -60,21 +62,27 @@ def simulated(xml, seconds=6.0, hertz=100.0, force=1.5, slow=1.0, seed=1) -> Log
     out = []
     for k in range(int(seconds / h)):
         t = k * h / slow
-        wave = 1.2 * np.sin(3 * t) + 0.7 * np.sin(7.1 * t + 1)
         away = (data.qpos[0] - (lo + hi) / 2) / (hi - lo)
-        data.qfrc_applied[0] = force * (wave - 2 * away)
+        push = 1.2 * np.sin(3 * t) + 0.7 * np.sin(7.1 * t + 1) - 2 * away
+        data.qfrc_applied[0] = force * (push if wave else 0.5)
         out.append((k * h, data.qpos[0], data.qfrc_applied[0]))
         mujoco.mj_step(model, data)
     t, q, f = np.array(out).T
     time = np.arange(0, t[-1], 1 / hertz)
-    noise = 1e-4 * (hi - lo) * np.random.default_rng(seed).normal(size=len(time))
+    noise = 1e-4 * (hi - lo) * np.random.default_rng(1).normal(size=len(time))
     return Log(time, np.interp(time, t, q) + noise, np.interp(time, t, f))
 
 
 @pytest.fixture(scope="module")
 def door(tmp_path_factory):
-    path = tmp_path_factory.mktemp("door") / "door.xml"
-    path.write_text(scene())
+    folder = tmp_path_factory.mktemp("door")
+    plain, profile, path = (folder / name for name in ("plain.xml", "door.json", "door.xml"))
+    plain.write_text(scene())
+    flat = Component(label="hinge", interval=(0, 1), x=(0, 1), y=(0.05, 0.05))
+    joint = joda.context(plain, "door").joint
+    channels = Channels(damping=Resistance(components=(flat,)))
+    profile.write_text(Profile(joint=joint, channels=channels).to_json())
+    joda.attach(plain, [profile], path)
     return path
 
 
@@ -206,6 +214,11 @@ REFUSED = {
         "line 4: time does not increase: it goes back from 100 to 0.01, and in 599 rows",
         "a file of its own",
     ),
+    "turned round": (
+        lambda g: Log(g.time[::-1], g.position, g.force).text(),
+        "line 3: time does not increase: it goes back from 5.99 to 5.98, and in all rows",
+        "turn their order",
+    ),
     # --- positions and forces
     "degrees": (
         lambda g: placed(g, np.rad2deg(g.position)).text(),
@@ -241,6 +254,16 @@ REFUSED = {
         lambda g: with_cell(g, 1, "1e20"),
         "1 of 600 samples lie outside the range",
         "remove wrong samples",
+    ),
+    "an escape": (
+        lambda g: with_cell(g, 1, "\x1b[2J1"),
+        "line 42: position is '\\x1b[2J1'",
+        "must be a number",
+    ),
+    "milliradians": (
+        lambda g: placed(g, 1e3 * g.position).text(),
+        "of 600 samples lie outside the range 0 to 1.571 rad, the first at 0 s, by up to",
+        "check their unit (rad) and zero",
     ),
     "inf": (lambda g: with_cell(g, 1, "inf"), "line 42: position is 'inf'", "must be a number"),
     "nan": (
@@ -400,6 +423,39 @@ def test_what_can_only_be_meant_in_one_way_is_read_so(name, door, good, tmp_path
     assert all(noted in note for note in notes)
 
 
+DOUBTED = {
+    "constant position": (
+        lambda g: placed(g, np.full(len(g.time), 0.5)).text(),
+        "the joint hardly moved, 0 rad of 1.57; record a run in which it moves",
+    ),
+    "constant velocity": (
+        lambda g: "\n".join(["time,position,force,velocity", *(f"{row},0" for row in g.rows())]),
+        "the velocity is not the derivative of the position; correct it",
+    ),
+    "force turned": (
+        lambda g: replace(g, force=-g.force).text(),
+        "but only if its sign is turned",
+    ),
+    "time by another name": (
+        lambda g: g.text("Zeit,position,force"),
+        "column 'Zeit' is not read, and without time this is a quasi-static curve; if it is the "
+        "time, name it 'time'",
+    ),
+    "a pause": (
+        lambda g: joined(g, 8.0),
+        "a gap of 2.01 s after 5.99 s, where 10 ms is usual; cut the file there into two",
+    ),
+}
+"""How a file is made, and the note of what cannot be refused for sure."""
+
+
+@pytest.mark.parametrize("name", DOUBTED)
+def test_what_is_doubtful_is_said_and_used(name, door, good, tmp_path):
+    make, noted = DOUBTED[name]
+    path = written(tmp_path, make, good)
+    assert any(noted in note for note in read_measured(door, "door", [path]).notes)
+
+
 BUTTON = scene(SLIDE.format("0 0.003"), step=0.0002, damping=0.2, friction=0.02, mass=0.005)
 ODD = {
     "a button that goes 3 mm in 15 ms": (BUTTON, lambda: pressed(BUTTON)),
@@ -414,6 +470,7 @@ ODD = {
         lambda: simulated(scene(HINGE.format("-2 2"), damping=3), slow=0.5),
     ),
     "10 kHz": (scene(step=0.0005), lambda: simulated(scene(step=0.0005), seconds=2, hertz=1e4)),
+    "a constant force": (scene(), lambda: simulated(scene(), seconds=1.5, wave=False)),
     "a fifth of the range only": (scene(), lambda: simulated(scene(), force=0.4)),
 }
 """The scene, and what is right of it although it is unusual."""

@@ -130,15 +130,15 @@ def refine(
     spec, compiled = load(source)
     number = find_joint(compiled, joint)
     name = joint_name(compiled, number)
-    found = context(source, name)
-    notes = checked([*measured, *held_out], found, float(compiled.opt.timestep))
     profiles = profiles_of(spec, compiled)
     if name not in profiles:
         raise JodaError(
             f"{source}: joint '{name}' carries no profile; make one with joda generate, or attach "
             "one with joda attach."
         )
-    before = begin = profiles[name]
+    before, found = profiles[name], context(source, name)
+    notes = checked([*measured, *held_out], found, float(compiled.opt.timestep))
+    begin = before
     for _ in range(finer):
         begin = resolved(begin)
     timed = [one for one in measured if isinstance(one, Run)]

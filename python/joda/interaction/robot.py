@@ -56,7 +56,8 @@ def read_targets(path: str | Path, model: mujoco.MjModel) -> Targets:
     driven = [name for name in columns if name != "time"]
     if "time" not in columns or not driven or not len(table.lines):
         raise JodaError(
-            f"{path}: it needs {expected}; it has {table.has}, and {len(table.lines)} rows."
+            f"{path}: it needs {expected}; of these it has {', '.join(columns) or 'none'}, "
+            f"{len(table.lines)} rows."
         )
     check_filled(table, list(columns), "fill it in")
     check_increasing(table)

@@ -41,7 +41,7 @@ class Table:
     @property
     def has(self) -> str:
         """The columns of the file, in words."""
-        return ", ".join((*self.columns, *self.others))[:SHOWN] or "none"
+        return ", ".join((*self.columns, *self.others)) or "none"
 
 
 def read_table(path: Path, wanted: Sequence[str], expected: str) -> Table:
@@ -67,7 +67,7 @@ def read_table(path: Path, wanted: Sequence[str], expected: str) -> Table:
     if not any(names):
         raise JodaError(
             f"{path}, line {number}: no header row with {expected} but "
-            f"'{', '.join(header)[:SHOWN]}'; the first row must name the columns."
+            f"'{_shown(', '.join(header))}'; the first row must name the columns."
         )
     for name in wanted:
         if names.count(name) > 1:
@@ -88,7 +88,9 @@ def read_table(path: Path, wanted: Sequence[str], expected: str) -> Table:
         path=path,
         lines=np.array(lines, np.intp),
         columns={name: np.array(column) for name, column in values.items()},
-        others=tuple(cell for cell, name in zip(header, names, strict=True) if cell and not name),
+        others=tuple(
+            _shown(cell) for cell, name in zip(header, names, strict=True) if cell and not name
+        ),
     )
 
 
@@ -114,6 +116,8 @@ def check_increasing(table: Table) -> None:
         told = f"it is {after} in all rows; give each row its own time in seconds"
     elif after == before:
         told = f"it is {after} as in the row before; write it with more digits, or remove the row"
+    elif back == len(time) - 1:
+        told = f"it goes back from {before} to {after}, and in all rows; turn their order"
     elif back == 1:
         told = (
             f"it goes back from {before} to {after}; sort the rows by time, or if this is the "
@@ -170,8 +174,13 @@ def _number(path: Path, line: int, name: str, text: str) -> float:
     if not abs(value) < LARGEST:
         large = "" if np.isnan(value) or np.isinf(value) else ", too large to be meant"
         empty = "; where it is not known leave the cell empty" if name == "force" else ""
-        shown = text if len(text) < SHOWN else f"{text[:SHOWN]}..."
         raise JodaError(
-            f"{path}, line {line}: {name} is '{shown}'{large}; it must be a number{empty}."
+            f"{path}, line {line}: {name} is '{_shown(text)}'{large}; it must be a number{empty}."
         )
     return value if abs(value) > LEAST else 0.0
+
+
+def _shown(text: str) -> str:
+    """Text for a sentence: not too long, and with nothing that a terminal would obey."""
+    short = text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in short)

@@ -17,6 +17,8 @@ ROOM, SOFTNESS, MOST_ROOM = 0.02, 0.015, 0.1
 seconds at its highest speed, for a soft stop; as a share of the range, at most."""
 FEW = 0.02
 """Share of samples, beyond the range, that may be single wrong values."""
+MOSTLY = 0.3
+"""Share of samples beyond the range from which on they are no single wrong values."""
 STEPS = 40
 """An encoder with fewer steps over what the joint visited is coarse."""
 
@@ -95,10 +97,12 @@ def _outside(
     wrong = beyond > _room(run, position, context)
     if not wrong.any():
         return [], position
+    unit = context.joint.unit
+    first = f", the first at {run.time[wrong][0]:.6g} s," if isinstance(run, Run) else ","
+    few = "remove wrong samples" if wrong.mean() < MOSTLY else f"check their unit ({unit}) and zero"
     told = (
-        f"{run.name}: {wrong.sum()} of {len(position)} samples lie outside {_range(context)}, by "
-        f"up to {beyond.max():.3g} {context.joint.unit}; remove wrong samples, or correct the "
-        "model's range."
+        f"{run.name}: {wrong.sum()} of {len(position)} samples lie outside {_range(context)}"
+        f"{first} by up to {beyond.max():.3g} {unit}; {few}, or correct the model's range."
     )
     fatal = bool(beyond.max() > MOST_ROOM * (hi - lo))
     suspicion = Suspicion("outside", told, fatal)
