@@ -7,6 +7,7 @@ import typer
 
 from joda.cli import interrupt
 from joda.cli.options import Model
+from joda.cli.say import say
 
 
 def studio(
@@ -37,7 +38,7 @@ def studio(
     from joda import studio as run
 
     def ready(address: str) -> None:
-        print(f"{address}   (Ctrl-C ends it)", flush=True)
+        say(f"{address}   (Ctrl-C ends it)")
 
     run(scene, joint, runs or (), folder=folder, port=port, browser=browser, ready=ready)
     interrupt.forget()

@@ -12,6 +12,7 @@ from joda.measured.curves import CurveError, FailingForce, told
 from joda.measured.places import BINS, places
 from joda.measured.reading import Measured
 from joda.measured.replay import Window
+from joda.plain import plain
 
 Array = NDArray[np.float64]
 By = Literal["position", "velocity", "direction", "time", "load"]
@@ -97,7 +98,7 @@ class Comparison:
             "failing_force": [vars(place) for place in self.failing_force],
             "notes": list(self.notes),
         }
-        return dumps(content, indent=2, ensure_ascii=False) + "\n"
+        return plain(dumps(content, indent=2, ensure_ascii=False)) + "\n"
 
 
 def sentences(comparison: Comparison) -> list[str]:

@@ -6,9 +6,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from joda.errors import JodaError
-from joda.profile import Joint
+from joda.profile import Joint, describe
 
 _TYPES = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name
@@ -120,7 +121,7 @@ def describe_joint(
     """The joint as a profile knows it, over `limits` or else its own range.
 
     Raises:
-        JodaError: it has no range.
+        JodaError: it has no range, or a name or a range that no profile can have.
     """
     lo, hi = limits or map(float, model.jnt_range[joint])
     if not lo < hi:
@@ -128,9 +129,12 @@ def describe_joint(
             f"joint '{joint_name(model, joint)}' has no range; add range=\"lo hi\" to it."
         )
     hinge = joint_type(model, joint) == "hinge"
-    return Joint(
-        name=joint_name(model, joint),
-        type="hinge" if hinge else "slide",
-        range=(lo, hi),
-        unit="rad" if hinge else "m",
-    )
+    try:
+        return Joint(
+            name=joint_name(model, joint),
+            type="hinge" if hinge else "slide",
+            range=(lo, hi),
+            unit="rad" if hinge else "m",
+        )
+    except ValidationError as error:
+        raise JodaError(f"joint '{joint_name(model, joint)}': {describe(error)}") from None
