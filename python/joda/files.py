@@ -69,7 +69,7 @@ def fresh(name: str) -> Path:
 
 def file_name(name: str) -> str:
     """A part of a file's name that stands for `name`: no path, nothing special, not too long."""
-    return re.sub(r"[^\w.-]+", "_", name)[:MOST].strip("._") or "joint"
+    return re.sub(r"[^\w.-]+", "_", name)[:MOST].strip("._-") or "joint"
 
 
 def make_folder(path: Path) -> None:

@@ -8,7 +8,7 @@ that what is shown of JSON is the same JSON.
 import json
 import re
 
-_UNSEEN = re.compile(
+UNSEEN = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters but for tab and line feed
     "\xad\u061c\u180e\u200b\u200e\u200f\u202a-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"  # formats
     "\u2028\u2029\ufffe\uffff\ud800-\udfff\U000e0000-\U000e007f]"
@@ -26,7 +26,7 @@ def plain(text: str) -> str:
 
     Line feeds and tabs stay.
     """
-    return _UNSEEN.sub(lambda match: json.dumps(match[0])[1:-1], text)
+    return UNSEEN.sub(lambda match: json.dumps(match[0])[1:-1], text)
 
 
 def one_line(text: str) -> str:

@@ -127,10 +127,10 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None
 def tell_doors(result: "Demo") -> None:
     """What the demo's two doors did."""
     rows = zip(result.starts, result.plain_ends, result.joda_ends, strict=True)
-    for start, plain, ours in rows:
+    for start, without, ours in rows:
         say(
             f"Let go at {degrees(start):.0f} degrees, {result.duration:g} s later: without a "
-            f"profile at {degrees(plain):.1f}, with it at {abs(degrees(ours)):.1f} degrees."
+            f"profile at {degrees(without):.1f}, with it at {abs(degrees(ours)):.1f} degrees."
         )
     forces = zip(
         ("without a profile", "with it"), (result.plain_force, result.joda_force), strict=True
@@ -160,9 +160,7 @@ def tell_errors(result: "Refined", unit: str) -> None:
         first, last = result.windows
         say(f"The same over windows of 0.4 s: {first:.3g} → {last:.3g} {unit}.")
     if result.checked:
-        say(
-            f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS."
-        )
+        say(f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS.")
     for channel, places in result.unseen.items():
         if places:
             where = ", ".join(f"s = {a:.2f} to {b:.2f}" for a, b in places)

@@ -70,7 +70,9 @@ def overlay(
         panels = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
         draw_channels(panels, before, after, gravity)
         panels[0].legend(frameon=False, fontsize=9, ncols=3)
-        panels[0].set_title(f"{clean(after.joint.name)}: before and after", loc="left", parse_math=False)
+        panels[0].set_title(
+            f"{clean(after.joint.name)}: before and after", loc="left", parse_math=False
+        )
         panels[-1].set_xlabel(f"joint position ({after.joint.unit})")
         return figure
 

@@ -16,6 +16,8 @@ _TYPES = {
     for name in ("free", "ball", "slide", "hinge")
 }
 _SCALAR = ("hinge", "slide")
+LONGEST_NAME = 1000
+"""Bytes of a name in a model."""
 
 
 def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
@@ -26,11 +28,25 @@ def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
         spec = mujoco.MjSpec.from_file(str(path))
         model = spec.compile()
         bytes(model.names).decode()
-        return spec, model
     except UnicodeDecodeError:
         raise _not_utf8(path) from None
-    except (ValueError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:  # RuntimeError: out of memory
         raise JodaError(f"{path}: MuJoCo cannot load it: {sentence(error)}") from None
+    _check_bounds(path, model)
+    return spec, model
+
+
+def _check_bounds(path: Path, model: mujoco.MjModel) -> None:
+    """Raises JodaError for names that nobody can read and masses that make all else NaN."""
+    longest = max(map(len, bytes(model.names).split(b"\0")))
+    if longest > LONGEST_NAME:
+        raise JodaError(f"{path}: has a name of {longest} letters; give at most {LONGEST_NAME}.")
+    heaviest = max(model.body_mass.max(), model.body_inertia.max())
+    if heaviest > mujoco.mjMAXVAL:
+        raise JodaError(
+            f"{path}: has a mass or an inertia of {heaviest:.3g} kg or kg·m²; MuJoCo computes with "
+            f"at most {mujoco.mjMAXVAL:g}."
+        )
 
 
 def write_out(spec: mujoco.MjSpec, path: Path) -> bytes:
