@@ -234,11 +234,8 @@ class Anthropic:
         except ValueError:  # JSON that is cut off
             message = None
         if not usable(message):  # a web page, say
-            raise ProposalFailed(
-                f"{host(client)} does not answer as the Messages API does; check "
-                "ANTHROPIC_BASE_URL.",
-                tally.usage,
-            )
+            told = "does not answer as the Messages API does; check ANTHROPIC_BASE_URL."
+            raise ProposalFailed(f"{host(client)} {told}", tally.usage)
         return message
 
     def _collect(

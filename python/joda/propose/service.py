@@ -2,13 +2,14 @@
 
 import os
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 from urllib.parse import urlsplit
 
 from joda.errors import JodaError
 
 if TYPE_CHECKING:
     from anthropic import Anthropic as Client
+    from anthropic.types import Message
 
 SHORTEST_SECRET = 6
 """Letters; less is no secret but a word."""
@@ -63,7 +64,7 @@ def host(client: "Client") -> str:
     return f"{client.base_url.scheme}://{client.base_url.netloc.decode()}"
 
 
-def usable(message: Any) -> bool:
+def usable(message: Any) -> "TypeGuard[Message]":
     """Whether an answer is a message with texts and sensible counts of tokens."""
     usage, content = getattr(message, "usage", None), getattr(message, "content", None)
     counts = [getattr(usage, name, None) for name in ("input_tokens", "output_tokens")]
