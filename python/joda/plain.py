@@ -31,7 +31,7 @@ def plain(text: str) -> str:
 
 def one_line(text: str) -> str:
     """The same in one line of bounded length; what is left out is from the middle."""
-    line = " ".join(plain(" ".join(text.splitlines())).split("\t"))
+    line = plain(text).replace("\n", " ").replace("\t", " ")
     if len(line) > LONGEST:
         line = f"{line[: LONGEST - END - 3]}...{line[-END:]}"
     return line

@@ -15,6 +15,7 @@ from joda._studio.solids import Shape, shape
 from joda._studio.trajectories import Trajectories
 from joda._studio.view3d import View3D
 from joda.errors import JodaError
+from joda.plain import plain
 
 HERE = Path(__file__).parent
 BLUE = "#1f5fbf"
@@ -69,9 +70,9 @@ class Page:
         lo, hi = joint.range
         with ui.element("header").classes("top"):
             ui.label("joda studio").classes("brand")
-            ui.label(desk.scene.name).classes("file").tooltip(str(desk.scene))
+            ui.label(plain(desk.scene.name)).classes("file").tooltip(plain(str(desk.scene)))
             ui.label(
-                f"{joint.name} · {joint.type} · {lo:.4g} to {hi:.4g} {joint.unit}".replace(
+                f"{plain(joint.name)} · {joint.type} · {lo:.4g} to {hi:.4g} {joint.unit}".replace(
                     "-", "\N{MINUS SIGN}"
                 )
             ).classes("aside")
@@ -190,7 +191,7 @@ def serve(shared: Shared, port: int, browser: bool, ready: Callable[[str], None]
             root=lambda: Page(shared, solid) and None,
             host=HOST,
             port=port,
-            title=f"{shared.desk.scene.name} · joda studio",
+            title=f"{plain(shared.desk.scene.name)} · joda studio",
             show=browser and guard.address.removeprefix(f"http://{HOST}:{port}"),
             reload=False,
             show_welcome_message=False,

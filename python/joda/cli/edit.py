@@ -31,7 +31,7 @@ def studio(
 ) -> None:
     """Look at a joint in the browser, drag its curves, and save.
 
-    The page is served on this machine only. Ctrl-C ends it. Example:
+    The page is served on this machine only, to who has its address. Ctrl-C ends it. Example:
 
         joda studio oven/scene.xml --joint door
     """
