@@ -12,6 +12,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 
 LAYERS = [
+    {"plain"},
     {"errors", "_build", "_core", "component"},
     {"files", "plugin", "effects"},
     {"profile", "_doctor"},

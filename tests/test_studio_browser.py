@@ -11,6 +11,7 @@ import subprocess
 import sys
 from contextlib import closing
 from types import SimpleNamespace
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -99,7 +100,9 @@ def server(project):
     try:
         line = process.stdout.readline()
         assert line.startswith("http://127.0.0.1:"), line
-        yield SimpleNamespace(address=line.split()[0], process=process)
+        address = line.split()[0]
+        origin = address.partition("/?")[0] + "/"
+        yield SimpleNamespace(address=address, origin=origin, process=process)
     finally:
         process.kill()
         process.communicate()
@@ -345,7 +348,7 @@ def test_nothing_was_asked_of_the_network_and_nothing_failed(page, server):
             asked.add(message["params"]["request"]["url"])
     asked = {url for url in asked if not url.startswith(("data:", "blob:", "chrome"))}
     assert len(asked) > 10
-    assert {url for url in asked if not url.startswith(server.address)} == set()
+    assert {url for url in asked if not url.startswith(server.origin)} == set()
     failed = [
         entry["message"] for entry in page.browser.get_log("browser") if entry["level"] == "SEVERE"
     ]
@@ -353,7 +356,7 @@ def test_nothing_was_asked_of_the_network_and_nothing_failed(page, server):
 
 
 def test_it_listens_on_one_loopback_address_only(server):
-    port = int(server.address.rsplit(":", 1)[1])
+    port = urlsplit(server.address).port
     socket.create_connection(("127.0.0.1", port)).close()
     with pytest.raises(OSError, match="refused"):
         socket.create_connection(("127.0.0.2", port))

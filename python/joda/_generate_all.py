@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from joda._generate import ROUNDS, Generated, begin, check_rounds, choose, ranged, run
 from joda.errors import JodaError
-from joda.files import make_folder, read_text
+from joda.files import file_name, make_folder, read_text
 from joda.propose import Ask, BatchProposer, Proposer
 from joda.propose.session import Session
 from joda.scenes.model import load_model
@@ -145,7 +145,7 @@ def _jobs(source: Path, target: Path, joint: str | None, failed: Results) -> dic
             continue
         taken: set[str] = set()
         for name in names:
-            folder = target / stem / _unique(_file_name(name), taken)
+            folder = target / stem / _unique(file_name(name), taken)
             if joint in (None, name):
                 jobs[f"{stem}/{name}"] = _Job(path, name, folder)
             else:
@@ -201,7 +201,3 @@ def _unique(name: str, taken: set[str]) -> str:
         free = f"{name}_{number}"
     taken.add(free.lower())
     return free
-
-
-def _file_name(joint: str) -> str:
-    return re.sub(r"[^\w.-]+", "_", joint).strip("._") or "joint"

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from joda.errors import JodaError
+from joda.files import file_name
 from joda.pictures.draw import draw
 from joda.pictures.style import write_png
 from joda.profile import Profile
@@ -52,7 +53,7 @@ def plot(
     profile = profiles[name]
     positions = np.linspace(*profile.joint.range, 201)
     balance = -gravity_force(model, find_joint(model, name), positions)
-    suffix = f".{name}.png" if len(profiles) > 1 else ".png"
+    suffix = f".{file_name(name)}.png" if len(profiles) > 1 else ".png"
     target = Path(output) if output else source.with_suffix(suffix)
     write_png(draw(profile, (positions, balance)), target, force)
     return target

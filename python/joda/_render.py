@@ -5,7 +5,6 @@ of its motion, can be seen. All the work is done in a child process, see `joda.p
 """
 
 import io
-import re
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,10 +15,11 @@ import mujoco
 import numpy as np
 
 from joda.errors import JodaError
-from joda.files import check_target, make_folder, write_bytes
+from joda.files import check_target, file_name, make_folder, write_bytes
 from joda.pictures.caption import captioned
 from joda.pictures.offscreen import Image, answer, ask
 from joda.pictures.stage import Stage, View
+from joda.pictures.style import clean
 from joda.profile import Joint
 from joda.scenes.model import describe_joint, find_joint, load_model
 from joda.scenes.part import Array, moving
@@ -73,7 +73,7 @@ def _make(request: Any) -> list[str]:
         raise JodaError(f"{path}: joint '{joint.name}' moves no geom that can be seen.")
     stage = Stage(model, index)
     fractions = np.linspace(0, 1, count)
-    stem = re.sub(r"[^\w.-]+", "_", joint.name).strip("_") or "joint"
+    stem = file_name(joint.name)
     digits = max(2, len(str(count - 2)))
     make_folder(Path(folder))
     targets = [Path(folder) / f"{stem}_{s:.{digits}f}.png" for s in fractions]
@@ -91,8 +91,9 @@ def _make(request: Any) -> list[str]:
 def _label(joint: Joint, q: float, s: float) -> str:
     hinge = joint.type == "hinge"
     other = f"{np.rad2deg(q):.1f}°" if hinge else f"{q * 1000:.4g} mm"
-    text = f"{joint.name}    q = {q:.3g} {joint.unit} ({other})    s = {s:.2f}"
-    return text.replace("-", "\N{MINUS SIGN}") if "-" not in joint.name else text
+    name = clean(joint.name)
+    text = f"{name}    q = {q:.3g} {joint.unit} ({other})    s = {s:.2f}"
+    return text.replace("-", "\N{MINUS SIGN}") if "-" not in name else text
 
 
 def _write(target: Path, label: str, image: Image) -> None:

@@ -17,7 +17,7 @@ from joda.interaction.script import Describe, interaction, perform
 from joda.interaction.traces import FORCE, draw_force, draw_position, shade
 from joda.measured.runs import Run, run_text
 from joda.pictures.film import frames, write_film
-from joda.pictures.style import house_style, png
+from joda.pictures.style import clean, house_style, png
 from joda.scenes.model import find_joint, joint_name, load_model, moves_with
 from joda.scenes.motion import FAST, Motion, fast, usual_speed
 
@@ -230,7 +230,7 @@ def _picture(motion: Motion, quick: Intervals, found: Context, says: str, than: 
             shade(axes, quick, f"more than {FAST:g} times {than}")
         if quick:
             upper.legend(frameon=False, fontsize=8)
-        title = "\n".join(wrap(f"{found.joint.name}: {says}", 100))
+        title = "\n".join(wrap(f"{clean(found.joint.name)}: {says}", 100))
         upper.set_title(title, loc="left", fontsize=9, parse_math=False)
         lower.set_xlabel("time (s)")
     return figure

@@ -4,18 +4,25 @@ from collections.abc import Iterable
 from itertools import pairwise
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from joda.plain import plain
 
 MIN_WIDTH = 1e-9
 """Narrowest interval, and narrowest gap between control points, in normalised position."""
 MAX_VALUE = 1e15
 """Largest magnitude of a control point's value; no coefficient of a cubic can overflow."""
 
+LONGEST_TEXT = 10_000
+"""Characters of a text; a page has fewer."""
+
 
 class Frozen(BaseModel):
-    """A part of a file: immutable, finite, without unknown keys."""
+    """A part of a file: immutable, finite, of bounded texts, without unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, str_max_length=LONGEST_TEXT
+    )
 
 
 class Curve(Frozen):
@@ -62,11 +69,19 @@ class Component(Curve):
     """A local curve of a channel.
 
     Attributes:
-        label: what it stands for; shown in pictures and kept in the MJCF. No ';' or '|'.
+        label: what it stands for; shown in pictures and kept in the MJCF. No ';', '|' or
+            control characters.
         y: N or N·m; N·s/m or N·m·s/rad for damping.
     """
 
     label: Annotated[str, Field(pattern=r"^[^;|\x00-\x1f]*$")] = ""
+
+    @field_validator("label")
+    @classmethod
+    def _check_label(cls, label: str) -> str:
+        if plain(label) != label:
+            raise ValueError("must not hold control characters or what turns text around")
+        return label
 
     def text(self) -> str:
         """The component as in the plugin's attributes."""

@@ -1,6 +1,7 @@
 """Reading and writing whole files: atomic, never half, never over a user's file unasked."""
 
 import os
+import re
 import tempfile
 from collections.abc import Mapping
 from io import BytesIO, TextIOWrapper
@@ -12,6 +13,10 @@ from joda.errors import JodaError
 
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks; UTF-32 begins so too."""
+MOST = 50
+"""Letters of a name that go into a file's name; a file system has room for 255 bytes of it."""
+LARGEST = 20_000_000
+"""Bytes of a JSON file that is read; what joda writes has a thousandth of it."""
 
 
 def cache_folder() -> Path:
@@ -60,6 +65,13 @@ def _no_text(raw: bytes, at: int) -> str:
     )
 
 
+def read_json(path: Path) -> str:
+    """Text of a JSON file, not yet parsed; raises JodaError as `read_text`, or if it is huge."""
+    if path.is_file() and (size := path.stat().st_size) > LARGEST:
+        raise JodaError(f"{path}: has {size / 1e6:.0f} MB; a file of this kind has at most 20 MB.")
+    return read_text(path)
+
+
 def check_target(path: Path, force: bool) -> None:
     """Raises JodaError if `path` exists and `force` is off, or no file can be made there.
 
@@ -86,6 +98,11 @@ def fresh(name: str) -> Path:
     """The first of NAME, NAME_2, NAME_3, ... that does not exist."""
     candidates = (Path(f"{name}_{k}" if k > 1 else name) for k in count(1))
     return next(path for path in candidates if not path.exists())
+
+
+def file_name(name: str) -> str:
+    """A part of a file's name that stands for `name`: no path, nothing special, not too long."""
+    return re.sub(r"[^\w.-]+", "_", name)[:MOST].strip("._-") or "joint"
 
 
 def make_folder(path: Path) -> None:

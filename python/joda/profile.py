@@ -21,7 +21,8 @@ from pydantic import ValidationError, model_validator
 from joda.component import Component, Frozen, numbers
 from joda.effects import AddedInertia, AnyEffect, Effect, GravityOffset
 from joda.errors import JodaError
-from joda.files import read_text
+from joda.files import read_json
+from joda.plain import plain
 
 CHANNELS = ("conservative", "friction", "damping")
 ATTRIBUTES = (
@@ -32,6 +33,12 @@ ATTRIBUTES = (
 """The plugin's attributes for one joint."""
 
 
+FARTHEST, NARROWEST = 1e6, 1e-9
+"""Bounds of a joint's range, rad or m: beyond them its positions are not finite or not distinct."""
+MOST_COMPONENTS = 200
+"""Of a channel; more would only be slow."""
+
+
 class File(Frozen):
     """The content of a JSON file."""
 
@@ -39,7 +46,7 @@ class File(Frozen):
     def read(cls, path: str | Path) -> Self:
         """Reads and checks a file; raises JodaError with file, key and remedy."""
         try:
-            return cls.model_validate_json(read_text(Path(path)))
+            return cls.model_validate_json(read_json(Path(path)))
         except ValidationError as error:
             raise JodaError(f"{path}: {describe(error)}") from None
 
@@ -55,7 +62,7 @@ class File(Frozen):
                 else re.sub(r"\s+", " ", match[0]).replace("[ ", "[").replace(" ]", "]")
             )
 
-        return strings_or_lists.sub(fold, text) + "\n"
+        return plain(strings_or_lists.sub(fold, text)) + "\n"
 
 
 class Channel(Frozen):
@@ -63,6 +70,14 @@ class Channel(Frozen):
 
     combine: Literal["sum", "max"] = "sum"
     components: tuple[Component, ...] = ()
+
+    @model_validator(mode="after")
+    def _check_count(self) -> Self:
+        if len(self.components) > MOST_COMPONENTS:
+            raise ValueError(
+                f"{len(self.components)} components; a channel has at most {MOST_COMPONENTS}"
+            )
+        return self
 
     def text(self) -> str:
         """The components as in the plugin's attributes."""
@@ -109,6 +124,10 @@ class Joint(Frozen):
     def _check(self) -> Self:
         if not self.range[0] < self.range[1]:
             raise ValueError("range must be two increasing numbers")
+        if max(map(abs, self.range)) > FARTHEST or self.range[1] - self.range[0] < NARROWEST:
+            raise ValueError(
+                f"range must lie between -{FARTHEST:g} and {FARTHEST:g} and be {NARROWEST:g} wide"
+            )
         if self.unit != ("rad" if self.type == "hinge" else "m"):
             raise ValueError("unit must be rad for a hinge and m for a slide")
         return self

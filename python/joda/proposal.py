@@ -17,6 +17,8 @@ Factor = Annotated[float, Field(ge=0, le=100)]
 
 NARROWEST = 1e-3
 """Narrowest interval of an effect, in normalised position."""
+MOST_EFFECTS = 100
+"""A joint has three or four; more would only be slow."""
 
 
 class JointSummary(Frozen):
@@ -80,3 +82,10 @@ class Proposal(File):
     gravity_can_be_ignored: bool = False
     joint_limit_hint: JointLimitHint = JointLimitHint()
     effect_proposals: tuple[EffectProposal, ...]
+
+    @model_validator(mode="after")
+    def _check_count(self) -> Self:
+        count = len(self.effect_proposals)
+        if count > MOST_EFFECTS:
+            raise ValueError(f"{count} effects are proposed; a joint has at most {MOST_EFFECTS}")
+        return self

@@ -30,7 +30,7 @@ def studio(
         folder: of the project: nothing outside of it is read or written. By default the scene's.
         port: of the page on 127.0.0.1; by default 8642, or if that is taken another one.
         browser: whether to open the page in a browser.
-        ready: told the page's address when it answers.
+        ready: told the page's address, with its token, when it answers.
 
     Raises:
         JodaError: NiceGUI is not installed, a file cannot be read or lies outside the folder, the

@@ -19,10 +19,14 @@ from joda.diagnosis.outcome import scene_files
 from joda.errors import JodaError
 from joda.files import check_target, make_folder, write_bytes, write_together
 from joda.measured.reading import read_measured
+from joda.plain import plain
 from joda.profile import Profile
 from joda.scenes.model import describe_joint, find_joint, joint_name, joint_type, load
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
+
+LONGEST_NAME = 100
+"""Letters of a name under which a file that is handed over is kept."""
 
 
 class Desk:
@@ -138,7 +142,8 @@ class Desk:
 
     def upload(self, name: str, content: bytes) -> None:
         """Adds a run that was handed over as a file's content; raises JodaError if it is none."""
-        path = self.scratch("runs") / (Path(name.replace("\\", "/")).name or "run.csv")
+        own = plain(Path(name.replace("\\", "/")).name).strip(".")[-LONGEST_NAME:]
+        path = self.scratch("runs") / (own or "run.csv")
         if path in self.runs:
             raise JodaError(f"{path.name}: is there already; give it another name.")
         make_folder(path.parent)

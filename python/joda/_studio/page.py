@@ -8,13 +8,14 @@ from nicegui import app, background_tasks, ui
 from starlette.responses import Response
 
 from joda._studio.editors import Editors
-from joda._studio.guard import HOST, OnlyHere
+from joda._studio.guard import HOST, Guard
 from joda._studio.lacks import Lacks
 from joda._studio.shared import Shared, say, told
 from joda._studio.solids import Shape, shape
 from joda._studio.trajectories import Trajectories
 from joda._studio.view3d import View3D
 from joda.errors import JodaError
+from joda.plain import plain
 
 HERE = Path(__file__).parent
 BLUE = "#1f5fbf"
@@ -69,9 +70,9 @@ class Page:
         lo, hi = joint.range
         with ui.element("header").classes("top"):
             ui.label("joda studio").classes("brand")
-            ui.label(desk.scene.name).classes("file").tooltip(str(desk.scene))
+            ui.label(plain(desk.scene.name)).classes("file").tooltip(plain(str(desk.scene)))
             ui.label(
-                f"{joint.name} · {joint.type} · {lo:.4g} to {hi:.4g} {joint.unit}".replace(
+                f"{plain(joint.name)} · {joint.type} · {lo:.4g} to {hi:.4g} {joint.unit}".replace(
                     "-", "\N{MINUS SIGN}"
                 )
             ).classes("aside")
@@ -151,8 +152,9 @@ def serve(shared: Shared, port: int, browser: bool, ready: Callable[[str], None]
         shared: the studio.
         port: that is free.
         browser: whether to open one.
-        ready: told the page's address when it answers.
+        ready: told the page's address, with its token, when it answers.
     """
+    guard = Guard(port)
     solid = shape(shared.desk.model, shared.desk.number)
     files = [one.stl() for one in solid.solids]
 
@@ -170,7 +172,7 @@ def serve(shared: Shared, port: int, browser: bool, ready: Callable[[str], None]
                 await asyncio.sleep(0.05)
                 continue
             writer.close()
-            ready(f"http://{HOST}:{port}")
+            ready(guard.address)
             return
 
     def begin() -> None:
@@ -183,20 +185,21 @@ def serve(shared: Shared, port: int, browser: bool, ready: Callable[[str], None]
 
     app.on_startup(begin)
     app.on_shutdown(end)
-    app.add_middleware(OnlyHere)
+    app.add_middleware(guard.protecting)
     try:
         ui.run(
             root=lambda: Page(shared, solid) and None,
             host=HOST,
             port=port,
-            title=f"{shared.desk.scene.name} · joda studio",
-            show=browser,
+            title=f"{plain(shared.desk.scene.name)} · joda studio",
+            show=browser and guard.address.removeprefix(f"http://{HOST}:{port}"),
             reload=False,
             show_welcome_message=False,
             uvicorn_logging_level="critical",  # a second Ctrl-C would be a traceback
             tailwind=False,
             favicon=HERE / "icon.svg",
             reconnect_timeout=20.0,
+            cache_control_directives="private, no-cache",  # else a refusal is kept for a year
         )
     except (KeyboardInterrupt, asyncio.CancelledError):
         pass

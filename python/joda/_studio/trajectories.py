@@ -8,6 +8,7 @@ from nicegui import events, ui
 from joda._studio import charts
 from joda._studio.motions import Replayed
 from joda._studio.shared import Shared, told
+from joda.plain import plain
 
 
 class Trajectories:
@@ -99,7 +100,7 @@ class Trajectories:
             for number, path in enumerate(self._shared.desk.runs):
                 chosen = " chosen" if number == self._number else ""
                 with ui.element("span").classes(f"chip run{chosen}"):
-                    name = ui.label(path.stem).tooltip(path.name)
+                    name = ui.label(plain(path.stem)).tooltip(plain(path.name))
                     name.on("click", lambda k=number: self._choose(k))
                     drop = ui.button(icon="close", on_click=lambda p=path: self._drop(p))
                     drop.props("flat round size=xs").tooltip("leave this run out")
@@ -168,7 +169,7 @@ class _RunDialog:
                 if desk.folder.path / name not in desk.runs:
                     file = ui.element("span").classes("chip")
                     with file:
-                        ui.label(name).on("click", lambda n=name: self._add(n))
+                        ui.label(plain(name)).on("click", lambda n=name: self._add(n))
 
     @told
     def _add(self, name: str) -> None:

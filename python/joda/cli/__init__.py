@@ -20,6 +20,7 @@ from joda.cli.measure import bench, compare, refine
 from joda.cli.mend import add, diagnose, improve
 from joda.cli.observe import context, plot, render
 from joda.cli.reference import doctor, schema, templates
+from joda.cli.say import complain, say
 from joda.errors import JodaError
 
 __all__ = ["app", "main"]
@@ -34,7 +35,7 @@ app = typer.Typer(
 
 def _tell_version(asked: bool) -> None:
     if asked:
-        print(f"joda {__version__} for MuJoCo {MUJOCO_VERSION}")
+        say(f"joda {__version__} for MuJoCo {MUJOCO_VERSION}")
         raise typer.Exit
 
 
@@ -103,7 +104,7 @@ def _explain(error: BaseException) -> int:
 
 
 def _fail(message: str, status: int = 2) -> int:
-    print(f"joda: {' '.join(message.splitlines())}", file=sys.stderr)
+    complain(message)
     return status
 
 

@@ -8,6 +8,7 @@ import typer
 
 from joda.cli.options import Force, Joint, Json, Model
 from joda.cli.progress import progress_bar, spinner
+from joda.cli.say import say
 from joda.cli.tell import print_json, tell_cases, with_text_paths
 from joda.errors import JodaError
 
@@ -100,9 +101,9 @@ def simulate(
         print_json(with_text_paths({key: told[key] for key in told if key != "run"}))
         return
     for sentence in done.sentences:
-        print(sentence)
+        say(sentence)
     for path in filter(None, (done.csv, done.picture, done.film)):
-        print(path)
+        say(path)
 
 
 def experiments(
@@ -135,7 +136,7 @@ def experiments(
         return
     tell_cases(done.cases)
     for path in (done.gallery, done.numbers):
-        print(path)
+        say(path)
 
 
 def with_usual(arguments: list[str]) -> list[str]:

@@ -7,6 +7,7 @@ import typer
 
 from joda.cli import interrupt
 from joda.cli.options import Model
+from joda.cli.say import say
 
 
 def studio(
@@ -30,14 +31,14 @@ def studio(
 ) -> None:
     """Look at a joint in the browser, drag its curves, and save.
 
-    The page is served on this machine only. Ctrl-C ends it. Example:
+    The page is served on this machine only, to who has its address. Ctrl-C ends it. Example:
 
         joda studio oven/scene.xml --joint door
     """
     from joda import studio as run
 
     def ready(address: str) -> None:
-        print(f"{address}   (Ctrl-C ends it)", flush=True)
+        say(f"{address}   (Ctrl-C ends it)")
 
     run(scene, joint, runs or (), folder=folder, port=port, browser=browser, ready=ready)
     interrupt.forget()

@@ -8,6 +8,7 @@ import typer
 
 from joda.cli.options import Folder, Force, Json, Key, Model, Scene, Templates, Vlm
 from joda.cli.progress import progress_bar, spinner
+from joda.cli.say import say
 from joda.cli.tell import (
     generated_as_json,
     print_json,
@@ -87,7 +88,7 @@ def _hidden_effect(output: Path | None, as_json: bool, **options: Any) -> None:
         result = hidden_effect(output, **options)
         print_json({**with_text_paths(asdict(result))})
         return
-    result = hidden_effect(output, say=lambda sentence: print(sentence, flush=True), **options)
+    result = hidden_effect(output, say=say, **options)
     names = "compare.html", "diagnosis.html", "new.xml", "new.png", "unseen.html", "sealed.json"
     tell_files(result.folder, [name for name in names if (result.folder / name).exists()])
 
@@ -154,7 +155,7 @@ def generate(
         tell_round(round)
     tell_cost(result.history.usage)
     for note in result.notes:
-        print(note)
+        say(note)
     names = "profile.png", "scene.xml", "composed.json", "proposal.json", "history.json"
     tell_files(result.folder, names)
     tell_viewer(result.folder / "scene.xml")
@@ -192,8 +193,8 @@ def revise(
     tell_round(result.history.rounds[-1])
     tell_cost(result.history.usage)
     for note in result.notes:
-        print(note)
-    print(result.picture)
+        say(note)
+    say(result.picture)
 
 
 def compile(
@@ -218,7 +219,7 @@ def compile(
     from joda import compile as run
 
     run(proposal, model, joint, output, templates=templates or (), key=key, force=force)
-    print(output)
+    say(output)
 
 
 def attach(
@@ -251,5 +252,5 @@ def attach(
     from joda import attach as run
 
     for note in run(model, composed, output, joint=joint, native=native, force=force):
-        print(note)
-    print(output)
+        say(note)
+    say(output)

@@ -10,6 +10,7 @@ import typer
 
 from joda.cli.options import Force, Joint, Json, Model, Runs, Scene
 from joda.cli.progress import loss_bar, spinner
+from joda.cli.say import say
 from joda.cli.tell import (
     print_json,
     tell_changes,
@@ -74,9 +75,9 @@ def refine(
     tell_changes(result.changes)
     tell_errors(result, Profile.read(result.composed).joint.unit)
     for note in result.notes:
-        print(note)
+        say(note)
     for path in (result.scene, result.composed, result.picture, result.history):
-        print(path)
+        say(path)
 
 
 def compare(
@@ -109,9 +110,9 @@ def compare(
             progress=progress,
         )  # fmt: skip
     for sentence in (*found.notes, *sentences(found)):
-        print(sentence)
+        say(sentence)
     for path in filter(None, (as_json, report, output)):
-        print(path)
+        say(path)
 
 
 def bench(

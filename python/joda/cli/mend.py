@@ -7,6 +7,7 @@ import typer
 
 from joda.cli.options import Force, Joint, Json, Model, Runs, Scene
 from joda.cli.progress import progress_bar, spinner
+from joda.cli.say import say
 from joda.cli.tell import print_json
 
 Report = Annotated[Path | None, typer.Option(help="Write an HTML page with pictures to this file.")]
@@ -43,9 +44,9 @@ def diagnose(
             picture=output, force=force, progress=bar,
         )  # fmt: skip
     for sentence in sentences(found):
-        print(sentence)
+        say(sentence)
     for path in filter(None, (as_json, report, output)):
-        print(path)
+        say(path)
 
 
 def add(
@@ -80,9 +81,9 @@ def add(
         print_json(added.as_json())
         return
     for sentence in sentences(added):
-        print(sentence)
+        say(sentence)
     for path in filter(None, (added.scene, added.composed, added.picture)):
-        print(path)
+        say(path)
 
 
 def improve(
@@ -106,6 +107,6 @@ def improve(
     with spinner("improve") as progress:
         result = run(model, joint, runs, output, report=report, force=force, progress=progress)
     for sentence in sentences(result):
-        print(sentence)
+        say(sentence)
     for path in filter(None, (result.scene, result.composed, result.picture, report)):
-        print(path)
+        say(path)

@@ -7,6 +7,7 @@ import typer
 
 from joda.cli.options import Folder, Force, Joint, Model
 from joda.cli.progress import spinner
+from joda.cli.say import say
 
 
 def context(
@@ -25,15 +26,16 @@ def context(
     """
     from joda import context as run
     from joda.files import check_target, write_text
+    from joda.plain import plain
 
     if as_json:
         check_target(as_json, force)
     found = run(model, joint)
     if as_json:
-        write_text(as_json, found.model_dump_json(indent=2) + "\n")
-    print(found.describe())
+        write_text(as_json, plain(found.model_dump_json(indent=2)) + "\n")
+    say(found.describe())
     if as_json:
-        print(as_json)
+        say(as_json)
 
 
 def render(
@@ -54,7 +56,7 @@ def render(
     with spinner("render"):
         paths = run(model, joint, output, count=count, force=force)
     for path in paths:
-        print(path)
+        say(path)
 
 
 def plot(
@@ -75,4 +77,4 @@ def plot(
     """
     from joda import plot as run
 
-    print(run(source, output, joint=joint, force=force))
+    say(run(source, output, joint=joint, force=force))

@@ -3,18 +3,21 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from joda.plain import one_line
+
 
 @contextmanager
 def spinner(task: str) -> Iterator[Callable[[str], None]]:
     """A spinner; yields what tells it the present stage."""
     from rich.console import Console
+    from rich.text import Text
 
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda what: None
         return
     with console.status(task) as status:
-        yield lambda what: status.update(f"{task}: {what}")
+        yield lambda what: status.update(Text(one_line(f"{task}: {what}")))
 
 
 @contextmanager
@@ -28,12 +31,12 @@ def progress_bar() -> Iterator[Callable[[int, int, str], None]]:
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
     )
     with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("")
         yield lambda done, total, what: bar.update(
-            task, completed=done, total=total, description=what
+            task, completed=done, total=total, description=one_line(what)
         )
 
 

@@ -8,6 +8,7 @@ import typer
 
 from joda.cli.options import Force, Json, Templates
 from joda.cli.progress import spinner
+from joda.cli.say import say
 from joda.cli.tell import print_json, tell_checks, tell_templates
 
 
@@ -35,7 +36,7 @@ def templates(
     if as_json:
         print_json([one.model_dump(mode="json", exclude_none=True) for one in found.values()])
     elif output:
-        print(output)
+        say(output)
     else:
         tell_templates(found.values())
 

@@ -11,7 +11,9 @@ from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from joda.cli.say import say
 from joda.errors import JodaError
+from joda.plain import plain
 
 if TYPE_CHECKING:
     from joda._bench import Row
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 
 def print_json(value: Any) -> None:
     """The value as indented JSON."""
-    print(json.dumps(value, indent=2, ensure_ascii=False))
+    say(json.dumps(value, indent=2, ensure_ascii=False))
 
 
 def with_text_paths(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -44,20 +46,20 @@ def generated_as_json(result: "Generated") -> dict[str, Any]:
 def tell_changes(changes: Sequence[str]) -> None:
     """A line per change, or that there is none."""
     for change in changes or ("Nothing changed.",):
-        print(change)
+        say(change)
 
 
 def tell_files(folder: Path, names: Iterable[str]) -> None:
     """The files of a folder that are worth naming."""
-    print("Files:")
+    say("Files:")
     for name in names:
-        print(f"  {folder / name}")
+        say(f"  {folder / name}")
 
 
 def tell_viewer(scene: Path) -> None:
     """How to look at a scene."""
     command = shlex.join([_python(), "-m", "mujoco.viewer", f"--mjcf={scene}"])
-    print(f"See it move: {command}")
+    say(f"See it move: {command}")
 
 
 def _python() -> str:
@@ -71,21 +73,21 @@ def _python() -> str:
 def tell_round(round: "Round") -> None:
     """What was proposed in a round, and what came of it."""
     summary = round.proposal.joint_summary
-    print(f"Round {round.number}, {round.proposer}: {summary.motion_description}")
-    print(f"  {round.proposal.whole_motion_descrptn}")
+    say(f"Round {round.number}, {round.proposer}: {summary.motion_description}")
+    say(f"  {round.proposal.whole_motion_descrptn}")
     for effect in round.proposal.effect_proposals:
         where = f"{effect.start_ratio:g} to {effect.end_ratio:g}"
-        print(f"  - {effect.effect_name}, s = {where}: {effect.reason}")
-    print(textwrap.indent(round.facts, "  "))
+        say(f"  - {effect.effect_name}, s = {where}: {effect.reason}")
+    say(textwrap.indent(round.facts, "  "))
     for sentence in (*round.unmet, *round.notes):
-        print(f"  ! {sentence}")
+        say(f"  ! {sentence}")
 
 
 def tell_cost(usage: "Usage") -> None:
     """What was asked of the network; nothing if it was not asked."""
     if usage.requests:
         price = "price unknown" if usage.dollars is None else f"{usage.dollars:.3f} dollars"
-        print(
+        say(
             f"Asked {usage.requests} times: {usage.input_tokens} tokens in "
             f"({usage.cache_read_tokens} from the cache), {usage.output_tokens} out, {price}."
         )
@@ -109,14 +111,14 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None
     else:
         for label in done:
             if label in failed:
-                print(f"{label}: {failed[label]}")
+                say(f"{label}: {failed[label]}")
                 continue
             result = made[label]
             last = result.history.rounds[-1]
             lacking = " ".join(last.unmet) or "as described"
-            print(f"{label}: {last.proposal.joint_summary.motion_description}; {lacking}")
+            say(f"{label}: {last.proposal.joint_summary.motion_description}; {lacking}")
             for note in result.notes:
-                print(f"  {note}")
+                say(f"  {note}")
         tell_cost(total(result.history.usage for result in made.values()))
     if failed:
         raise JodaError(f"{len(failed)} of {len(done)} have no profile; see above.")
@@ -125,10 +127,10 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None
 def tell_doors(result: "Demo") -> None:
     """What the demo's two doors did."""
     rows = zip(result.starts, result.plain_ends, result.joda_ends, strict=True)
-    for start, plain, ours in rows:
-        print(
+    for start, without, ours in rows:
+        say(
             f"Let go at {degrees(start):.0f} degrees, {result.duration:g} s later: without a "
-            f"profile at {degrees(plain):.1f}, with it at {abs(degrees(ours)):.1f} degrees."
+            f"profile at {degrees(without):.1f}, with it at {abs(degrees(ours)):.1f} degrees."
         )
     forces = zip(
         ("without a profile", "with it"), (result.plain_force, result.joda_force), strict=True
@@ -137,7 +139,7 @@ def tell_doors(result: "Demo") -> None:
         f"{name} it {'pulls' if force > 0 else 'holds back'} with up to {abs(force):.1f} N·m"
         for name, force in forces
     ]
-    print(f"Opened slowly by hand: {', '.join(told)}.")
+    say(f"Opened slowly by hand: {', '.join(told)}.")
 
 
 def tell_errors(result: "Refined", unit: str) -> None:
@@ -150,21 +152,19 @@ def tell_errors(result: "Refined", unit: str) -> None:
     what = "Position"
     if result.windows is None:
         what, unit = "Force", {"rad": "N·m", "m": "N"}[unit]
-    print(
+    say(
         f"{what} error: {result.before:.3g} → {result.after:.3g} {unit} RMS after "
         f"{result.iterations} iterations; the measurement's noise is {result.noise:.2g} {unit}."
     )
     if result.windows:
         first, last = result.windows
-        print(f"The same over windows of 0.4 s: {first:.3g} → {last:.3g} {unit}.")
+        say(f"The same over windows of 0.4 s: {first:.3g} → {last:.3g} {unit}.")
     if result.checked:
-        print(
-            f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS."
-        )
+        say(f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS.")
     for channel, places in result.unseen.items():
         if places:
             where = ", ".join(f"s = {a:.2f} to {b:.2f}" for a, b in places)
-            print(f"The data tell little of {channel} at {where}; there it is as it was before.")
+            say(f"The data tell little of {channel} at {where}; there it is as it was before.")
 
 
 def tell_ratios(rows: "Iterable[Row]") -> None:
@@ -207,19 +207,19 @@ def tell_checks(checks: "Iterable[Check]") -> None:
     checks = list(checks)
     for check in checks:
         style = "bold red" if check.fatal else marks[check.state][1]
-        told = Text(check.found)
+        told = Text(plain(check.found))
         if check.remedy:
-            told.append(f"\n→ {check.remedy}", "bold" if check.fatal else "dim")
-        table.add_row(Text(check.state, style), check.what, told)
+            told.append(f"\n→ {plain(check.remedy)}", "bold" if check.fatal else "dim")
+        table.add_row(Text(check.state, style), Text(check.what), told)
     console = Console(width=None if sys.stdout.isatty() else 160)
     console.print(table)
     fatal = [check.what for check in checks if check.fatal]
-    console.print(f"Not working: {', '.join(fatal)}." if fatal else "All that joda needs works.")
+    say(f"Not working: {', '.join(fatal)}." if fatal else "All that joda needs works.")
 
 
 def tell_templates(found: "Iterable[Template]") -> None:
     """A paragraph per template, no wider than the terminal."""
-    print("\n\n".join(map(_paragraph, found)))
+    say("\n\n".join(map(_paragraph, found)))
 
 
 def _paragraph(template: "Template") -> str:

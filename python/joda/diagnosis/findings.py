@@ -7,7 +7,8 @@ from typing import Any, Literal
 
 from joda.diagnosis.weighing import Verdict
 from joda.errors import JodaError
-from joda.files import read_text
+from joda.files import read_json
+from joda.plain import plain
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,13 @@ class Diagnosis:
 
     def to_json(self) -> str:
         """The diagnosis as JSON."""
-        return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
+        return plain(json.dumps(asdict(self), indent=2, ensure_ascii=False)) + "\n"
 
 
 def read_diagnosis(path: Path) -> dict[str, Any]:
     """A diagnosis that was written before; raises JodaError if it is none."""
     try:
-        content = json.loads(read_text(path))
+        content = json.loads(read_json(path))
     except json.JSONDecodeError as error:
         raise JodaError(f"{path}, line {error.lineno}: not JSON ({error.msg}).") from None
     except (ValueError, RecursionError) as error:  # numbers too long, brackets too deep

@@ -8,6 +8,7 @@ from joda.measured.adequacy import MULTIPLE, Adequacy
 from joda.measured.curves import CurveError, FailingForce, told
 from joda.measured.errors import Missed, RunError
 from joda.measured.failing import Failing
+from joda.plain import plain
 
 SAID = 6
 """Most places that are told."""
@@ -57,7 +58,7 @@ class Comparison:
             "failing_force": [vars(place) for place in self.failing_force],
             "notes": list(self.notes),
         }
-        return dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        return plain(dumps(content, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 def sentences(comparison: Comparison) -> list[str]:

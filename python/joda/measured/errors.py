@@ -13,6 +13,9 @@ from joda.measured.runs import Run
 
 Array = NDArray[np.float64]
 
+ASTRAY = 1e9
+"""Error, in units of the noise, of a simulation that is not finite."""
+
 
 @dataclass(frozen=True)
 class RunError:
@@ -40,7 +43,7 @@ class Missed:
 
     Attributes:
         file: of the run.
-        multiple: RMS error in units of the run's noise; infinite if the simulation went astray.
+        multiple: RMS error in units of the run's noise; `ASTRAY` if the simulation went astray.
         explained: what errors of the measured start and force alone make of it, in the same units.
         time: of the window, s from and to; None for the whole run.
     """
@@ -114,7 +117,7 @@ def errors(
 
 
 def _multiple(error: float, sigma: float) -> float:
-    return error / sigma if np.isfinite(error) else float("inf")
+    return min(error / sigma, ASTRAY) if np.isfinite(error) else ASTRAY
 
 
 def _missed(run: Run, sigma: float, window: Window) -> Missed:

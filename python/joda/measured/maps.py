@@ -12,7 +12,7 @@ from joda.measured.gauge import Gauged, static_force
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.measured.visited import Interval
-from joda.pictures.style import COLOURS
+from joda.pictures.style import COLOURS, clean
 from joda.profile import Joint, Profile
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def draw_runs(
             colour, line = (COLOURS["conservative"], "-") if number == last else ("#888888", "--")
             axes.plot(runs[k].time, paths[k], line, color=colour, lw=1.6, label=label)
         axes.set_ylabel(f"position ({unit})")
-        axes.set_title(runs[k].name, loc="left", fontsize=9, parse_math=False)
+        axes.set_title(clean(runs[k].name), loc="left", fontsize=9, parse_math=False)
         axes.spines[["top", "right"]].set_visible(False)
     handles, labels = plots[0].get_legend_handles_labels()
     part.legend(
@@ -179,7 +179,7 @@ def _curve(axes: "Axes", measured: Measured, curve: Gauged) -> None:
         force = static_force(measured.profile, measured.context, grid, way)
         axes.plot(np.linspace(0, 1, 501), force, color=colour, lw=1.6, label=line)
     axes.axhline(0, color="#bbbbbb", lw=0.8, zorder=0)
-    axes.set_title(curve.curve.name, loc="left", fontsize=9, parse_math=False)
+    axes.set_title(clean(curve.curve.name), loc="left", fontsize=9, parse_math=False)
     axes.set_xlim(-0.02, 1.02)
     axes.set_xlabel("normalised position s")
     axes.set_ylabel(f"force ({'N·m' if joint.type == 'hinge' else 'N'})")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from joda.component import Component
 from joda.field import evaluate
-from joda.pictures.style import COLOURS, GRAVITY, house_style
+from joda.pictures.style import COLOURS, GRAVITY, clean, house_style
 from joda.profile import CHANNELS, Profile
 
 if TYPE_CHECKING:
@@ -70,7 +70,9 @@ def overlay(
         panels = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 1])
         draw_channels(panels, before, after, gravity)
         panels[0].legend(frameon=False, fontsize=9, ncols=3)
-        panels[0].set_title(f"{after.joint.name}: before and after", loc="left", parse_math=False)
+        panels[0].set_title(
+            f"{clean(after.joint.name)}: before and after", loc="left", parse_math=False
+        )
         panels[-1].set_xlabel(f"joint position ({after.joint.unit})")
         return figure
 

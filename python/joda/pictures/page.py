@@ -4,6 +4,8 @@ import base64
 from collections.abc import Sequence
 from html import escape
 
+from joda.plain import plain
+
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 60rem; margin: 2rem auto;
        padding: 0 1rem; }
@@ -13,27 +15,32 @@ img { max-width: 100%; }
 """
 
 
+def _shown(text: str) -> str:
+    """Plain text as HTML that shows it."""
+    return escape(plain(text))
+
+
 def paragraph(text: str) -> str:
     """A paragraph of plain text."""
-    return f"<p>{escape(text)}</p>"
+    return f"<p>{_shown(text)}</p>"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table of plain texts."""
-    cells = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows]
-    first = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    cells = ["".join(f"<td>{_shown(cell)}</td>" for cell in row) for row in rows]
+    first = "".join(f"<th>{_shown(cell)}</th>" for cell in head)
     return f"<table><tr>{first}</tr>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
 def picture(png: bytes, what: str) -> str:
     """A PNG, inside the file."""
     content = base64.b64encode(png).decode()
-    return f'<img alt="{escape(what)}" src="data:image/png;base64,{content}">'
+    return f'<img alt="{_shown(what)}" src="data:image/png;base64,{content}">'
 
 
 def page(title: str, *parts: str) -> str:
     """The whole file."""
     return (
-        f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title>'
-        f"<style>{STYLE}</style><h1>{escape(title)}</h1>\n" + "\n".join(parts) + "</html>\n"
+        f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>{_shown(title)}</title>'
+        f"<style>{STYLE}</style><h1>{_shown(title)}</h1>\n" + "\n".join(parts) + "</html>\n"
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from joda.files import check_target, write_bytes
+from joda.plain import plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +49,7 @@ def number(value: float) -> str:
 
 def clean(text: str) -> str:
     """The text in one line, of bounded length."""
-    return " ".join(text.split())[:300]
+    return plain(" ".join(text.split())[:300])
 
 
 def text_width(figure: Any, text: str, size: float, weight: str = "normal") -> float:

@@ -20,6 +20,7 @@ from joda.propose import Answer, Ask, Task, Turn, Usage, replies
 from joda.propose import prompt as prompts
 from joda.propose.batch import HALF, Batches, Request, why
 from joda.propose.price import Tally, price
+from joda.propose.service import Credentials, host, usable
 from joda.template import Template
 
 if TYPE_CHECKING:
@@ -68,8 +69,9 @@ class Anthropic:
         timeout: of one request, in seconds.
 
     Raises:
-        JodaError: the package `anthropic` or ANTHROPIC_API_KEY is missing, or JODA_VLM_PRICE (two
-            numbers, dollars per million input and output tokens, "3/15") cannot be read.
+        JodaError: the package `anthropic` is missing, the key or the address cannot be used, or
+            JODA_VLM_PRICE (two numbers, dollars per million input and output tokens, "3/15") cannot
+            be read.
     """
 
     def __init__(
@@ -82,12 +84,7 @@ class Anthropic:
             raise JodaError(
                 'asking a Claude model needs the package anthropic: pip install ".[vlm]".'
             ) from None
-        self._key = os.environ.get("ANTHROPIC_API_KEY", "").strip()
-        if not self._key:
-            raise JodaError(
-                "ANTHROPIC_API_KEY is not set; set it to a key from platform.claude.com, or choose "
-                "the proposer 'offline'."
-            )
+        self._credentials = Credentials(base_url)
         self.model = model or os.environ.get("JODA_VLM") or DEFAULT_MODEL
         self.name = f"anthropic:{self.model}"
         self._base_url, self._timeout = base_url, timeout
@@ -164,7 +161,7 @@ class Anthropic:
         from anthropic import Anthropic as Client
 
         return Client(
-            api_key=self._key,
+            api_key=self._credentials.key,
             base_url=self._base_url,
             max_retries=MAX_RETRIES,
             timeout=self._timeout,
@@ -192,7 +189,8 @@ class Anthropic:
             if message is None:
                 message = self._send(client, tally, asked)
                 tally.pay(message)
-            text = "".join(block.text for block in message.content if block.type == "text")
+            said = "".join(block.text for block in message.content if block.type == "text")
+            text = self._credentials.hide(said)
             if message.stop_reason == "refusal":
                 raise ProposalFailed(
                     f"{self.model} declined to answer; describe the joint in other words, or "
@@ -225,19 +223,19 @@ class Anthropic:
     def _send(self, client: "Client", tally: Tally, asked: Request) -> "Message":
         from anthropic import APIError
 
+        message: Message | None
         try:
             counted = client.with_options(middleware=[tally.sent])
-            message: Message = counted.messages.create(**asked)
+            message = counted.messages.create(**asked)
         except APIError as error:
             raise ProposalFailed(self._sentence(error, client), tally.usage) from None
         except KeyboardInterrupt:
             raise ProposalInterrupted(tally.usage) from None
-        if getattr(message, "usage", None) is None:  # a web page, say
-            raise ProposalFailed(
-                f"{client.base_url} does not answer as the Messages API does; check "
-                "ANTHROPIC_BASE_URL.",
-                tally.usage,
-            )
+        except ValueError:  # JSON that is cut off
+            message = None
+        if not usable(message):  # a web page, say
+            told = "does not answer as the Messages API does; check ANTHROPIC_BASE_URL."
+            raise ProposalFailed(f"{host(client)} {told}", tally.usage)
         return message
 
     def _collect(
@@ -246,7 +244,9 @@ class Anthropic:
         """The answer in a batch's result; an invalid one is repaired outside of the batch."""
         tally = Tally(self._price, Usage(requests=1))
         if result.type != "succeeded":
-            return ProposalFailed(why(result), tally.usage)
+            return ProposalFailed(self._credentials.hide(why(result)), tally.usage)
+        if not usable(result.message):
+            return ProposalFailed("the service's answer is no message; ask again.", tally.usage)
         tally.pay(result.message, HALF)
 
         def parse(text: str) -> Proposal | None:
@@ -263,10 +263,11 @@ class Anthropic:
         import anthropic
 
         if isinstance(error, anthropic.APITimeoutError):
-            return f"{client.base_url} does not answer within {self._timeout:g} s; try again later."
+            return f"{host(client)} does not answer within {self._timeout:g} s; try again later."
         if not isinstance(error, anthropic.APIStatusError):
-            return f"{client.base_url} cannot be reached; check network and ANTHROPIC_BASE_URL."
-        detail = f"{error.status_code}: {(error.api_message or 'no reason given').rstrip('.')}"
+            return f"{host(client)} cannot be reached; check network and ANTHROPIC_BASE_URL."
+        reason = self._credentials.hide(str(error.api_message or "no reason given")).rstrip(".")
+        detail = f"{error.status_code}: {reason}"
         advice = {
             401: "set ANTHROPIC_API_KEY to a valid key",
             402: "see to the account's credit",

@@ -137,7 +137,8 @@ class Batches:
                 found.append((entry.custom_id, entry.result))
         except (AnthropicError, HTTPError) as error:
             raise JodaError(
-                f"{self.store}: batch {batch.id} cannot be collected ({error}); run the same again."
+                f"{self.store}: batch {batch.id} cannot be collected ({type(error).__name__}); run "
+                "the same again."
             ) from None
         yield from found
 

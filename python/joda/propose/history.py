@@ -1,6 +1,9 @@
 """What was proposed and what came of it, round by round: `history.json`."""
 
+from pathlib import Path
 from typing import Literal
+
+from pydantic import field_validator
 
 from joda.component import Frozen
 from joda.interaction.behaviour import Behaviour
@@ -69,6 +72,20 @@ class History(File):
     rounds: tuple[Round, ...] = ()
     failures: tuple[Failure, ...] = ()
     composed: str = ""
+
+    @field_validator("model", "templates")
+    @classmethod
+    def _check_paths(cls, value: str | tuple[str, ...]) -> str | tuple[str, ...]:
+        if "\0" in "".join(value):
+            raise ValueError("must be a path; there is a NUL in it")
+        return value
+
+    @field_validator("pictures")
+    @classmethod
+    def _check_names(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        if any(Path(name).name != name or "\0" in name for name in names or ()):
+            raise ValueError("must be names of files in pictures/, not paths")
+        return names
 
     @property
     def usage(self) -> Usage:

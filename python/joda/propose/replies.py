@@ -46,7 +46,7 @@ def parse(reply: str, task: Task, turns: Sequence[Turn]) -> Proposal | None:
     """
     try:
         answer = json.loads(reply)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:  # RecursionError: brackets too deep
         raise JodaError(f"It is not JSON ({error}).") from None
     if not isinstance(answer, dict) or answer.get("status") not in ("revised", "complete"):
         raise JodaError('It must be an object whose status is "revised" or "complete".')
@@ -92,7 +92,7 @@ def parse_ablation(reply: str, task: Task) -> Profile:
         return Profile.model_validate({"joint": task.context.joint, "channels": channels})
     except ValidationError as error:
         raise JodaError(_wrong(error)) from None
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise JodaError(f"It must be JSON with three lists of points ({error}).") from None
 
 

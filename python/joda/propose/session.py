@@ -24,6 +24,7 @@ from joda.files import make_folder, read_text, write_bytes, write_text
 from joda.interaction.behaviour import behaviour
 from joda.pictures.draw import draw
 from joda.pictures.style import png
+from joda.plain import plain
 from joda.profile import Profile
 from joda.proposal import Proposal
 from joda.propose import Answer, Proposer, Task, Turn, Usage, total
@@ -72,7 +73,7 @@ class Session:
         self.turns = [self._turn(round) for round in history.rounds]
         make_folder(folder)
         self._save()
-        write_text(folder / "context.json", self.context.model_dump_json(indent=2) + "\n")
+        write_text(folder / "context.json", plain(self.context.model_dump_json(indent=2)) + "\n")
         self.task = Task(self.context, library, self._pictures(), history.description)
         if self.turns and not self._finished():
             self._write(self.turns[-1])

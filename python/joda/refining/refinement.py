@@ -11,7 +11,7 @@ from joda.field import evaluate
 from joda.joints.least_squares import Fit
 from joda.joints.parameters import Parameters
 from joda.pictures.changes import draw_channels
-from joda.pictures.style import COLOURS, house_style
+from joda.pictures.style import COLOURS, clean, house_style
 from joda.profile import CHANNELS, Profile
 
 if TYPE_CHECKING:
@@ -154,6 +154,6 @@ def picture(
             axes.spines[["top", "right"]].set_visible(False)
         plots[0].legend(frameon=False, fontsize=8, ncols=3)
         plots[-1].set_xlabel(over)
-        left.suptitle(f"{after.joint.name}: profile", x=0.02, ha="left", parse_math=False)
+        left.suptitle(f"{clean(after.joint.name)}: profile", x=0.02, ha="left", parse_math=False)
         right.suptitle("measured", x=0.02, ha="left")
         return figure

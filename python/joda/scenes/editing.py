@@ -5,7 +5,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
@@ -16,7 +15,7 @@ from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
 from joda.scenes.limits import firm_limit, limit_parameters
-from joda.scenes.mjcf import Element, MjcfError, Source
+from joda.scenes.mjcf import Element, MjcfError, Source, quoted
 from joda.scenes.model import joint_name, joint_type, write_out
 from joda.scenes.scene import (
     DAMPING_ROW,
@@ -83,7 +82,10 @@ class EditedScene:
         self.notes.append(
             f"{path} was written out by MuJoCo first, numbers rounded to six digits: {reason}."
         )
-        source = Source(path, write_out(self.spec, path))
+        try:
+            source = Source(path, write_out(self.spec, path))
+        except MjcfError as error:  # a name with characters that XML has not
+            raise JodaError(f"{error}: a name in it is not XML; give it another one.") from None
         return source, dict(enumerate(source.joints()))
 
     def add(self, joint: int, profile: Profile, native: str, also: Mapping[str, str]) -> None:
@@ -109,7 +111,7 @@ class EditedScene:
         self.joints[joint][1].set(**{**changes, **also})
         self._configure(joint, profile)
         if not has_damping_row(self.model, joint):
-            row, name = quoteattr(DAMPING_ROW + self.names[joint]), quoteattr(self.names[joint])
+            row, name = quoted(DAMPING_ROW + self.names[joint]), quoted(self.names[joint])
             self.rows.append(f"<joint name={row} joint1={name} {INERT}/>")
 
     def finish(self, folder: Path) -> bytes:
@@ -121,10 +123,10 @@ class EditedScene:
         for instance in self.instances.values():
             name = instance.existing or f"joda_{self.names[instance.joint]}"
             keys = "".join(
-                f"\n  <config key={quoteattr(key)} value={quoteattr(value)}/>"
+                f"\n  <config key={quoted(key)} value={quoted(value)}/>"
                 for key, value in instance.config.items()
             )
-            text = f"<instance name={quoteattr(name)}>{keys}\n</instance>"
+            text = f"<instance name={quoted(name)}>{keys}\n</instance>"
             if instance.existing:
                 declared[name].replace(text)
             else:
@@ -161,7 +163,7 @@ class EditedScene:
     def _refer(self, joint: int, name: str) -> None:
         """Puts the reference to the instance into the joint's body."""
         body, element = self.joints[joint]
-        reference = f"<plugin instance={quoteattr(name)}/>"
+        reference = f"<plugin instance={quoted(name)}/>"
         inline = next((child for child in body.children if child.tag == "plugin"), None)
         if inline:
             inline.replace(reference)

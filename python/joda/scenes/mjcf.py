@@ -13,8 +13,15 @@ from pathlib import Path
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
+from joda.plain import UNSEEN
+
 _TAG = re.compile(rb"""<(?:[^"'>]|"[^"]*"|'[^']*')*>""")
 _ATTRIBUTE = re.compile(rb"""\s+([\w:.\-]+)\s*=\s*("[^"]*"|'[^']*')""")
+
+
+def quoted(value: str) -> str:
+    """An attribute's value between quotation marks; what is not seen but acts as its number."""
+    return UNSEEN.sub(lambda match: f"&#{ord(match[0])};", quoteattr(value))
 
 
 class MjcfError(ValueError):
@@ -73,7 +80,7 @@ class Element:
         """Sets attributes, in place where they exist already."""
         tag = self.document.content[self.start : self.inner]
         for name, value in values.items():
-            text = f"{name}={quoteattr(value)}".encode()
+            text = f"{name}={quoted(value)}".encode()
             for match in _ATTRIBUTE.finditer(tag):
                 if match[1].decode() == name:
                     tag = tag[: match.start(1)] + text + tag[match.end() :]
@@ -165,7 +172,7 @@ class Source:
                 element.set(file=moved(element.attributes["file"]))
         missing = [] if "assetdir" in named else [kind for kind in kinds[1:] if kind not in named]
         if missing:
-            paths = " ".join(f"{kind}={quoteattr(moved('.'))}" for kind in missing)
+            paths = " ".join(f"{kind}={quoted(moved('.'))}" for kind in missing)
             self.root.insert_first(f"<compiler {paths}/>")
 
     def _relocate_includes(self, document: Document, there: Path) -> None:
@@ -223,7 +230,11 @@ def _parse(document: Document) -> Element:
             element.close = parser.CurrentByteIndex
             element.end = content.index(b">", parser.CurrentByteIndex) + 1
 
+    def refuse(name: str, *declared: object) -> None:
+        raise MjcfError(f"{document.path}: it declares an entity, which MuJoCo does not expand")
+
     parser.StartElementHandler, parser.EndElementHandler = begin, finish
+    parser.EntityDeclHandler = refuse
     try:
         parser.Parse(content, True)
     except expat.ExpatError as error:

@@ -6,15 +6,18 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from joda.errors import JodaError
-from joda.profile import Joint
+from joda.profile import Joint, describe
 
 _TYPES = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name
     for name in ("free", "ball", "slide", "hinge")
 }
 _SCALAR = ("hinge", "slide")
+LONGEST_NAME = 1000
+"""Bytes of a name in a model."""
 
 
 def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
@@ -25,11 +28,28 @@ def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
         spec = mujoco.MjSpec.from_file(str(path))
         model = spec.compile()
         bytes(model.names).decode()
-        return spec, model
     except UnicodeDecodeError:
         raise _not_utf8(path) from None
-    except (ValueError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:  # RuntimeError: out of memory
         raise JodaError(f"{path}: MuJoCo cannot load it: {sentence(error)}") from None
+    _check_bounds(path, model)
+    return spec, model
+
+
+def _check_bounds(path: Path, model: mujoco.MjModel) -> None:
+    """Raises JodaError for names that nobody can read and masses that make all else NaN."""
+    names = bytes(model.names).split(b"\0")
+    longest = max(
+        len(name) for name in names if not name.startswith(b"joda_")
+    )  # longer than theirs
+    if longest > LONGEST_NAME:
+        raise JodaError(f"{path}: has a name of {longest} letters; give at most {LONGEST_NAME}.")
+    heaviest = max(model.body_mass.max(), model.body_inertia.max())
+    if heaviest > mujoco.mjMAXVAL:
+        raise JodaError(
+            f"{path}: has a mass or an inertia of {heaviest:.3g} kg or kg·m²; MuJoCo computes with "
+            f"at most {mujoco.mjMAXVAL:g}."
+        )
 
 
 def write_out(spec: mujoco.MjSpec, path: Path) -> bytes:
@@ -120,7 +140,7 @@ def describe_joint(
     """The joint as a profile knows it, over `limits` or else its own range.
 
     Raises:
-        JodaError: it has no range.
+        JodaError: it has no range, or a name or a range that no profile can have.
     """
     lo, hi = limits or map(float, model.jnt_range[joint])
     if not lo < hi:
@@ -128,9 +148,12 @@ def describe_joint(
             f"joint '{joint_name(model, joint)}' has no range; add range=\"lo hi\" to it."
         )
     hinge = joint_type(model, joint) == "hinge"
-    return Joint(
-        name=joint_name(model, joint),
-        type="hinge" if hinge else "slide",
-        range=(lo, hi),
-        unit="rad" if hinge else "m",
-    )
+    try:
+        return Joint(
+            name=joint_name(model, joint),
+            type="hinge" if hinge else "slide",
+            range=(lo, hi),
+            unit="rad" if hinge else "m",
+        )
+    except ValidationError as error:
+        raise JodaError(f"joint '{joint_name(model, joint)}': {describe(error)}") from None
