@@ -31,7 +31,7 @@ def context(
     found = run(model, joint)
     if as_json:
         write_text(as_json, found.model_dump_json(indent=2) + "\n")
-    print(found.describe())
+    print("\n".join((found.describe(), *found.doubts)))
     if as_json:
         print(as_json)
 

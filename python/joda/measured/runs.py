@@ -205,6 +205,11 @@ def read_columns(
     return lines, {name: np.array(column) for name, column in values.items()}
 
 
+def header(path: Path) -> list[str]:
+    """The names of a file's columns; raises JodaError if it cannot be read."""
+    return [name.strip() for name in next(_rows(path), (0, []))[1]]
+
+
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Rows with the numbers of their lines; comments and empty lines are left out."""
     reader = csv.reader(StringIO(read_text(path).removeprefix("\ufeff")))

@@ -1,0 +1,36 @@
+"""Which actuators act on a joint: directly, by a tendon, a site or a slider-crank."""
+
+import mujoco
+import numpy as np
+
+PLACES = 5
+"""At how many places of the range moment arms are looked at: a crank has none at its dead point."""
+LEAST = 1e-9
+"""Moment arms below this are rounding."""
+
+
+def actuators_on(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
+    """The actuators that act on a joint, by name or else "actuator 3".
+
+    Those have a moment arm on it somewhere in its range, all other joints at their reference.
+    Actuators that are disabled do not act, nor does adhesion, which only holds what it touches.
+
+    Args:
+        model: compiled.
+        joint: id of a hinge or slide.
+    """
+    if not model.nu or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION:
+        return ()
+    data, dof = mujoco.MjData(model), int(model.jnt_dofadr[joint])
+    acts = np.zeros(model.nu, bool)
+    for position in np.linspace(*model.jnt_range[joint], PLACES):
+        data.qpos[model.jnt_qposadr[joint]] = position
+        mujoco.mj_fwdPosition(model, data)
+        for k in range(model.nu):
+            own = slice(data.moment_rowadr[k], data.moment_rowadr[k] + data.moment_rownnz[k])
+            arms = data.actuator_moment[own][data.moment_colind[own] == dof]
+            acts[k] |= bool(np.any(np.abs(arms) > LEAST))
+    acts &= model.actuator_trntype != mujoco.mjtTrn.mjTRN_BODY
+    group = np.clip(model.actuator_group, 0, 31)
+    acts &= (model.opt.disableactuator >> group) & 1 == 0
+    return tuple(model.actuator(k).name or f"actuator {k}" for k in np.flatnonzero(acts))
