@@ -15,7 +15,9 @@ from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
 from joda.files import check_target, write_together
 from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
-from joda.measured.runs import QuasiStatic, Run, read_measurement
+from joda.measured.driven import read_logs
+from joda.measured.obstructed import clear_of_contacts
+from joda.measured.runs import QuasiStatic, Run
 from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.refining.curvefit import CurveProblem
@@ -79,6 +81,7 @@ def refine(
     fit: Collection[Kind] = ("values", "intervals"),
     keep_shape: bool = True,
     finer: int = 0,
+    passive: bool = False,
     force: bool = False,
     progress: Callable[[str, int, int, float], None] = lambda stage, number, total, rms: None,
 ) -> Refined:
@@ -102,6 +105,7 @@ def refine(
             strengths, the damping_ratio of the ends of the range, inertia, a gravity offset.
         keep_shape: see above.
         finer: so many times a control point is put halfway between each two, before the fit.
+        passive: whether the actuators on the joint, if there are any, were off.
         force: overwrite what exists.
         progress: told the stage, the iteration, of how many at most, and the RMS misfit (rad or m;
             N·m or N of curves).
@@ -122,11 +126,13 @@ def refine(
         raise JodaError(f"fit: '{sorted(unknown)[0]}' is none of {', '.join(KINDS)}.")
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
-    measured, held_out = ([read_measurement(path) for path in paths] for paths in (runs, check))
-    if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
-        raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
     spec, compiled = load(source)
     number = find_joint(compiled, joint)
+    (measured, unused), (held_out, more) = (
+        read_logs(compiled, number, paths, passive) for paths in (runs, check)
+    )
+    if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
+        raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
     name = joint_name(compiled, number)
     profiles = profiles_of(spec, compiled)
     if name not in profiles:
@@ -135,6 +141,8 @@ def refine(
             "one with joda attach."
         )
     before, found = profiles[name], context(source, name)
+    clear = clear_of_contacts(compiled, number, found.joint, measured)
+    apart = clear_of_contacts(compiled, number, found.joint, held_out) if held_out else None
     begin = before
     for _ in range(finer):
         begin = resolved(begin)
@@ -142,7 +150,7 @@ def refine(
     parameters = Parameters(begin, fit, keep_shape=keep_shape, gravity=unit)
     if not len(parameters.start):
         raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
-    problem = _problem(found, compiled, number, parameters, measured)
+    problem = _problem(found, compiled, number, parameters, clear.measured)
     result = problem.fit(
         iterations, method, lambda stage, k, rms: progress(stage, k, iterations, rms)
     )
@@ -150,13 +158,14 @@ def refine(
     errors = problem.rms(parameters.start), problem.rms(result.theta)
     windows = problem.windows(result.theta)
     checked = None
-    if held_out:
-        other = _problem(found, compiled, number, parameters, held_out)
+    if apart:
+        other = _problem(found, compiled, number, parameters, apart.measured)
         checked = other.rms(parameters.start), other.rms(result.theta)
     hidden = unseen(begin, parameters, result.covariance)
     also, said = _beyond(parameters, result.theta, compiled, number, found)
     scene, notes = attached(source, after, target, joint=name, also=also)
-    notes += [*said, *problem.notes]
+    notes += [*said, *found.doubts, *unused, *more, *clear.notes, *(apart.notes if apart else [])]
+    notes += problem.notes
     balance = np.array(found.positions), -np.array(found.gravity_force)
     figure = picture(before, after, balance, problem, result, hidden)
     write_together(

@@ -12,6 +12,7 @@ from joda.measured.curves import CurveError, FailingForce, told
 from joda.measured.places import BINS, places
 from joda.measured.reading import Measured
 from joda.measured.replay import Window
+from joda.scenes.contacts import Contact
 
 Array = NDArray[np.float64]
 By = Literal["position", "velocity", "direction", "time", "load"]
@@ -72,6 +73,7 @@ class Comparison:
         curves: errors by quasi-static curve.
         failing_force: where its quasi-static force fails, the largest share first.
         notes: what is suspicious about the data, a sentence each.
+        contacts: of the scene that resist the joint where it was measured.
     """
 
     joint: str
@@ -84,6 +86,7 @@ class Comparison:
     curves: tuple[CurveError, ...]
     failing_force: tuple[FailingForce, ...]
     notes: tuple[str, ...]
+    contacts: tuple[Contact, ...]
 
     def to_json(self) -> str:
         """The comparison as JSON."""
@@ -96,6 +99,7 @@ class Comparison:
             "curves": [vars(curve) for curve in self.curves],
             "failing_force": [vars(place) for place in self.failing_force],
             "notes": list(self.notes),
+            "contacts": [vars(contact) for contact in self.contacts],
         }
         return dumps(content, indent=2, ensure_ascii=False) + "\n"
 
