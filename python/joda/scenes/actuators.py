@@ -22,8 +22,9 @@ def actuators_on(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
     if not model.nu or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION:
         return ()
     data, dof = mujoco.MjData(model), int(model.jnt_dofadr[joint])
+    lo, hi = map(float, model.jnt_range[joint])
     acts = np.zeros(model.nu, bool)
-    for position in np.linspace(*model.jnt_range[joint], PLACES):
+    for position in np.linspace(lo, hi, PLACES):
         data.qpos[model.jnt_qposadr[joint]] = position
         mujoco.mj_fwdPosition(model, data)
         for k in range(model.nu):

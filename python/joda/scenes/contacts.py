@@ -40,6 +40,7 @@ class Contact:
         interval: where, in normalised position.
         path: the same, rad or m.
         force: the largest against the motion there, N·m or N.
+        presses: whether it pushes somewhere, and does not only rub.
         along: whether it only rubs, and that wherever the joint was moved.
         stop: whether it lies at an end of the range, as a stop does.
     """
@@ -49,6 +50,7 @@ class Contact:
     interval: tuple[float, float]
     path: tuple[float, float]
     force: float
+    presses: bool
     along: bool
     stop: bool
 
@@ -81,7 +83,7 @@ def contacts_along(
     out = []
     for pair in sorted({pair for look in looks for pair in look}):
         resists = np.array([sweep.resists(look.get(pair)) for look in looks])
-        rubs = not any(sweep.presses(look.get(pair)) for look in looks)
+        pushes = np.array([sweep.presses(look.get(pair)) for look in looks])
         for first, last in _runs(resists):
             begin = sweep.edge(pair, positions, first, -1)
             end = sweep.edge(pair, positions, last, 1)
@@ -94,7 +96,8 @@ def contacts_along(
                     interval=(a, b),
                     path=(begin, end),
                     force=force,
-                    along=rubs and bool(resists.all()),
+                    presses=bool(pushes[first : last + 1].any()),
+                    along=bool(resists.all() and not pushes.any()),
                     stop=b <= END or a >= 1 - END,
                 )
             )

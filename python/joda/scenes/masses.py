@@ -38,10 +38,8 @@ def mass_doubts(model: mujoco.MjModel, joint: int, inertia: float, driven: bool)
     mass = float(model.body_subtreemass[body])
     own = moves_with(model, body)[model.geom_bodyid]
     collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    parts = [
-        np.flatnonzero(part) for part in (own & collides, own & ~collides, own) if part.any()
-    ]
-    sizes = np.array([[_volume(model, g), *_box(model, g)] for part in parts for g in part])
+    parts = [np.flatnonzero(part) for part in (own & collides, own & ~collides, own) if part.any()]
+    sizes = np.array([[_volume(model, int(g)), *_box(model, int(g))] for p in parts for g in p])
     sums = np.add.reduceat(sizes, np.cumsum([0, *map(len, parts[:-1])])) if parts else None
     out = [] if sums is None else [_of_mass(name, mass, sums)]
     out.append(_of_armature(model, joint, inertia) if not driven else "")
