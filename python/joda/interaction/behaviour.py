@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from joda._context import Context
 from joda.component import Frozen
 from joda.interaction.pulling import Pull, apart, number, pulled
-from joda.interaction.surroundings import Surroundings
+from joda.interaction.surroundings import Surroundings, told
 from joda.joints.rig import rig
 from joda.profile import Profile
 from joda.scenes.motion import Motion, settle
@@ -24,9 +24,6 @@ STARTS = np.unique([*np.linspace(0, 1, 61), 0.005, 0.01, 0.99, 0.995])
 
 IN_SCENE = np.unique([*np.linspace(0, 1, 31), 0.02])
 """The same where its whole scene is simulated, which takes longer."""
-
-NEAR = 0.02
-"""How near a contact (in normalised position) a hand is that got stuck at it."""
 
 PATIENCE = 15.0
 """How long (s) a joint that was let go may take to come to rest."""
@@ -43,7 +40,8 @@ class Stretch(Frozen):
 
     Attributes:
         start: interval of normalised positions where it is let go.
-        goes: what it then does; blocked where the scene lets it not be.
+        goes: what it then does; blocked where something of the scene is, or is in the way from
+            the closed end.
         end: normalised position where it comes to rest, the mean over the stretch.
     """
 
@@ -100,7 +98,7 @@ class Behaviour(Frozen):
         unit, speed = ("N·m", "rad/s") if hinge else ("N", "m/s")
         closed = self.closed_end
         opened = "high_end" if closed == "low_end" else "low_end"
-        words = {closed: "closes", opened: "opens", "blocked": "the scene does not let it be there"}
+        words = {closed: "closes", opened: "opens", "blocked": "blocked by the scene"}
         lines = [f"in the scene as it is: {self.touched}"] if self.touched else []
         lines += ["let go at rest (s is the normalised position):"]
         for stretch in self.let_go:
@@ -119,7 +117,7 @@ class Behaviour(Frozen):
             else:
                 lines.append(
                     f"{name} it slowly by hand: impossible, stuck at s = {way.at:.2f} "
-                    f"with {way.force:.3g} {unit}{arm}"
+                    f"with {way.force:.3g} {unit}{arm}{_by(way)}"
                 )
         if self.fastest:
             edge = self.fastest.speed * context.lever_arm
@@ -149,10 +147,13 @@ def behaviour(context: Context, profile: Profile, around: Surroundings | None = 
     lo, hi = context.joint.range
     closed: End = "high_end" if context.closed_end == "high_end" else "low_end"
     shut, open_ = (0.0, 1.0) if closed == "low_end" else (1.0, 0.0)
-    opening, reached = pulled(model, joint, shut, open_, context)
-    if not (around and not opening.arrived and around.inside(reached, NEAR)):
+    begin = around.reference if around and around.inside(shut) else shut
+    opening, reached = pulled(model, joint, begin, open_, context)
+    if around:
+        opening = _held(opening, around)
+    if not opening.held_by:
         reached = open_
-    back = reached if abs(reached - shut) > NEAR else open_
+    back = reached if abs(reached - shut) > AT_END else open_
     closing, _ = pulled(model, joint, back, shut, context)
     far = (min(shut, reached), max(shut, reached))
 
@@ -173,15 +174,25 @@ def behaviour(context: Context, profile: Profile, around: Surroundings | None = 
         let_go=_stretches(starts, rests),
         settles_at=_settles(starts[freely], rests[freely]),
         opening=opening,
-        closing=closing,
+        closing=_held(closing, around) if around else closing,
         fastest=_fastest(starts, motions, rests, closed, context),
-        touched=around.told if around else "",
+        touched=told(around.contacts) if around else "",
     )
+
+
+def _held(way: Pull, around: Surroundings) -> Pull:
+    """The same with what is in the way, where the hand got stuck."""
+    near = () if way.arrived else around.near(way.at)
+    return way.model_copy(update={"held_by": told(near)}) if near else way
 
 
 def _snaps(way: Pull) -> str:
     places = ", ".join(f"{s:.2f}" for s in way.snaps_at)
     return f"; it snaps ahead of the hand at s = {places}" if places else ""
+
+
+def _by(way: Pull) -> str:
+    return f": {way.held_by}" if way.held_by else ""
 
 
 def _goes(start: float, rest: float) -> Goes:

@@ -30,6 +30,7 @@ class Pull(Frozen):
         at: normalised position where it took that; where it got stuck, if it did.
         first, middle, last: the most within the first 15 % of the way, the median between 30 % and
             70 %, the most within the last 15 %; N·m or N, negative where the hand holds back.
+        held_by: what of the scene is in the way where it got stuck; empty if nothing is.
         snaps_at: normalised positions on the way where the joint ran ahead of the hand.
     """
 
@@ -40,6 +41,7 @@ class Pull(Frozen):
     middle: float
     last: float
     snaps_at: tuple[float, ...]
+    held_by: str = ""
 
 
 def grip(context: Context) -> float:

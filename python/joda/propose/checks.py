@@ -212,7 +212,6 @@ def moves(seen: Seen) -> str:
     for name, way in (("opened", seen.behaviour.opening), ("closed", seen.behaviour.closing)):
         if not way.arrived:
             force = way.force / seen.context.lever_arm
-            touched = seen.behaviour.touched
-            why = f", as in the scene {touched}" if touched else ""
+            why = f", where {way.held_by}" if way.held_by else ""
             return f"a hand cannot get it {name}, stuck at s = {way.at:.2f} with {force:.3g} N{why}"
     return ""

@@ -9,18 +9,18 @@ LEAST = 1e-9
 """Moment arms below this are rounding."""
 
 
-def actuators_on(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
-    """The actuators that act on a joint, by name or else "actuator 3".
+def acting_on(model: mujoco.MjModel, joint: int) -> list[int]:
+    """The actuators, by id, that have a moment arm on a joint somewhere in its range.
 
-    Those have a moment arm on it somewhere in its range, all other joints at their reference.
-    Actuators that are disabled do not act, nor does adhesion, which only holds what it touches.
+    All other joints are at their reference. Actuators that are disabled do not act, nor does
+    adhesion, which only holds what it touches.
 
     Args:
         model: compiled.
         joint: id of a hinge or slide.
     """
     if not model.nu or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION:
-        return ()
+        return []
     data, dof = mujoco.MjData(model), int(model.jnt_dofadr[joint])
     lo, hi = map(float, model.jnt_range[joint])
     acts = np.zeros(model.nu, bool)
@@ -34,4 +34,9 @@ def actuators_on(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
     acts &= model.actuator_trntype != mujoco.mjtTrn.mjTRN_BODY
     group = np.clip(model.actuator_group, 0, 31)
     acts &= (model.opt.disableactuator >> group) & 1 == 0
-    return tuple(model.actuator(k).name or f"actuator {k}" for k in np.flatnonzero(acts))
+    return [int(k) for k in np.flatnonzero(acts)]
+
+
+def actuators_on(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
+    """The same by name, or "actuator 3" where it has none."""
+    return tuple(model.actuator(k).name or f"actuator {k}" for k in acting_on(model, joint))
