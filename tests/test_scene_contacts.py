@@ -77,6 +77,24 @@ def test_a_box_meets_a_post_where_their_sizes_say(option):
     assert one.presses and one.hinders and not one.along and not one.stop
 
 
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"more": '<actuator><position joint="j" kp="500"/></actuator>'},
+        {"option": 'gravity="-9.81 0 0"'},
+        {"joint": 'stiffness="300" springref="-1"'},
+        {"joint": 'frictionloss="30"'},
+    ],
+    ids=["actuator", "gravity", "spring", "friction"],
+)
+def test_what_pulls_the_joint_away_or_holds_it_hides_no_contact(changed):
+    text = slide(**changed)
+    if "option" in changed:
+        text = text.replace(' gravity="0 0 0"', "")
+    (one,) = found(text)
+    assert one.path == pytest.approx((0.5, 1.0), abs=1e-4)
+
+
 def test_a_leaf_meets_a_corner_where_geometry_says():
     (one,) = found(DOOR.format(mass=4), joint="hinge")
     # It leaves the chest where its end passes the near side: cos q = 0.2 / 0.6, less its thickness.

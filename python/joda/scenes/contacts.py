@@ -6,6 +6,7 @@ joint, not that two geoms touch: a door that rests in its frame touches it all a
 """
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import mujoco
@@ -26,6 +27,8 @@ PACE = 0.1
 """Speed at which it moves meanwhile, ranges per second."""
 FELT = 0.02
 """A contact resists if its force would move the joint by half this share of the range in 1 s."""
+ALL_ELSE = ("GRAVITY", "ACTUATION", "SPRING", "DAMPER", "FRICTIONLOSS", "LIMIT", "EQUALITY")
+"""What acts on a joint besides contacts."""
 END = 0.01
 """A contact no farther from an end of the range than this share of it is that end's stop."""
 
@@ -112,7 +115,10 @@ class _Sweep:
     """A scene in which a joint is put here and there."""
 
     def __init__(self, model: mujoco.MjModel, joint: int, described: Joint) -> None:
-        self.model, self.data = model, mujoco.MjData(model)
+        self.model = copy(model)  # pulled away from a contact by anything else, it shows no force
+        for kind in ALL_ELSE:
+            self.model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}"))
+        self.data = mujoco.MjData(self.model)
         self.lo, hi = described.range
         self.span = hi - self.lo
         self.qpos, self.dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])

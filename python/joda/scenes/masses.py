@@ -39,7 +39,7 @@ def mass_doubts(model: mujoco.MjModel, joint: int, inertia: float, driven: bool)
     own = moves_with(model, body)[model.geom_bodyid]
     collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     parts = [np.flatnonzero(part) for part in (own & collides, own & ~collides, own) if part.any()]
-    sizes = np.array([[_volume(model, int(g)), *_box(model, int(g))] for p in parts for g in p])
+    sizes = np.array([[*_volumes(model, int(g)), *_box(model, int(g))] for p in parts for g in p])
     sums = np.add.reduceat(sizes, np.cumsum([0, *map(len, parts[:-1])])) if parts else None
     out = [] if sums is None else [_of_mass(name, mass, sums)]
     out.append(_of_armature(model, joint, inertia) if not driven else "")
@@ -49,9 +49,10 @@ def mass_doubts(model: mujoco.MjModel, joint: int, inertia: float, driven: bool)
 def _of_mass(name: str, mass: float, sizes: Array) -> str:
     """A sentence where the mass does not fit the size; empty where it may.
 
-    `sizes`: of each way to see the part, its volume, its boxes' volume (m³) and their faces (m²).
+    `sizes`: of each way to see the part, its volume, that which MuJoCo counts for its mass, its
+    boxes' volume (m³) and their faces (m²).
     """
-    volumes, boxes, faces = np.maximum(sizes, 1e-18).T
+    volumes, counted, boxes, faces = np.maximum(sizes, 1e-18).T
     density, most = mass / volumes.min(), mass / boxes.max()
     said = f"Joint '{name}' moves {mass:.3g} kg"
     if density < LIGHTEST or mass / faces.min() < THINNEST:
@@ -66,12 +67,19 @@ def _of_mass(name: str, mass: float, sizes: Array) -> str:
             f"{said} within {1e3 * boxes.max():.3g} litres, {most:.3g} kg/m³, heavier than lead: "
             "set the mass that was weighed (<inertial> or the geoms' mass), or mend the scale."
         )
-    water = np.flatnonzero(np.abs(mass / volumes / WATER - 1) < NEARLY)
-    if len(water) and mass > SOLID:
+    if mass <= SOLID:
+        return ""
+    if np.any(np.abs(mass / volumes / WATER - 1) < NEARLY):
         return (
-            f"{said}, its {1e3 * volumes[water[0]]:.3g} litres as solid as water (1000 kg/m³, "
-            "MuJoCo's default density): if it is hollow, set the mass that was weighed, a density, "
-            'or inertia="shell" on its mesh.'
+            f"{said}, its {mass:.3g} litres as solid as water (1000 kg/m³, MuJoCo's default "
+            "density): if it is hollow, set the mass that was weighed, a density, or "
+            'inertia="shell" on its mesh.'
+        )
+    if np.any(twice := np.abs(mass / counted / WATER - 1) < NEARLY):
+        return (
+            f"{said}, as MuJoCo counts {mass:.3g} litres of its default density (1000 kg/m³) for "
+            f"meshes that enclose {1e3 * volumes[twice][0]:.3g}: set the mass that was weighed, or "
+            'inertia="exact" or "shell" on the mesh.'
         )
     return ""
 
@@ -95,23 +103,28 @@ def _box(model: mujoco.MjModel, geom: int) -> tuple[float, float]:
     return float(x * y * z), float(y * z)
 
 
-def _volume(model: mujoco.MjModel, geom: int) -> float:
-    """Of a geom, m³; of a mesh, that which its faces enclose, at most its box."""
-    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return float(4 / 3 * np.pi * size[0] ** 3)
-    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-        return float(4 / 3 * np.pi * np.prod(size))
-    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        return float(2 * np.pi * size[0] ** 2 * size[1])
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return float(2 * np.pi * size[0] ** 2 * (size[1] + 2 / 3 * size[0]))
-    box = _box(model, geom)[0]
-    if kind != mujoco.mjtGeom.mjGEOM_MESH:
-        return box
-    mesh = int(model.geom_dataid[geom])
-    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    vertices = model.mesh_vert[first : first + count].astype(float)
-    first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
-    a, b, c = (vertices - vertices.mean(axis=0))[model.mesh_face[first : first + count].T]
-    return min(float(abs(np.sum(a * np.cross(b, c)))) / 6, box)
+def _volumes(model: mujoco.MjModel, geom: int) -> tuple[float, float]:
+    """Of a geom, m³, and what MuJoCo counts of it for its mass.
+
+    A mesh encloses the sum of the tetrahedra that its faces make with a point; MuJoCo's
+    inertia="legacy" counts those that are outside as inside too.
+    """
+    kind, size, box = int(model.geom_type[geom]), model.geom_size[geom], _box(model, geom)[0]
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[geom])
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        vertices = model.mesh_vert[first : first + count].astype(float)
+        first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        a, b, c = corners = vertices[model.mesh_face[first : first + count].T]
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        centre = np.average(corners.mean(axis=0), axis=0, weights=np.maximum(areas, 1e-18))
+        parts = np.sum((a - centre) * np.cross(b - centre, c - centre), axis=1) / 6
+        return min(float(abs(parts.sum())), box), float(np.abs(parts).sum())
+    round = np.pi * size[0] ** 2
+    volume = {
+        int(mujoco.mjtGeom.mjGEOM_SPHERE): 4 / 3 * round * size[0],
+        int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): 4 / 3 * np.pi * np.prod(size),
+        int(mujoco.mjtGeom.mjGEOM_CYLINDER): 2 * round * size[1],
+        int(mujoco.mjtGeom.mjGEOM_CAPSULE): 2 * round * (size[1] + 2 / 3 * size[0]),
+    }.get(kind, box)
+    return float(volume), float(volume)
