@@ -48,10 +48,11 @@ def _unused(
     """Notes on columns that belong to logs of driven or several joints; raises JodaError."""
     names = header(path)
     pairs = [name.split(":", 1) for name in names if ":" in name]
-    commands = [f"ctrl:{of}" for kind, of in pairs if kind.lower() == "ctrl"]
-    others = [name for name in names if name.split(":", 1)[0].lower() in OF_JOINTS and ":" in name]
+    kinds = [(kind.strip().lower(), of.strip()) for kind, of in pairs]
+    commands = [f"ctrl:{of}" for kind, of in kinds if kind == "ctrl"]
+    others = [f"{kind}:{of}" for kind, of in kinds if kind in OF_JOINTS]
     for column in commands:
-        if column.split(":", 1)[1] in acting and not passive:
+        if column.removeprefix("ctrl:") in acting and not passive:
             raise JodaError(
                 f"{path}: column '{column}' is the command of an actuator on joint "
                 f"'{joint_name(model, joint)}', and logs of driven joints are not supported yet; "
