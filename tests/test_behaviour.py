@@ -7,7 +7,8 @@ import pytest
 
 from joda import context
 from joda.component import Component
-from joda.interaction.behaviour import AT_END, GRIP, STARTS, behaviour, grip
+from joda.interaction.behaviour import AT_END, STARTS, behaviour
+from joda.interaction.pulling import GRIP, grip
 from joda.profile import Channel, Channels, Profile, Resistance
 
 SLIDE = """

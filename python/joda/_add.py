@@ -72,6 +72,7 @@ def add(
     output: str | Path,
     *,
     effect: str | None = None,
+    passive: bool = False,
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Added:
@@ -89,6 +90,7 @@ def add(
         runs: CSV files with time, position and perhaps force, or quasi-static curves.
         output: scene to write; beside it, with its name, go .composed.json and .png.
         effect: which one; None: the diagnosis' first.
+        passive: whether the actuators on the joint, if there are any, were off.
         force: overwrite what exists.
         progress: told what is being done.
 
@@ -103,7 +105,7 @@ def add(
     composed, picture = beside(target, force)
     told = read_diagnosis(Path(diagnosis))
     name, direction, near = _chosen(told, Path(diagnosis), effect)
-    measured = read_runs(model, joint, runs)
+    measured = read_runs(model, joint, runs, passive)
     own = measured.profile.joint
     if told.get("joint", own.name) != own.name:
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")

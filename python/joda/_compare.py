@@ -33,6 +33,7 @@ def compare(
     joint: str,
     runs: Sequence[str | Path],
     *,
+    passive: bool = False,
     json: str | Path | None = None,
     report: str | Path | None = None,
     picture: str | Path | None = None,
@@ -46,6 +47,7 @@ def compare(
         joint: its name or address, see `joda.scenes.model.find_joint`.
         runs: CSV files with time, position and perhaps force; without time, position and the force
             that slowly moves the joint there, in the order measured.
+        passive: whether the actuators on the joint, if there are any, were off.
         json, report, picture: files to write: all numbers, an HTML page that needs nothing else,
             a PNG.
         force: overwrite them.
@@ -60,7 +62,7 @@ def compare(
     targets = [Path(path) for path in (json, report, picture) if path]
     for path in targets:
         check_target(path, force)
-    measured = read_measured(model, joint, runs)
+    measured = read_measured(model, joint, runs, passive)
     found = errors(measured, begin=progress)
     short = window_rows(measured)
     judged = adequacy(measured, found, short) if found.runs else None
@@ -80,6 +82,7 @@ def compare(
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
         failing_force=tuple(failing_force(measured.curves, described)),
         notes=(*measured.notes, *left_out(measured.runs, LENGTHS[0]), *([note] if note else [])),
+        contacts=measured.contacts,
     )
     files: dict[Path, bytes | str] = {}
     if json:

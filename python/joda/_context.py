@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from joda.profile import Joint
+from joda.scenes.actuators import actuators_on
 from joda.scenes.angles import range_doubt
+from joda.scenes.masses import mass_doubts
 from joda.scenes.model import describe_joint, find_joint, load_model, moves_with
 from joda.scenes.motion import gravity_force
 
 POSITIONS = 21
 """At how many positions, evenly over the range, inertia and gravity are sampled."""
-
-_ACTS_ON_JOINT = int(mujoco.mjtTrn.mjTRN_JOINT)
-_ACTS_IN_PARENT = int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 Vector = tuple[float, float, float]
 End = Literal["low_end", "high_end"]
@@ -47,8 +46,10 @@ class Context(BaseModel):
             hand's force (N) it gives the generalised force.
         size: of the box around what moves, along the world's axes, at the low end; m.
         driven: whether an actuator acts on the joint.
+        actuators: which ones do.
         names: what the file calls the joint, the child and what moves with it, in this order.
         around: what it calls the bodies above, nearest first, and the model.
+        doubts: what cannot be meant of its range, mass or inertia, a sentence each.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -70,13 +71,10 @@ class Context(BaseModel):
     lever_arm: float
     size: Vector
     driven: bool
+    actuators: tuple[str, ...] = ()
     names: tuple[str, ...]
     around: tuple[str, ...]
-
-    @property
-    def doubt(self) -> str:
-        """A sentence on what cannot be meant as it stands in the model; else nothing."""
-        return range_doubt(self.joint)
+    doubts: tuple[str, ...] = ()
 
     def describe(self) -> str:
         """The context in a few lines for a person."""
@@ -96,10 +94,9 @@ class Context(BaseModel):
             "gravity": f"{_span(self.gravity_force)} {force} (positive drives +q)",
             "upper end": self.upper_end.replace("_", " "),
             "closed end": f"{self.closed_end.replace('_', ' ')}; opening: {opens}",
-            **({"driven by": "an actuator"} if self.driven else {}),
+            **({"driven by": ", ".join(self.actuators)} if self.driven else {}),
             "names": ", ".join(self.names[:12]),
             "part of": ", ".join(self.around),
-            **({"doubtful": self.doubt} if self.doubt else {}),
         }
         return "\n".join(f"{name + ':':12} {text}" for name, text in rows.items())
 
@@ -133,6 +130,7 @@ def context(model: str | Path, joint: str) -> Context:
     gravity[np.abs(gravity) <= 1e-9 * weight] = 0  # rounding
     parent = int(m.body_parentid[body])
     points = _points(m, data, body)
+    acting = actuators_on(m, j)
     return Context(
         joint=described,
         parent=_body_name(m, parent),
@@ -151,9 +149,14 @@ def context(model: str | Path, joint: str) -> Context:
         lever_arm=_lever_arm(described, points, data.xanchor[j], data.xaxis[j])
         or float(np.sqrt(inertia.mean() / m.body_subtreemass[body])),
         size=_vector(np.ptp(points, axis=0)),
-        driven=_driven(m, j),
+        driven=bool(acting),
+        actuators=acting,
         names=_names(m, j),
         around=_around(m, j),
+        doubts=(
+            *filter(None, [range_doubt(described)]),
+            *mass_doubts(m, j, float(inertia.mean()), bool(acting)),
+        ),
     )
 
 
@@ -193,11 +196,6 @@ def _lever_arm(
     away = points - anchor
     away -= np.outer(away @ axis, axis)
     return float(np.linalg.norm(away, axis=1).max())
-
-
-def _driven(m: mujoco.MjModel, joint: int) -> bool:
-    acts = np.isin(m.actuator_trntype, (_ACTS_ON_JOINT, _ACTS_IN_PARENT))
-    return bool(np.any(acts & (m.actuator_trnid[:, 0] == joint)))
 
 
 def _names(m: mujoco.MjModel, joint: int) -> tuple[str, ...]:

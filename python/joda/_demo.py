@@ -12,8 +12,8 @@ from joda._context import context
 from joda._generate import generate
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied, write_bytes
-from joda.interaction.behaviour import FIRMNESS, SLOW, grip
 from joda.interaction.hand import pull
+from joda.interaction.pulling import FIRMNESS, SLOW, grip
 from joda.measured.runs import Run, write_run
 from joda.pictures.offscreen import Image, NoRenderer, render
 from joda.pictures.style import house_style, write_png

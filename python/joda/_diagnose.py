@@ -27,6 +27,7 @@ def diagnose(
     runs: Sequence[str | Path],
     *,
     exclude: Collection[str] = (),
+    passive: bool = False,
     json: str | Path | None = None,
     report: str | Path | None = None,
     picture: str | Path | None = None,
@@ -40,6 +41,7 @@ def diagnose(
         joint: its name or address, see `joda.scenes.model.find_joint`.
         runs: CSV files with time, position and perhaps force.
         exclude: effects that are not considered.
+        passive: whether the actuators on the joint, if there are any, were off.
         json, report, picture: files to write: all numbers, an HTML page that needs nothing else,
             a PNG.
         force: overwrite them.
@@ -57,7 +59,7 @@ def diagnose(
             check_target(Path(path), force)
     for name in exclude:
         check_effect(name)
-    measured = read_runs(model, joint, runs)
+    measured = read_runs(model, joint, runs, passive)
     found = diagnosed(measured, exclude, progress)
     diagnosis, profile = found.diagnosis, found.profile
     files: dict[Path, bytes | str] = {}

@@ -61,6 +61,7 @@ def improve(
     output: str | Path,
     *,
     report: str | Path | None = None,
+    passive: bool = False,
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Improved:
@@ -74,6 +75,7 @@ def improve(
             fewer than four every fourth stretch of each is held out.
         output: scene to write; beside it, with its name, go .composed.json and .png.
         report: an HTML page to write that needs nothing else.
+        passive: whether the actuators on the joint, if there are any, were off.
         force: overwrite what exists.
         progress: told what is being done.
 
@@ -87,7 +89,7 @@ def improve(
     composed, picture = beside(target, force)
     if report:
         check_target(Path(report), force)
-    measured = read_runs(model, joint, runs)
+    measured = read_runs(model, joint, runs, passive)
     steps, why = improved(measured, progress)
     progress("drawing")
     last, (_, held) = steps[-1].profile, parted(measured)

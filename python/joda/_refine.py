@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 
 from joda._attach import attached
 from joda._context import Context, context
+from joda.diagnosis.plausible import implausible
 from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
 from joda.files import check_target, write_together
 from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
+from joda.measured.driven import read_logs
 from joda.measured.excerpts import excerpts
-from joda.measured.reading import checked
-from joda.measured.runs import QuasiStatic, Run, read_measurement
+from joda.measured.obstructed import clear_of_contacts
+from joda.measured.reading import checked, read_measured
+from joda.measured.runs import QuasiStatic, Run
 from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.refining.curvefit import CurveProblem
@@ -33,6 +36,8 @@ Array = NDArray[np.float64]
 ITERATIONS = 60
 STILL: tuple[Kind, ...] = ("values", "intervals", "strengths")
 """What quasi-static curves can tell."""
+WORSE = 1.05
+"""How much more what is held out may be missed by after a fit, as a factor."""
 PARTED = 5.0
 """Whole runs that are missed by so many times more than windows have parted from the measured."""
 
@@ -81,6 +86,7 @@ def refine(
     fit: Collection[Kind] = ("values", "intervals"),
     keep_shape: bool = True,
     finer: int = 0,
+    passive: bool = False,
     force: bool = False,
     progress: Callable[[str, int, int, float], None] = lambda stage, number, total, rms: None,
 ) -> Refined:
@@ -97,13 +103,15 @@ def refine(
         runs: measured motions, CSV files with time, position and perhaps force; or all of them
             quasi-static curves, without time.
         output: scene to write; beside it, with its name, go .composed.json, .png and .history.json.
-        check: such files that are held out of the fit and only compared.
+        check: such files that are held out of the fit: where they are missed by more after it,
+            nothing is written.
         iterations: at most so many.
         method: Levenberg-Marquardt, or Adam as in the paper.
         fit: what may change: the control points' values, the intervals' ends, the channels'
             strengths, the damping_ratio of the ends of the range, inertia, a gravity offset.
         keep_shape: see above.
         finer: so many times a control point is put halfway between each two, before the fit.
+        passive: whether the actuators on the joint, if there are any, were off.
         force: overwrite what exists.
         progress: told the stage, the iteration, of how many at most, and the RMS misfit (rad or m;
             N·m or N of curves).
@@ -112,7 +120,8 @@ def refine(
         what was written, and how much better it is.
 
     Raises:
-        JodaError: a file cannot be read or written, the joint carries no profile, JAX is missing.
+        JodaError: a file cannot be read or written, the joint carries no profile, JAX is missing;
+            or what was fitted is no better, or exerts forces that nothing in the runs needs.
     """
     source, target = Path(model), Path(output)
     beside = {
@@ -124,11 +133,13 @@ def refine(
         raise JodaError(f"fit: '{sorted(unknown)[0]}' is none of {', '.join(KINDS)}.")
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
-    measured, held_out = ([read_measurement(path) for path in paths] for paths in (runs, check))
-    if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
-        raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
     spec, compiled = load(source)
     number = find_joint(compiled, joint)
+    (measured, unused), (held_out, more) = (
+        read_logs(compiled, number, paths, passive) for paths in (runs, check)
+    )
+    if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
+        raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
     name = joint_name(compiled, number)
     profiles = profiles_of(spec, compiled)
     if name not in profiles:
@@ -137,18 +148,21 @@ def refine(
             "one with joda attach."
         )
     before, found = profiles[name], context(source, name)
-    notes = checked([*measured, *held_out], found, float(compiled.opt.timestep))
+    notes = [*checked([*measured, *held_out], found, float(compiled.opt.timestep)), *unused, *more]
+    clear = clear_of_contacts(compiled, number, found.joint, measured)
+    other = clear_of_contacts(compiled, number, found.joint, held_out) if held_out else None
+    notes += [*clear.notes, *(other.notes if other else [])]
     begin = before
     for _ in range(finer):
         begin = resolved(begin)
-    timed = [one for one in measured if isinstance(one, Run)]
+    timed = [one for one in clear.measured if isinstance(one, Run)]
     parts, _, cut = excerpts(timed)
-    measured, notes = [*parts] if timed else measured, [*notes, *cut]
+    notes += cut
     unit = gravity_scale(found, begin)
     parameters = Parameters(begin, fit, keep_shape=keep_shape, gravity=unit)
     if not len(parameters.start):
         raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
-    problem = _problem(found, compiled, number, parameters, measured)
+    problem = _problem(found, compiled, number, parameters, parts if timed else clear.measured)
     result = problem.fit(
         iterations, method, lambda stage, k, rms: progress(stage, k, iterations, rms)
     )
@@ -156,13 +170,17 @@ def refine(
     errors = problem.rms(parameters.start), problem.rms(result.theta)
     windows = problem.windows(result.theta)
     apart = None
-    if held_out:
-        other = _problem(found, compiled, number, parameters, held_out)
-        apart = other.rms(parameters.start), other.rms(result.theta)
+    if other:
+        unseen_runs = _problem(found, compiled, number, parameters, other.measured)
+        apart = unseen_runs.rms(parameters.start), unseen_runs.rms(result.theta)
+    if reason := _worse(errors, windows, apart, problem.sigma):
+        raise JodaError(f"{target}: not written, as {reason}.")
+    if timed and (reason := implausible(read_measured(source, name, runs, passive), after)):
+        raise JodaError(f"{target}: not written, as {reason}.")
     hidden = unseen(begin, parameters, result.covariance)
-    also, more = _beyond(parameters, result.theta, compiled, number, found)
+    also, mended = _beyond(parameters, result.theta, compiled, number, found)
     scene, said = attached(source, after, target, joint=name, also=also)
-    notes += [*said, *more, *problem.notes]
+    notes += [*said, *mended, *problem.notes]
     balance = np.array(found.positions), -np.array(found.gravity_force)
     figure = picture(before, after, balance, problem, result, hidden)
     write_together(
@@ -195,6 +213,23 @@ def refine(
         iterations=len(result.history),
         notes=tuple(notes),
     )
+
+
+def _worse(
+    errors: tuple[float, float],
+    windows: tuple[float, float] | None,
+    apart: tuple[float, float] | None,
+    noise: float,
+) -> str | None:
+    """Why the fitted profile is no better than it was, as a clause; None if it is."""
+    if apart and apart[1] > WORSE * max(apart[0], noise):
+        return (
+            f"what was held out (--check) is missed by {apart[1]:.3g} with it instead of "
+            f"{apart[0]:.3g}"
+        )
+    if errors[1] > errors[0] > noise and (windows is None or windows[1] > windows[0]):
+        return f"it is missed by {errors[1]:.3g} instead of {errors[0]:.3g} after the fit"
+    return None
 
 
 def _of_one_kind(measured: Sequence[Run | QuasiStatic]) -> bool:

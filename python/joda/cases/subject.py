@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from joda._context import Context
-from joda.interaction.behaviour import FIRMNESS, SLOW, grip
 from joda.interaction.hand import Grip, Hand, finest
+from joda.interaction.pulling import FIRMNESS, SLOW, grip
 from joda.interaction.robot import AFTER, read_targets
 from joda.interaction.traces import shown
 from joda.scenes.model import find_joint

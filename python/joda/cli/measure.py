@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from joda.cli.options import Force, Joint, Json, Model, Runs, Scene
+from joda.cli.options import Force, Joint, Json, Model, Passive, Runs, Scene
 from joda.cli.progress import loss_bar, spinner
 from joda.cli.say import say
 from joda.cli.tell import (
@@ -48,6 +48,7 @@ def refine(
     finer: Annotated[
         int, typer.Option(min=0, max=3, help="So many times control points are doubled first.")
     ] = 0,
+    passive: Passive = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -67,7 +68,8 @@ def refine(
         result = run(
             model, joint, runs, output, check=check or (), iterations=iterations, method=method,
             fit=[name.strip() for name in fit.split(",") if name.strip()],  # type: ignore[misc]
-            keep_shape=not free_shape, finer=finer, force=force, progress=bar,
+            keep_shape=not free_shape, finer=finer, passive=passive, force=force,
+            progress=bar,
         )  # fmt: skip
     if as_json:
         print_json(with_text_paths(asdict(result)))
@@ -93,6 +95,7 @@ def compare(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
     ] = None,
+    passive: Passive = False,
     force: Force = False,
 ) -> None:
     """Replay measured runs: how far off the model is, and where.
@@ -106,8 +109,8 @@ def compare(
 
     with spinner("compare") as progress:
         found = run(
-            model, joint, runs, json=as_json, report=report, picture=output, force=force,
-            progress=progress,
+            model, joint, runs, passive=passive, json=as_json, report=report, picture=output,
+            force=force, progress=progress,
         )  # fmt: skip
     for sentence in (*found.notes, *sentences(found)):
         say(sentence)

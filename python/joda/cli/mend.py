@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from joda.cli.options import Force, Joint, Json, Model, Runs, Scene
+from joda.cli.options import Force, Joint, Json, Model, Passive, Runs, Scene
 from joda.cli.progress import progress_bar, spinner
 from joda.cli.say import say
 from joda.cli.tell import print_json
@@ -27,6 +27,7 @@ def diagnose(
     exclude: Annotated[
         list[str] | None, typer.Option(help="An effect that is not considered.")
     ] = None,
+    passive: Passive = False,
     force: Force = False,
 ) -> None:
     """Tell which effect a model lacks, where, and how much of it.
@@ -41,7 +42,7 @@ def diagnose(
     with progress_bar() as bar:
         found = run(
             model, joint, runs, exclude=exclude or (), json=as_json, report=report,
-            picture=output, force=force, progress=bar,
+            picture=output, passive=passive, force=force, progress=bar,
         )  # fmt: skip
     for sentence in sentences(found):
         say(sentence)
@@ -60,6 +61,7 @@ def add(
     effect: Annotated[
         str | None, typer.Option(help="Which effect [default: the diagnosis' first].")
     ] = None,
+    passive: Passive = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -75,8 +77,9 @@ def add(
 
     with spinner("add") as progress:
         added = run(
-            model, joint, diagnosis, runs, output, effect=effect, force=force, progress=progress
-        )
+            model, joint, diagnosis, runs, output, effect=effect, passive=passive, force=force,
+            progress=progress,
+        )  # fmt: skip
     if as_json:
         print_json(added.as_json())
         return
@@ -92,6 +95,7 @@ def improve(
     joint: Joint,
     output: Scene,
     report: Report = None,
+    passive: Passive = False,
     force: Force = False,
 ) -> None:
     """Diagnose and add until the data support nothing more.
@@ -105,7 +109,10 @@ def improve(
     from joda._improve import sentences
 
     with spinner("improve") as progress:
-        result = run(model, joint, runs, output, report=report, force=force, progress=progress)
+        result = run(
+            model, joint, runs, output, report=report, passive=passive, force=force,
+            progress=progress,
+        )  # fmt: skip
     for sentence in sentences(result):
         say(sentence)
     for path in filter(None, (result.scene, result.composed, result.picture, report)):

@@ -15,6 +15,9 @@ Runs = Annotated[
 Joint = Annotated[
     str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
 ]
+Passive = Annotated[
+    bool, typer.Option("--passive", help="The joint's actuators were off while it was measured.")
+]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to fill.", show_default=False)]
 Scene = Annotated[Path, typer.Option("-o", "--output", help="Scene to write.", show_default=False)]
 Templates = Annotated[

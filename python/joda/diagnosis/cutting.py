@@ -75,7 +75,7 @@ def windows_of(
             velocity, doubt = begun.velocity.copy(), begun.velocity_error.copy()
             if smoothing.begins_at_rest(time, position, sigma):
                 velocity[0], doubt[0] = 0.0, 0.1 * doubt[0] / LOOSE
-            force = np.interp(time[0] + h * np.arange(steps), run.time, run.force)
+            force = np.interp(time[0] + h * np.arange(steps), time, run.force[piece])
             fresh = np.arange(many) == 0
             start = np.stack([begun.position, velocity], axis=1)
             doubts = np.stack([begun.position_error, doubt], axis=1)

@@ -9,6 +9,7 @@ from joda.diagnosis.weighing import Verdict
 from joda.errors import JodaError
 from joda.files import read_json
 from joda.plain import plain
+from joda.scenes.contacts import Contact
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class Diagnosis:
         unit: of that noise and of the errors held out.
         next_experiment: that would decide what is open; None if nothing is.
         notes: what is suspicious about the data.
+        contacts: of the scene that resist the joint where it was measured.
     """
 
     joint: str
@@ -71,6 +73,7 @@ class Diagnosis:
     unit: str
     next_experiment: str | None
     notes: tuple[str, ...]
+    contacts: tuple[Contact, ...]
 
     def to_json(self) -> str:
         """The diagnosis as JSON."""

@@ -25,7 +25,9 @@ PARTED = 5.0
 """Whole runs that are missed by so many times more than windows have parted from the measured."""
 
 
-def read_runs(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
+def read_runs(
+    model: str | Path, joint: str, runs: Sequence[str | Path], passive: bool = False
+) -> Measured:
     """As `joda.measured.reading.read_measured`, but of long runs only parts.
 
     It is noted where that is so, and that curves beside runs say nothing.
@@ -33,7 +35,7 @@ def read_runs(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Meas
     Raises:
         JodaError: a file cannot be read, or what it holds cannot be of this joint.
     """
-    measured = read_measured(model, joint, runs)
+    measured = read_measured(model, joint, runs, passive)
     ignored = tuple(
         f"{one.curve.name}: a quasi-static curve, not used as there are timed runs."
         for one in measured.curves

@@ -32,18 +32,18 @@ GRID = 201
 """Positions at which a curve's largest value is looked for."""
 
 
-def implausible(measured: Measured, profile: Profile, effect: str) -> str | None:
-    """Why a profile with an effect more cannot be meant, as a clause; None if it can.
+def implausible(measured: Measured, profile: Profile, effect: str | None = None) -> str | None:
+    """Why a fitted profile cannot be meant, as a clause; None if it can.
 
     Args:
-        measured: the joint, its profile without the effect, and its runs.
-        profile: with the effect.
-        effect: its name.
+        measured: the joint, its profile before, and its runs.
+        profile: the fitted one.
+        effect: name of what was added; None: all of the profile counts.
     """
     if not measured.runs:
         return None
     needs = Needs(measured)
-    force = needs.largest(profile, effect)
+    force = needs.exerted(of_effect(profile, effect) if effect else profile)
     if force <= EXCESS * needs.force:
         return None
     unit = measured.profile.joint.force_unit
@@ -85,21 +85,10 @@ class Needs:
         applied = max(float(np.nanmax(np.abs(run.force), initial=0.0)) for run in measured.runs)
         gravity = max(map(abs, measured.context.gravity_force))
         inertia = measured.single.inertia * self.acceleration
-        self.force = inertia + applied + gravity + self._exerted(measured.profile)
+        self.force = inertia + applied + gravity + self.exerted(measured.profile)
 
-    def largest(self, profile: Profile, effect: str) -> float:
-        """Largest force of what a profile has of an effect, where and as fast as runs went."""
-        channels = {}
-        for name in CHANNELS:
-            channel = getattr(profile.channels, name)
-            own = tuple(part for part in channel.components if part.label == effect)
-            channels[name] = channel.model_copy(update={"components": own})
-        own_effects = tuple(one for one in profile.effects if one.effect == effect)
-        return self._exerted(
-            profile.model_copy(update={"channels": Channels(**channels), "effects": own_effects})
-        )
-
-    def _exerted(self, profile: Profile) -> float:
+    def exerted(self, profile: Profile) -> float:
+        """Largest force of a profile where and as fast as runs went, N·m or N."""
         grid = np.linspace(*self.visited, GRID)
         total = 0.0
         for name in CHANNELS:
@@ -122,6 +111,17 @@ class Needs:
             elif isinstance(one, LoadDependentFriction):
                 total += one.coefficient * getattr(self, "force", 0.0)
         return total
+
+
+def of_effect(profile: Profile, effect: str) -> Profile:
+    """What a profile has of an effect."""
+    channels = {}
+    for name in CHANNELS:
+        channel = getattr(profile.channels, name)
+        own = tuple(part for part in channel.components if part.label == effect)
+        channels[name] = channel.model_copy(update={"components": own})
+    effects = tuple(one for one in profile.effects if one.effect == effect)
+    return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})
 
 
 def _speed(time: Array, position: Array) -> float:

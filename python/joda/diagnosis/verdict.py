@@ -151,6 +151,7 @@ def _said(
         unit=measured.unit,
         next_experiment=experiment,
         notes=measured.notes,
+        contacts=measured.contacts,
     )
 
 

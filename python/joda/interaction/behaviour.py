@@ -3,35 +3,30 @@
 from itertools import groupby
 from typing import Literal
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from joda._context import Context
 from joda.component import Frozen
-from joda.interaction.hand import finest, pull
-from joda.joints.rig import TIMESTEP, rig
+from joda.interaction.pulling import Pull, apart, number, pulled
+from joda.interaction.surroundings import Surroundings, told
+from joda.joints.rig import rig
 from joda.profile import Profile
-from joda.scenes.motion import FAST, Motion, settle
+from joda.scenes.motion import Motion, settle
 
 Array = NDArray[np.float64]
 End = Literal["low_end", "high_end"]
 Interval = tuple[float, float]
+Goes = Literal["low_end", "high_end", "stays", "settles", "blocked"]
 
 STARTS = np.unique([*np.linspace(0, 1, 61), 0.005, 0.01, 0.99, 0.995])
 """Where the joint is let go, in normalised position."""
 
+IN_SCENE = np.unique([*np.linspace(0, 1, 31), 0.02])
+"""The same where its whole scene is simulated, which takes longer."""
+
 PATIENCE = 15.0
 """How long (s) a joint that was let go may take to come to rest."""
-
-GRIP = 60.0
-"""What a hand can do at the end of the lever arm, N, if gravity does not ask for more."""
-
-FIRMNESS = 1000.0
-"""Stiffness of a hand at the end of the lever arm, N/m."""
-
-SLOW = 3.0
-"""How long (s) a hand takes from one end to the other."""
 
 AT_END = 0.01
 """How near (in normalised position) an end a joint must rest to be there."""
@@ -45,34 +40,14 @@ class Stretch(Frozen):
 
     Attributes:
         start: interval of normalised positions where it is let go.
-        goes: what it then does.
+        goes: what it then does; blocked where something of the scene is, or is in the way from
+            the closed end.
         end: normalised position where it comes to rest, the mean over the stretch.
     """
 
     start: Interval
-    goes: Literal["low_end", "high_end", "stays", "settles"]
+    goes: Goes
     end: float
-
-
-class Pull(Frozen):
-    """What a slow hand needs to move the joint from one end to the other.
-
-    Attributes:
-        arrived: whether a hand, of at most `grip`, can do it at all.
-        force: the most that it took, N·m or N.
-        at: normalised position where it took that.
-        first, middle, last: the most within the first 15 % of the way, the median between 30 % and
-            70 %, the most within the last 15 %; N·m or N, negative where the hand holds back.
-        snaps_at: normalised positions on the way where the joint ran ahead of the hand.
-    """
-
-    arrived: bool
-    force: float
-    at: float
-    first: float
-    middle: float
-    last: float
-    snaps_at: tuple[float, ...]
 
 
 class Closing(Frozen):
@@ -90,7 +65,7 @@ class Closing(Frozen):
 
 
 class Behaviour(Frozen):
-    """A joint's behaviour, all other joints held.
+    """A joint's behaviour: by itself, or in its scene where that touches it.
 
     Attributes:
         closed_end: which end counts as closed; the low end where the model does not tell.
@@ -99,6 +74,7 @@ class Behaviour(Frozen):
             moving: detents, balances.
         opening, closing: moved slowly by a hand from the closed end to the other, and back.
         fastest: None where it closes from nowhere by itself.
+        touched: what of the scene touches it, and where; empty if nothing does.
     """
 
     closed_end: End
@@ -107,6 +83,7 @@ class Behaviour(Frozen):
     opening: Pull
     closing: Pull
     fastest: Closing | None
+    touched: str = ""
 
     def after(self, position: float) -> Stretch:
         """The stretch that a normalised position belongs to, or is nearest to."""
@@ -121,13 +98,14 @@ class Behaviour(Frozen):
         unit, speed = ("N·m", "rad/s") if hinge else ("N", "m/s")
         closed = self.closed_end
         opened = "high_end" if closed == "low_end" else "low_end"
-        words = {closed: "closes", opened: "opens", "stays": "stays", "settles": "settles"}
-        lines = ["let go at rest (s is the normalised position):"]
+        words = {closed: "closes", opened: "opens", "blocked": "blocked by the scene"}
+        lines = [f"in the scene as it is: {self.touched}"] if self.touched else []
+        lines += ["let go at rest (s is the normalised position):"]
         for stretch in self.let_go:
             a, b = stretch.start
             where = f"s = {a:.3g}" if a == b else f"s = {a:.3g} to {b:.3g}"
             to = f" at s = {stretch.end:.2f}" if stretch.goes == "settles" else ""
-            lines.append(f"  {where}: {words[stretch.goes]}{to}")
+            lines.append(f"  {where}: {words.get(stretch.goes, stretch.goes)}{to}")
         for name, way in (("opening", self.opening), ("closing", self.closing)):
             arm = f" ({way.force / context.lever_arm:.3g} N at the edge)" if hinge else ""
             if way.arrived:
@@ -139,7 +117,7 @@ class Behaviour(Frozen):
             else:
                 lines.append(
                     f"{name} it slowly by hand: impossible, stuck at s = {way.at:.2f} "
-                    f"with {way.force:.3g} {unit}{arm}"
+                    f"with {way.force:.3g} {unit}{arm}{_by(way)}"
                 )
         if self.fastest:
             edge = self.fastest.speed * context.lever_arm
@@ -151,31 +129,61 @@ class Behaviour(Frozen):
         return "\n".join(lines)
 
 
-def behaviour(context: Context, profile: Profile) -> Behaviour:
+def behaviour(context: Context, profile: Profile, around: Surroundings | None = None) -> Behaviour:
     """Simulates the joint with a profile, alone on a rig.
 
     Args:
         context: the joint.
         profile: of that joint.
+        around: what touches it in its scene: then the whole scene is simulated as it is.
 
     Returns:
         the facts.
+
+    Raises:
+        JodaError: the scene's simulation is unstable.
     """
-    model = rig(context, profile)
+    model, joint = around.scene(profile) if around else (rig(context, profile), 0)
     lo, hi = context.joint.range
     closed: End = "high_end" if context.closed_end == "high_end" else "low_end"
-    motions = [settle(model, 0, lo + s * (hi - lo), PATIENCE) for s in STARTS]
-    rests = np.array([np.clip((m.position[-1] - lo) / (hi - lo), 0, 1) for m in motions])
-    ends = (lo, hi) if closed == "low_end" else (hi, lo)
-    opening, closing = (_pull(model, *way, context) for way in (ends, ends[::-1]))
+    shut, open_ = (0.0, 1.0) if closed == "low_end" else (1.0, 0.0)
+    begin = around.reference if around and around.inside(shut) else shut
+    opening, reached = pulled(model, joint, begin, open_, context)
+    if around:
+        opening = _held(opening, around)
+    if not opening.held_by:
+        reached = open_
+    back = reached if abs(reached - shut) > AT_END else open_
+    closing, _ = pulled(model, joint, back, shut, context)
+    far = (min(shut, reached), max(shut, reached))
+
+    def free(s: float) -> bool:
+        return around is None or (far[0] <= s <= far[1] and not around.inside(s))
+
+    starts = STARTS if around is None else IN_SCENE
+    freely = np.array([free(s) for s in starts])
+    motions = [
+        settle(model, joint, lo + s * (hi - lo), PATIENCE) if own else None
+        for s, own in zip(starts, freely, strict=True)
+    ]
+    rests = np.array(
+        [np.clip((m.position[-1] - lo) / (hi - lo), 0, 1) if m else np.nan for m in motions]
+    )
     return Behaviour(
         closed_end=closed,
-        let_go=_stretches(rests),
-        settles_at=_settles(rests),
+        let_go=_stretches(starts, rests),
+        settles_at=_settles(starts[freely], rests[freely]),
         opening=opening,
-        closing=closing,
-        fastest=_fastest(motions, rests, closed, context),
+        closing=_held(closing, around) if around else closing,
+        fastest=_fastest(starts, motions, rests, closed, context),
+        touched=told(around.contacts) if around else "",
     )
+
+
+def _held(way: Pull, around: Surroundings) -> Pull:
+    """The same with what is in the way, where the hand got stuck."""
+    near = () if way.arrived else around.near(way.at)
+    return way.model_copy(update={"held_by": told(near)}) if near else way
 
 
 def _snaps(way: Pull) -> str:
@@ -183,12 +191,13 @@ def _snaps(way: Pull) -> str:
     return f"; it snaps ahead of the hand at s = {places}" if places else ""
 
 
-def grip(context: Context) -> float:
-    """The largest generalised force of a hand, N·m or N."""
-    return max(GRIP * context.lever_arm, 2 * context.gravity_scale)
+def _by(way: Pull) -> str:
+    return f": {way.held_by}" if way.held_by else ""
 
 
-def _goes(start: float, rest: float) -> Literal["low_end", "high_end", "stays", "settles"]:
+def _goes(start: float, rest: float) -> Goes:
+    if np.isnan(rest):
+        return "blocked"
     if rest <= AT_END:
         return "low_end" if start > AT_END else "stays"
     if rest >= 1 - AT_END:
@@ -196,67 +205,41 @@ def _goes(start: float, rest: float) -> Literal["low_end", "high_end", "stays", 
     return "stays" if abs(rest - start) <= UNMOVED else "settles"
 
 
-def _stretches(rests: Array) -> tuple[Stretch, ...]:
+def _stretches(starts: Array, rests: Array) -> tuple[Stretch, ...]:
     """Neighbouring starts with the same outcome, as one."""
     out: list[Stretch] = []
-    number, last = 0, ("", 0.0)
+    count, last = 0, ("", 0.0)
     keys = []
-    for start, rest in zip(STARTS, rests, strict=True):
+    for start, rest in zip(starts, rests, strict=True):
         goes = _goes(start, rest)
         if goes != last[0] or (goes == "settles" and abs(rest - last[1]) > 0.02):
-            number += 1
+            count += 1
         last = (goes, rest)
-        keys.append((number, goes))
-    for (_, goes), group in groupby(range(len(STARTS)), key=keys.__getitem__):
+        keys.append((count, goes))
+    for (_, goes), group in groupby(range(len(starts)), key=keys.__getitem__):
         members = list(group)
-        start = (_number(STARTS[members[0]]), _number(STARTS[members[-1]]))
-        out.append(Stretch(start=start, goes=goes, end=_number(rests[members].mean())))
+        start = (number(starts[members[0]]), number(starts[members[-1]]))
+        end = np.mean(start) if goes == "blocked" else rests[members].mean()
+        out.append(Stretch(start=start, goes=goes, end=number(float(end))))
     return tuple(out)
 
 
-def _settles(rests: Array) -> tuple[float, ...]:
-    moved = np.abs(rests - STARTS) > UNMOVED
-    return _apart(rests[moved & (rests > AT_END) & (rests < 1 - AT_END)])
+def _settles(starts: Array, rests: Array) -> tuple[float, ...]:
+    moved = np.abs(rests - starts) > UNMOVED
+    return apart(rests[moved & (rests > AT_END) & (rests < 1 - AT_END)])
 
 
-def _pull(model: mujoco.MjModel, start: float, end: float, context: Context) -> Pull:
-    arm, (lo, hi) = context.lever_arm, context.joint.range
-    stiffness = FIRMNESS * arm**2
-    model.opt.timestep = min(TIMESTEP, finest(context.equivalent_inertia, stiffness))
-    motion = pull(model, 0, start, end, grip(context), stiffness, SLOW)
-    sign = np.sign(end - start)
-    way = (motion.position - start) / (end - start)
-    force = motion.force * sign
-    most = int(np.argmax(force))
-    middle = force[(way >= 0.3) & (way <= 0.7)]
-    last = force[way >= 0.85]
-    ahead = motion.velocity * sign > FAST * abs(end - start) / SLOW
-    begins = np.flatnonzero(ahead[1:] & ~ahead[:-1])
-    return Pull(
-        arrived=bool(way[-1] >= 0.99),
-        force=_number(force[most]),
-        at=_number(np.clip((motion.position[most] - lo) / (hi - lo), 0, 1)),
-        first=_number(force[way <= 0.15].max()),
-        middle=_number(np.median(middle)) if len(middle) else 0.0,
-        last=_number(last.max()) if len(last) else 0.0,
-        snaps_at=_apart((motion.position[begins] - lo) / (hi - lo)),
-    )
-
-
-def _apart(positions: Array) -> tuple[float, ...]:
-    """Groups of normalised positions, each by its mean."""
-    if not len(positions):
-        return ()
-    inside = np.sort(positions)
-    groups = np.split(inside, np.flatnonzero(np.diff(inside) > 0.02) + 1)
-    return tuple(_number(group.mean()) for group in groups)
-
-
-def _fastest(motions: list[Motion], rests: Array, closed: End, context: Context) -> Closing | None:
+def _fastest(
+    starts: Array,
+    motions: list[Motion | None],
+    rests: Array,
+    closed: End,
+    context: Context,
+) -> Closing | None:
     lo, hi = context.joint.range
     best = None
-    for start, motion, rest in zip(STARTS, motions, rests, strict=True):
-        if _goes(start, rest) != closed:
+    for start, motion, rest in zip(starts, motions, rests, strict=True):
+        if motion is None or _goes(start, rest) != closed:
             continue
         s = (motion.position - lo) / (hi - lo)
         there = int(np.argmax(s <= AT_END if closed == "low_end" else s >= 1 - AT_END))
@@ -264,7 +247,7 @@ def _fastest(motions: list[Motion], rests: Array, closed: End, context: Context)
         speed = _speed_at(motion, there, end)
         if best is None or speed > best.speed:
             best = Closing(
-                start=_number(start), seconds=_number(motion.time[there]), speed=_number(speed)
+                start=number(start), seconds=number(motion.time[there]), speed=number(speed)
             )
     return best
 
@@ -279,8 +262,3 @@ def _speed_at(motion: Motion, sample: int, position: float) -> float:
     (a, b), (u, v) = motion.position[sample - 2 : sample], motion.velocity[sample - 2 : sample]
     slope = (v * v - u * u) / (b - a) if b != a else 0.0
     return float(np.sqrt(max(v * v + slope * (position - b), 0.0)))
-
-
-def _number(value: float) -> float:
-    """Four significant digits and no finer than 1e-9: facts, not noise."""
-    return float(f"{value:.4g}") + 0.0 if abs(value) > 1e-9 else 0.0

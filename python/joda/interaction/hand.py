@@ -5,7 +5,7 @@ far as the hand's softness allows.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -191,7 +191,12 @@ def pull(
             strength is exhausted or the joint has arrived.
 
     Returns:
-        the motion until then.
+        the motion until then; its force is the hand's alone.
     """
     grip = Grip(abs(end - start) / duration, strength, stiffness)
-    return play(model, joint, start, Hand(model, joint, (end,), grip))
+    hand = Hand(model, joint, (end,), grip)
+    dof, force = model.jnt_dofadr[joint], list[float]()
+    motion = play(
+        model, joint, start, hand, watch=lambda data: force.append(data.qfrc_applied[dof])
+    )
+    return replace(motion, force=np.array(force))

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from joda._compile import HAND_FORCE
 from joda._context import Context
 from joda.errors import JodaError
-from joda.interaction.behaviour import FIRMNESS, SLOW, grip
 from joda.interaction.hand import Grip, Hand, finest
+from joda.interaction.pulling import FIRMNESS, SLOW, grip
 from joda.interaction.robot import AFTER, read_targets
 from joda.scenes.motion import Act, Motion, at_home, idle, leaning, play
 

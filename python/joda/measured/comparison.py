@@ -9,6 +9,7 @@ from joda.measured.curves import CurveError, FailingForce, told
 from joda.measured.errors import Missed, RunError
 from joda.measured.failing import Failing
 from joda.plain import plain
+from joda.scenes.contacts import Contact
 
 SAID = 6
 """Most places that are told."""
@@ -29,6 +30,7 @@ class Comparison:
         curves: errors by quasi-static curve.
         failing_force: where its quasi-static force fails, the largest share first.
         notes: what is suspicious about the data, a sentence each.
+        contacts: of the scene that resist the joint where it was measured.
     """
 
     joint: str
@@ -43,6 +45,7 @@ class Comparison:
     curves: tuple[CurveError, ...]
     failing_force: tuple[FailingForce, ...]
     notes: tuple[str, ...]
+    contacts: tuple[Contact, ...]
 
     def to_json(self) -> str:
         """The comparison as JSON."""
@@ -57,6 +60,7 @@ class Comparison:
             "curves": [vars(curve) for curve in self.curves],
             "failing_force": [vars(place) for place in self.failing_force],
             "notes": list(self.notes),
+            "contacts": [vars(contact) for contact in self.contacts],
         }
         return plain(dumps(content, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 

@@ -11,12 +11,16 @@ from joda._context import Context, context
 from joda.errors import JodaError
 from joda.joints.single import Single, single
 from joda.measured import smoothing
+from joda.measured.driven import read_logs
 from joda.measured.gauge import Gauged, gauged
+from joda.measured.obstructed import clear_of_contacts
 from joda.measured.replay import Replayer
-from joda.measured.runs import QuasiStatic, Run, read_measurement
+from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow import as_curve
 from joda.measured.suspicions import suspicions
 from joda.profile import Profile
+from joda.scenes.angles import range_doubt
+from joda.scenes.contacts import Contact
 from joda.scenes.model import describe_joint, find_joint, joint_name, load
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
@@ -45,6 +49,7 @@ class Measured:
         sigma: noise of each run's position, rad or m.
         curves: measured, each beside the model's.
         notes: what is suspicious about them.
+        contacts: of the scene that resist the joint where it was measured.
     """
 
     context: Context
@@ -56,6 +61,7 @@ class Measured:
     sigma: tuple[float, ...]
     curves: tuple[Gauged, ...]
     notes: tuple[str, ...]
+    contacts: tuple[Contact, ...]
 
     def changed(
         self, profile: Profile | None = None, runs: Sequence[int] | None = None
@@ -116,18 +122,23 @@ def checked(read: Sequence[Run | QuasiStatic], found: Context, timestep: float) 
     doubts = [doubt for run in read for doubt in suspicions(run, found)]
     for doubt in doubts:
         if doubt.fatal:
-            raise JodaError(" ".join(filter(None, (doubt.sentence, found.doubt))))
+            raise JodaError(" ".join(filter(None, (doubt.sentence, range_doubt(found.joint)))))
     for run in read:
         if isinstance(run, Run) and (steps := np.ptp(run.time) / timestep) > STEPS:
             raise JodaError(
                 f"{run.name}: {np.ptp(run.time):.4g} s are {steps:.2g} of the scene's timesteps of "
                 f"{timestep:g} s, which is too long to replay; cut the run into shorter ones."
             )
-    return [*filter(None, [found.doubt]), *(doubt.sentence for doubt in doubts)]
+    return [*found.doubts, *(doubt.sentence for doubt in doubts)]
 
 
-def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> Measured:
-    """Reads a joint and what was measured; raises JodaError, also for what cannot be of it."""
+def read_measured(
+    model: str | Path, joint: str, runs: Sequence[str | Path], passive: bool = False
+) -> Measured:
+    """Reads a joint and what was measured; raises JodaError, also for what cannot be of it.
+
+    `passive`: the actuators on the joint were off.
+    """
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
     source = Path(model)
@@ -138,8 +149,11 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
     bare = Profile(joint=describe_joint(compiled, number))
     profile = whole_profile(compiled, number, profiles_of(spec, compiled).get(name, bare))
     step = float(compiled.opt.timestep)
-    read = [read_measurement(path) for path in runs]
-    notes = checked(read, found, step)
+    read, unused = read_logs(compiled, number, runs, passive)
+    notes = [*checked(read, found, step), *unused]
+    clear = clear_of_contacts(compiled, number, profile.joint, read)
+    read = clear.measured
+    notes += clear.notes
     timed = tuple(run for run in read if isinstance(run, Run))
     noises = [smoothing.noise(run.time, run.position) for run in timed]
     usual = float(np.median(noises)) if noises else 0.0
@@ -172,4 +186,5 @@ def read_measured(model: str | Path, joint: str, runs: Sequence[str | Path]) -> 
         sigma=sigma,
         curves=tuple(curves),
         notes=tuple(notes),
+        contacts=clear.contacts,
     )

@@ -59,15 +59,15 @@ def read_table(path: Path, wanted: Sequence[str], expected: str) -> Table:
     """
     own = {name.lower(): name for name in wanted}
     rows = _rows(path)
-    number, header = next(rows, (0, []))
-    if not header:
+    number, first = next(rows, (0, []))
+    if not first:
         raise JodaError(f"{path}: empty, no header row with {expected}.")
-    header = _without_end([cell.strip() for cell in header], 1)
-    names = [own.get(cell.lower(), "") for cell in header]
+    head = _without_end([cell.strip() for cell in first], 1)
+    names = [own.get(cell.lower(), "") for cell in head]
     if not any(names):
         raise JodaError(
             f"{path}, line {number}: no header row with {expected} but "
-            f"'{_shown(', '.join(header))}'; the first row must name the columns."
+            f"'{_shown(', '.join(head))}'; the first row must name the columns."
         )
     for name in wanted:
         if names.count(name) > 1:
@@ -89,9 +89,14 @@ def read_table(path: Path, wanted: Sequence[str], expected: str) -> Table:
         lines=np.array(lines, np.intp),
         columns={name: np.array(column) for name, column in values.items()},
         others=tuple(
-            _shown(cell) for cell, name in zip(header, names, strict=True) if cell and not name
+            _shown(cell) for cell, name in zip(head, names, strict=True) if cell and not name
         ),
     )
+
+
+def header(path: Path) -> list[str]:
+    """The names of a file's columns; raises JodaError if it cannot be read."""
+    return [name.strip() for name in next(_rows(path), (0, []))[1]]
 
 
 def check_filled(table: Table, names: Sequence[str], remedy: str) -> None:

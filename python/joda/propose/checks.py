@@ -51,8 +51,10 @@ class Seen:
         return self.behaviour.after(way if low else 1 - way)
 
     def goes(self, way: float) -> str:
-        """closes, opens, stays or settles."""
+        """closes, opens, stays, settles or is blocked."""
         goes = self.after(way).goes
+        if goes == "blocked":
+            return "is blocked"
         if goes in ("stays", "settles"):
             return goes
         return "closes" if goes == self.behaviour.closed_end else "opens"
@@ -210,5 +212,6 @@ def moves(seen: Seen) -> str:
     for name, way in (("opened", seen.behaviour.opening), ("closed", seen.behaviour.closing)):
         if not way.arrived:
             force = way.force / seen.context.lever_arm
-            return f"a hand cannot get it {name}, stuck at s = {way.at:.2f} with {force:.3g} N"
+            why = f", where {way.held_by}" if way.held_by else ""
+            return f"a hand cannot get it {name}, stuck at s = {way.at:.2f} with {force:.3g} N{why}"
     return ""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from joda._compile import contributions, reference_scales
 from joda._context import Context
 from joda.field import evaluate
-from joda.interaction.behaviour import grip
+from joda.interaction.pulling import grip
 from joda.profile import Channel
 from joda.proposal import EffectProposal, Proposal
 from joda.propose.checks import ABOUT, FELT, share

@@ -22,6 +22,7 @@ from joda._render import render
 from joda.errors import JodaError
 from joda.files import make_folder, read_text, write_bytes, write_text
 from joda.interaction.behaviour import behaviour
+from joda.interaction.surroundings import surroundings, told
 from joda.pictures.draw import draw
 from joda.pictures.style import png
 from joda.plain import plain
@@ -68,6 +69,13 @@ class Session:
         self.notes: list[str] = []
         self.model = self._path(history.model)
         self.context: Context = context(self.model, history.joint)
+        self.notes += self.context.doubts
+        self._around = surroundings(self.model, history.joint)
+        if self._around:
+            self.notes.append(
+                f"In the scene {told(self._around.contacts)}; behaviours are simulated in the "
+                "scene as it is."
+            )
         self._templates = [self._path(path) for path in history.templates]
         library = read_templates(self._templates)
         self.turns = [self._turn(round) for round in history.rounds]
@@ -192,7 +200,7 @@ class Session:
             raise JodaError(f"{proposer} has nothing to propose{wish}; choose another proposer.")
         self.progress("simulating the proposal")
         profile = self._compiled(proposal)
-        behaved = behaviour(self.context, profile)
+        behaved = behaviour(self.context, profile, self._around)
         wanted = read_wishes(proposal.whole_motion_descrptn)
         # what was asked for at first may be what the user has complained about since
         heard = complaint or any(round.complaint for round in self.history.rounds)

@@ -95,10 +95,14 @@ def play(
         mujoco.mj_step(model, data, stride)
         out.append((*state, outside(model, data, dof)))
         if data.time <= state[0]:  # MuJoCo has begun anew
-            raise JodaError(
-                f"the simulation is unstable at {state[0]:.3g} s; make the scene's timestep, "
-                f"{step:g} s, smaller."
-            )
+            raise _unstable(model, state[0])
+
+
+def _unstable(model: mujoco.MjModel, time: float) -> JodaError:
+    return JodaError(
+        f"the simulation is unstable at {time:.3g} s; make the scene's timestep, "
+        f"{model.opt.timestep:g} s, smaller."
+    )
 
 
 def at_home(model: mujoco.MjModel) -> mujoco.MjData:
@@ -161,7 +165,8 @@ def usual_speed(motion: Motion) -> float:
 def settle(model: mujoco.MjModel, joint: int, position: float, patience: float) -> Motion:
     """As `release`, until the joint has come to rest or `patience` (s) has passed.
 
-    At rest: within a quarter of a second it has moved less than 1e-4 of its range.
+    At rest: within a quarter of a second it has moved less than 1e-4 of its range. Raises JodaError
+    if the simulation is unstable.
     """
     data = mujoco.MjData(model)
     qpos, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
@@ -172,6 +177,8 @@ def settle(model: mujoco.MjModel, joint: int, position: float, patience: float) 
     stride = max(pause // 25, 1)
     while data.time < patience:
         mujoco.mj_step(model, data, stride)
+        if data.time <= out[-1][0]:
+            raise _unstable(model, out[-1][0])
         out.append((data.time, data.qpos[qpos], data.qvel[dof], 0.0))
         recent = [row[1] for row in out[-(pause // stride + 1) :]]
         if len(recent) > pause // stride and max(recent) - min(recent) < 1e-4 * span:

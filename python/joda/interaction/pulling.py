@@ -1,0 +1,96 @@
+"""A slow hand that moves a joint from one place to another, and what it needs for that."""
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._context import Context
+from joda.component import Frozen
+from joda.interaction.hand import finest, pull
+from joda.scenes.motion import FAST
+
+Array = NDArray[np.float64]
+
+GRIP = 60.0
+"""What a hand can do at the end of the lever arm, N, if gravity does not ask for more."""
+
+FIRMNESS = 1000.0
+"""Stiffness of a hand at the end of the lever arm, N/m."""
+
+SLOW = 3.0
+"""How long (s) a hand takes from one end to the other."""
+
+
+class Pull(Frozen):
+    """What a slow hand needs to move the joint from one end to the other.
+
+    Attributes:
+        arrived: whether a hand, of at most `grip`, can do it at all.
+        force: the most that it took, or that was in vain, N·m or N.
+        at: normalised position where it took that; where it got stuck, if it did.
+        first, middle, last: the most within the first 15 % of the way, the median between 30 % and
+            70 %, the most within the last 15 %; N·m or N, negative where the hand holds back.
+        held_by: what of the scene is in the way where it got stuck; empty if nothing is.
+        snaps_at: normalised positions on the way where the joint ran ahead of the hand.
+    """
+
+    arrived: bool
+    force: float
+    at: float
+    first: float
+    middle: float
+    last: float
+    snaps_at: tuple[float, ...]
+    held_by: str = ""
+
+
+def grip(context: Context) -> float:
+    """The largest generalised force of a hand, N·m or N."""
+    return max(GRIP * context.lever_arm, 2 * context.gravity_scale)
+
+
+def pulled(
+    model: mujoco.MjModel, joint: int, begin: float, to: float, context: Context
+) -> tuple[Pull, float]:
+    """A slow hand from one normalised position to another, and how far it came."""
+    arm, (lo, hi) = context.lever_arm, context.joint.range
+    start, end = lo + begin * (hi - lo), lo + to * (hi - lo)
+    stiffness = FIRMNESS * arm**2
+    step = model.opt.timestep
+    model.opt.timestep = min(step, finest(context.equivalent_inertia, stiffness))
+    motion = pull(model, joint, start, end, grip(context), stiffness, SLOW)
+    model.opt.timestep = step
+    sign = np.sign(end - start)
+    way = (motion.position - start) / (end - start)
+    force = motion.force * sign
+    arrived = bool(way[-1] >= 0.99)
+    most = int(np.argmax(force)) if arrived else -1
+    middle = force[(way >= 0.3) & (way <= 0.7)]
+    last = force[way >= 0.85]
+    ahead = motion.velocity * sign > FAST * abs(end - start) / SLOW
+    begins = np.flatnonzero(ahead[1:] & ~ahead[:-1])
+    s = (motion.position - lo) / (hi - lo)
+    told = Pull(
+        arrived=arrived,
+        force=number(force[most]),
+        at=number(np.clip(s[most], 0, 1)),
+        first=number(force[way <= 0.15].max()),
+        middle=number(np.median(middle)) if len(middle) else 0.0,
+        last=number(last.max()) if len(last) else 0.0,
+        snaps_at=apart(s[begins]),
+    )
+    return told, float(np.clip(s[-1], 0, 1))
+
+
+def apart(positions: Array) -> tuple[float, ...]:
+    """Groups of normalised positions, each by its mean."""
+    if not len(positions):
+        return ()
+    inside = np.sort(positions)
+    groups = np.split(inside, np.flatnonzero(np.diff(inside) > 0.02) + 1)
+    return tuple(number(group.mean()) for group in groups)
+
+
+def number(value: float) -> float:
+    """Four significant digits and no finer than 1e-9: facts, not noise."""
+    return float(f"{value:.4g}") + 0.0 if abs(value) > 1e-9 else 0.0

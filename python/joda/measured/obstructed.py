@@ -1,0 +1,153 @@
+"""Measurements where the scene touches the joint: what is left out of them, and what is said.
+
+Replays move the joint by itself. Where a contact of the scene would hinder it that is another
+motion, so what was measured there is neither replayed nor fitted.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.errors import JodaError
+from joda.measured import smoothing
+from joda.measured.runs import LEAST, QuasiStatic, Run, known
+from joda.profile import Joint
+from joda.scenes.contacts import Contact, contacts_along
+
+Measurement = Run | QuasiStatic
+
+ROOM = 3.0
+"""How near a contact, in noises of the position, counts as within it."""
+TOLD = 3
+"""How many contacts are told, those with the largest force first."""
+
+
+@dataclass(frozen=True)
+class Clear:
+    """What is left of measurements where the scene hinders the joint.
+
+    Attributes:
+        measured: runs and curves, without what was measured within contacts: in a run the force is
+            NaN there, and it begins and ends outside.
+        contacts: found along what they visit.
+        notes: what was found and left out, a sentence each.
+    """
+
+    measured: list[Measurement]
+    contacts: tuple[Contact, ...]
+    notes: list[str]
+
+
+def clear_of_contacts(
+    model: mujoco.MjModel, joint: int, described: Joint, read: Sequence[Measurement]
+) -> Clear:
+    """Finds the contacts along the measured path, and leaves out what lies within them.
+
+    Args:
+        model: the compiled scene.
+        joint: its id.
+        described: the joint, with its range.
+        read: runs and curves, whose positions are of this joint.
+
+    Raises:
+        JodaError: nothing is left.
+    """
+    places = np.clip(np.concatenate([one.position for one in read]), *described.range)
+    path = float(places.min()), float(places.max())
+    contacts = contacts_along(model, joint, described, path)
+    notes = [_rubbing(one, described) for one in contacts if one.along]
+    hindering = [one for one in contacts if one.hinders]
+    if not hindering:
+        return Clear(list(read), contacts, notes)
+    left, lost = [], []
+    for one in read:
+        inside = _within(one, hindering)
+        part = _without(one, inside)
+        if part is not None:
+            left.append(part)
+        if inside.any():
+            of = f"{inside.sum()} of {len(inside)}" if part else "all"
+            lost.append(f"{of} samples of {one.name}")
+    if not lost:
+        return Clear(list(read), contacts, notes)
+    told = _touching(hindering, described)
+    if not left:
+        raise JodaError(
+            f"{told}; that is where {_files(read)} lie, and a replay of the joint by itself would "
+            f"be another motion; {MEND}."
+        )
+    notes.append(f"{told}; left out there: {', '.join(lost)}. {MEND[0].upper()}{MEND[1:]}.")
+    return Clear(left, contacts, notes)
+
+
+MEND = (
+    "if the real joint is free there, move the geoms apart or exclude the pair "
+    '(<contact><exclude body1="..." body2="..."/></contact>)'
+)
+
+
+def _within(one: Measurement, contacts: Sequence[Contact]) -> NDArray[np.bool_]:
+    """Which samples lie in a contact, or reach it before the next one; shape (n,)."""
+    position = one.position
+    room = ROOM * smoothing.noise(one.time, position) if isinstance(one, Run) else 0.0
+    steps = np.abs(np.diff(position, prepend=position[:1], append=position[-1:]))
+    reach = np.maximum(steps[1:], steps[:-1]) if isinstance(one, Run) else np.zeros(len(position))
+    away = [np.maximum(c.path[0] - position, position - c.path[1]) for c in contacts]
+    return np.asarray(np.min(away, axis=0) <= np.maximum(room, reach))
+
+
+def _without(one: Measurement, inside: NDArray[np.bool_]) -> Measurement | None:
+    """The measurement without these samples; None if too little is left."""
+    if not inside.any():
+        return one
+    if isinstance(one, QuasiStatic):
+        kept = ~inside
+        if kept.sum() < LEAST:
+            return None
+        return QuasiStatic(one.name, one.position[kept], one.force[kept])
+    masked = replace(one, force=np.where(inside, np.nan, one.force))
+    pieces = known(masked)
+    if not pieces:
+        return None
+    part = slice(pieces[0][0], pieces[-1][-1] + 1)
+    velocity = None if one.velocity is None else one.velocity[part]
+    return replace(
+        masked,
+        time=one.time[part],
+        position=one.position[part],
+        velocity=velocity,
+        force=masked.force[part],
+    )
+
+
+def _touching(contacts: Sequence[Contact], joint: Joint) -> str:
+    """Where the scene hinders the joint, without the full stop."""
+    hardest = sorted(contacts, key=lambda one: -one.force)
+    told = "; ".join(
+        f"{_pair(one)} from s = {one.interval[0]:.3f} to {one.interval[1]:.3f} "
+        f"({one.path[0]:.4g} to {one.path[1]:.4g} {joint.unit}), with up to {one.force:.3g} "
+        f"{joint.force_unit}"
+        for one in hardest[:TOLD]
+    )
+    more = f"; and {len(contacts) - TOLD} contacts more" if len(contacts) > TOLD else ""
+    return f"In the scene joint '{joint.name}' is not free: {told}{more}"
+
+
+def _rubbing(one: Contact, joint: Joint) -> str:
+    return (
+        f"In the scene {_pair(one)} wherever the joint was, with up to {one.force:.3g} "
+        f"{joint.force_unit}; the replay is without that, so that friction which is found comes on "
+        f"top of it there: exclude the pair, or set its friction to zero."
+    )
+
+
+def _pair(one: Contact) -> str:
+    return f"'{one.geom}' touches '{one.other}'"
+
+
+def _files(read: Sequence[Measurement]) -> str:
+    names = [one.name for one in read]
+    return ", ".join(names[:TOLD]) + (f" and {len(names) - TOLD} more" * (len(names) > TOLD))
