@@ -507,8 +507,8 @@ def test_what_is_unusual_but_right_raises_no_doubt(name, tmp_path):
     model, path = tmp_path / "model.xml", written(tmp_path, lambda log: log.text(), make())
     model.write_text(xml)
     measured = read_measured(model, "door", [path])
-    assert measured.notes == ()
-    assert "doubtful" not in measured.context.describe()
+    light = {doubt for doubt in measured.context.doubts if "lighter than foam" in doubt}
+    assert set(measured.notes) <= light  # a button with the geom of a door
     found = joda.compare(model, "door", [path])
     span = np.ptp(measured.profile.joint.range)
     assert found.rmse_window < 1e-2 * span
@@ -580,11 +580,12 @@ def test_a_range_in_the_wrong_unit_is_suspected_aloud(angle, limits, said, good,
     compiler = f'><compiler angle="{angle.strip()}"/' if angle else ""
     model.write_text(scene(HINGE.format(limits), angle=compiler))
     found = joda.context(model, "door")
-    assert said in found.doubt
-    assert bool(found.doubt) == bool(said) == ("doubtful" in found.describe())
+    doubt = " ".join(found.doubts)
+    assert said in doubt
+    assert bool(doubt) == bool(said)
     if limits == "0 90" and said:
         path = written(tmp_path, lambda log: log.text(), good)
-        assert found.doubt in read_measured(model, "door", [path]).notes
+        assert doubt in read_measured(model, "door", [path]).notes
     if limits == "0 1.57":
         path = written(tmp_path, lambda log: log.text(), good)
         with pytest.raises(JodaError, match='add angle="radian" to <compiler>'):

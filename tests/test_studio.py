@@ -35,7 +35,7 @@ LID = """\
 <mujoco>
   <compiler angle="radian"/>
   <worldbody>
-    <geom type="plane" size="1 1 1"/>
+    <geom type="plane" size="1 1 1" pos="0 0 -.3"/>
     <geom type="box" size=".3 .2 .1" pos="0 0 -.12"/>
     <body pos="-.3 0 0">
       <joint name="lid" axis="0 -1 0" range="0 1.5" damping="0.05" frictionloss="0.1"/>

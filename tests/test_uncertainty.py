@@ -16,11 +16,11 @@ from joda.diagnosis.uncertainty import _fitted as fitted
 from joda.hidden import EFFECTS, draw
 
 
-def found(seed, effect, forced=True, runs=None):
+def found(seed, effect, forced=True):
     """The effect alone fitted to a case, and the case."""
     case = draw(seed, effect, forced)
     train = read(case)[0]
-    begun = asked(train.changed(runs=runs) if runs else train)
+    begun = asked(train)
     ranking = rank(begun, [h.effect for h in begun.hypotheses if h.effect != effect])
     return case, ranking.asked, ranking.guesses[0]
 
@@ -70,11 +70,3 @@ def test_what_is_left_and_what_nobody_visited_make_it_less_sure():
     # no run was below s = 0.16: how strong the magnet is at its end nobody knows
     assert abs(case.seal["magnitude"] - size) < 2 * none.magnitude
     assert begun.judge.windows.position.min() > case.truth.joint.lo + 0.15 * case.truth.joint.span
-
-
-def test_fewer_runs_are_less_sure():
-    doubts = []
-    for runs in (None, [0, 2]):
-        _, begun, guess = found(6, "quadratic_damping", runs=runs)
-        doubts.append(from_data(fitted(begun, guess))[0])
-    assert doubts[0] < doubts[1]

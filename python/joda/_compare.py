@@ -63,7 +63,7 @@ def compare(
     for path in targets:
         check_target(path, force)
     measured = read_measured(model, joint, runs, passive)
-    found = errors(measured, begin=progress)
+    found = errors(measured, explained=True, begin=progress)
     short = window_rows(measured)
     judged = adequacy(measured, found, short) if found.runs else None
     places, length = _failing(measured, found, short, judged)

@@ -81,6 +81,7 @@ def errors(
     measured: Measured,
     *,
     windows: bool = True,
+    explained: bool = False,
     begin: Callable[[str], None] = lambda name: None,
 ) -> Errors:
     """Replays all runs in MuJoCo with the plugin.
@@ -88,6 +89,8 @@ def errors(
     Args:
         measured: the runs, and the model.
         windows: whether the errors of windows, which take longer, are wanted.
+        explained: whether what errors of start and force make of whole runs is, which takes longer
+            still; else it is 0.
         begin: told the name of each run before its replay.
     """
     paths, rows, missed = [], [], []
@@ -101,7 +104,7 @@ def errors(
         left.append(joined(pieces))
         whole = rms(off[-1])
         if len(off[-1]):
-            scatter = measured.replayer.scatter(run, sigma) if windows else 0.0
+            scatter = measured.replayer.scatter(run, sigma) if explained else 0.0
             missed.append(Missed(run.name, _multiple(whole, sigma), scatter / sigma))
         missed += [_missed(run, sigma, piece) for piece in pieces]
         reason = _reason(run, whole, pieces) if windows else None

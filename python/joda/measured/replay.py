@@ -30,6 +30,8 @@ HORIZON = 2.0
 """How much of a whole run, s, tells its start."""
 ENSEMBLE = 8
 """Replays that tell how far errors of the start and the force move a whole run."""
+DENSEST = 50_000
+"""Samples of a run from which on only some are looked at for that, their noise averaged."""
 TRIES = 5
 """Replays, each from a better start than the best before, or nearer to it."""
 START = 3.0
@@ -101,9 +103,11 @@ class Replayer:
             return 0.0
         time, force = run.time[known] - run.time[0], run.force[known]
         start, spread = self._start(time, run.position[known], force, sigma)
+        every = slice(None, None, len(time) // DENSEST + 1)
+        off = smoothing.force_error(time, force, run.forced)[every] / np.sqrt(every.step)
+        time, force = time[every], force[every]
         rng = np.random.default_rng(0)
         starts = start + rng.standard_normal((ENSEMBLE, 2)) @ spread.T
-        off = smoothing.force_error(time, force, run.forced)
         forces = force + off * rng.standard_normal((ENSEMBLE, len(time)))
         paths = self._replay(time, np.vstack([start, starts]), np.vstack([force, forces]))
         return float(np.sqrt(np.mean((paths[1:] - paths[0]) ** 2)))
