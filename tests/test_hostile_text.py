@@ -33,6 +33,7 @@ from joda.plain import LONGEST, one_line, plain
 from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.history import History
 from joda.propose.session import Session
+from joda.propose.wishes import read_wishes
 from joda.scenes.scene import read_profiles
 
 CLI = Path(joda.__file__).parent / "cli"
@@ -569,3 +570,50 @@ def test_the_largest_numbers_that_a_file_may_hold_are_drawn(tmp_path):
     (tmp_path / "c.json").write_text(json.dumps(content))
     with Image.open(joda.plot(tmp_path / "c.json")) as drawn:
         assert drawn.format == "PNG"
+
+
+WORDS = {
+    "a name that is no text": (
+        ["context", "m\udcff.xml"],
+        r"'m\udcff.xml' is not UTF-8; rename the",
+    ),
+    "a wish without end": (
+        ["generate", "oven.xml", "-o", "new", "--describe", "x" * 20_000],
+        "joda: description: String should have at most 10000 characters.\n",
+    ),
+    "a complaint without end": (
+        ["revise", "gen", "--feedback", "x" * 20_000],
+        "joda: feedback has 20000 characters; say it in at most 10000.\n",
+    ),
+    "a file's name that acts": (
+        ["context", "\x1b[2J\r.xml"],
+        r"joda: \u001b[2J\r.xml: no such file",
+    ),
+    "a command that acts": (["\x1b[2J"], r"No such command '\x1b[2J'. Try --help."),
+}
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_words_of_a_command_line_are_refused_in_a_sentence(name, good, forked):
+    arguments, sentence = WORDS[name]
+    joint = ["--joint", "door"] if arguments[0] in ("context", "generate") else []
+    before = contents(good)
+    ended = forked.run([*arguments, *joint], good, 60)
+    assert ended.status == 2 and not ended.stdout and contents(good) == before
+    assert sentence in ended.stderr and harmless(ended.stderr) and ended.stderr.count("\n") == 1
+
+
+def test_no_text_takes_long_to_read(forked, tmp_path):
+    """Patterns that look for one word and then another are slow where both are repeated."""
+    assert [one.name for one in read_wishes("it stays where it is left; " + "shut when " * 10**4)]
+    read_wishes(f"it clicks in {'9' * 9000} positions")
+    spaces = (
+        door().replace("<joint ", f"<joint{' ' * 10**5}", 1).replace('5"/>', f'5"{" " * 10**5}/>')
+    )
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "door.xml").write_text(spaces)
+    (tmp_path / "models" / "comments.xml").write_text("<!--" * 10**6)
+    (tmp_path / "models" / "includes.xml").write_text("<mujoco>" + "<include " * 10**6)
+    command = ["generate", "models", "-o", "out", "--proposer", "offline", "--rounds", "1"]
+    ended = forked.run(command, tmp_path, 25)
+    assert not ended.interrupted and "door/door: " in ended.stdout, ended.stderr

@@ -176,7 +176,7 @@ def _models(source: Path, target: Path) -> Iterator[tuple[Path, str, bool]]:
         for path in sorted(source.rglob("*"))
         if path.suffix.lower() in (".xml", ".urdf") and made not in path.resolve().parents
     }
-    includes = re.compile(r"<include\s[^>]*\bfile\s*=\s*[\"']([^\"']*)")
+    includes = re.compile(r"<include\s[^<>]*\bfile\s*=\s*[\"']([^\"']*)")
     parts = {Path(file).name for text in texts.values() for file in includes.findall(text)}
     taken: set[str] = set()
     for path, text in texts.items():
@@ -188,7 +188,7 @@ def _models(source: Path, target: Path) -> Iterator[tuple[Path, str, bool]]:
 def _text(path: Path) -> str:
     """What the file says but for comments; where it cannot be read, that it is a model."""
     try:
-        return re.sub(r"<!--.*?-->", "", read_text(path), flags=re.DOTALL)
+        return re.sub(r"<!--.*?(?:-->|\Z)", "", read_text(path), flags=re.DOTALL)
     except JodaError:
         return "<mujoco>"
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from joda._generate import choose
+from joda.component import LONGEST_TEXT
 from joda.errors import JodaError
 from joda.pictures.changes import changes, overlay
 from joda.pictures.style import write_png
@@ -62,6 +63,9 @@ def revise(
     path = Path(folder)
     if not feedback.strip():
         raise JodaError("feedback is empty; say what is wrong, in words.")
+    if len(feedback) > LONGEST_TEXT:
+        said = f"feedback has {len(feedback)} characters"
+        raise JodaError(f"{said}; say it in at most {LONGEST_TEXT}.")
     session = Session.resume(path, progress)
     if not session.turns:
         raise JodaError(f"{path}: holds no proposal yet; go on with: joda generate --resume")

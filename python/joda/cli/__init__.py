@@ -77,6 +77,7 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")
     interrupt.watch()
     try:
+        _check_arguments()
         status = app(with_usual(sys.argv[1:]) or ["--help"], standalone_mode=False)
         sys.stdout.flush()
     except BrokenPipeError:  # who reads what is printed has enough
@@ -88,6 +89,17 @@ def main() -> None:
     if interrupt.seen():
         status = _fail("interrupted.", interrupt.STATUS)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _check_arguments() -> None:
+    """Raises JodaError for what is no text, such as a file's name in an old encoding."""
+    for argument in sys.argv[1:]:
+        try:
+            argument.encode()
+        except UnicodeEncodeError:
+            raise JodaError(
+                f"'{argument}' is not UTF-8; rename the file, or type the words anew."
+            ) from None
 
 
 def _explain(error: BaseException) -> int:

@@ -18,6 +18,7 @@ from joda.profile import CHANNELS
 from joda.profile import Channel as Curves
 from joda.proposal import EffectProposal, Proposal, Strength
 from joda.propose.mend import rescale
+from joda.propose.wishes import LONGEST_CLAUSE
 from joda.template import Template
 
 Channel = Literal["conservative", "friction", "damping"]
@@ -112,7 +113,8 @@ def revise(
     Raises:
         JodaError: it was not understood, or there is no such effect to change.
     """
-    for clause in filter(str.strip, re.split(r"[.!](?:\s|$)|[;\n]|,? and ", complaint.lower())):
+    parts = re.split(r"[.!](?:\s|$)|[;\n]|,? and ", complaint.lower())
+    for clause in (part[:LONGEST_CLAUSE] for part in parts if part.strip()):
         subjects, factor = _read(clause, complaint)
         effects = list(proposal.effect_proposals)
         for subject in subjects:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from joda._attach import attach
 from joda._compile import compile
@@ -26,7 +27,7 @@ from joda.interaction.surroundings import surroundings, told
 from joda.pictures.draw import draw
 from joda.pictures.style import png
 from joda.plain import plain
-from joda.profile import Profile
+from joda.profile import Profile, describe
 from joda.proposal import Proposal
 from joda.propose import Answer, Proposer, Task, Turn, Usage, total
 from joda.propose.history import Failure, History, Round
@@ -102,14 +103,17 @@ class Session:
 
         Not `pictured`: without pictures of the joint, which rules do not look at.
         """
-        history = History(
-            model=relative(model, folder),
-            joint=joint,
-            description=description,
-            templates=tuple(relative(path, folder) for path in templates),
-            key=key,
-            pictures=None if pictured else (),
-        )
+        try:
+            history = History(
+                model=relative(model, folder),
+                joint=joint,
+                description=description,
+                templates=tuple(relative(path, folder) for path in templates),
+                key=key,
+                pictures=None if pictured else (),
+            )
+        except ValidationError as error:
+            raise JodaError(describe(error)) from None
         return cls(folder, history, progress)
 
     @classmethod

@@ -16,7 +16,7 @@ from xml.sax.saxutils import quoteattr
 from joda.plain import UNSEEN
 
 _TAG = re.compile(rb"""<(?:[^"'>]|"[^"]*"|'[^']*')*>""")
-_ATTRIBUTE = re.compile(rb"""\s+([\w:.\-]+)\s*=\s*("[^"]*"|'[^']*')""")
+_ATTRIBUTE = re.compile(rb"""(?<!\s)\s+([\w:.\-]+)\s*=\s*("[^"]*"|'[^']*')""")
 
 
 def quoted(value: str) -> str:
@@ -86,9 +86,8 @@ class Element:
                     tag = tag[: match.start(1)] + text + tag[match.end() :]
                     break
             else:
-                close = re.search(rb"\s*/?>$", tag)
-                assert close
-                tag = tag[: close.start()] + b" " + text + tag[close.start() :]
+                close = len(tag.removesuffix(b">").removesuffix(b"/").rstrip())
+                tag = tag[:close] + b" " + text + tag[close:]
         self.document.edits.append((self.start, self.inner, tag))
 
     def replace(self, text: str) -> None:
