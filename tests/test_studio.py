@@ -34,8 +34,8 @@ LID = """\
 <mujoco>
   <compiler angle="radian"/>
   <worldbody>
-    <geom type="plane" size="1 1 1"/>
-    <geom type="box" size=".3 .2 .1" pos="0 0 -.12"/>
+    <geom type="plane" size="1 1 1" contype="0" conaffinity="0"/>
+    <geom type="box" size=".3 .2 .1" pos="0 0 -.12" contype="0" conaffinity="0"/>
     <body pos="-.3 0 0">
       <joint name="lid" axis="0 -1 0" range="0 1.5" damping="0.05" frictionloss="0.1"/>
       <geom type="box" size=".3 .2 .01" pos=".3 0 0" mass=".5" rgba="1 0 0 1"/>
