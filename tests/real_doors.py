@@ -40,6 +40,7 @@ SCENE = """
       </body>
     </body>
   </worldbody>
+  <contact><exclude body1="cabinet" body2="cabinet_door"/></contact>
 </mujoco>
 """
 

@@ -5,6 +5,8 @@ import numpy as np
 from joda.hidden.truth import Joint, Truth
 
 GRAVITY = 9.81
+WOOD = 600.0
+"""Density of the cube that stands for the part in pictures, kg/m³."""
 TIMESTEP = 0.002
 """Of a base model, s, unless its joint is fast."""
 STEPS = 700
@@ -75,9 +77,10 @@ def base_model(truth: Truth, name: str) -> str:
     """MJCF of the joint as its base model has it."""
     joint = truth.joint
     if joint.kind == "hinge":
-        axis, inertial, size = _hinge(joint)
+        axis, inertial, mass = _hinge(joint)
     else:
-        axis, inertial, size = _slide(joint)
+        axis, inertial, mass = _slide(joint)
+    half = 0.5 * (mass / WOOD) ** (1 / 3)
     native = "".join(
         f' {key}="{value!r}"'
         for key, value in (
@@ -94,8 +97,7 @@ def base_model(truth: Truth, name: str) -> str:
       <joint name="{name}" type="{joint.kind}" axis="{axis}" limited="true"
              range="{joint.lo!r} {joint.hi!r}"{native}/>
       {inertial}
-      <geom type="box" size="{size!r} {0.1 * size!r} {0.3 * size!r}"
-            contype="0" conaffinity="0"/>
+      <geom type="box" size="{half!r} {half!r} {half!r}" contype="0" conaffinity="0"/>
     </body>
   </worldbody>
 </mujoco>
@@ -108,7 +110,7 @@ def _timestep(joint: Joint) -> float:
 
 
 def _hinge(joint: Joint) -> tuple[str, str, float]:
-    """Axis, inertial element and size of a hinge: horizontal if it has gravity.
+    """Axis, inertial element and mass (kg) of a hinge: horizontal if it has gravity.
 
     Turned by q about +y, a centre of mass at (x, 0, z) makes the torque m g (x cos q + z sin q).
     """
@@ -124,7 +126,7 @@ def _hinge(joint: Joint) -> tuple[str, str, float]:
     inertial = (
         f'<inertial pos="{x!r} 0 {z!r}" mass="{mass!r}" diaginertia="{own!r} {own!r} {own!r}"/>'
     )
-    return ("0 1 0" if torque else "0 0 1"), inertial, float(np.hypot(x, z))
+    return ("0 1 0" if torque else "0 0 1"), inertial, float(mass)
 
 
 def _slide(joint: Joint) -> tuple[str, str, float]:
@@ -134,7 +136,7 @@ def _slide(joint: Joint) -> tuple[str, str, float]:
     inertial = (
         f'<inertial pos="0 0 0" mass="{joint.inertia!r}" diaginertia="{own!r} {own!r} {own!r}"/>'
     )
-    return f"{float(np.sqrt(1 - sine**2))!r} 0 {sine!r}", inertial, joint.span
+    return f"{float(np.sqrt(1 - sine**2))!r} 0 {sine!r}", inertial, joint.inertia
 
 
 def _between(rng: np.random.Generator, least: float, most: float) -> float:
