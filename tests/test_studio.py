@@ -17,7 +17,7 @@ from joda import JodaError, Profile, attach, compare, read_profiles, simulate, s
 from joda._studio import charts, edits
 from joda._studio.desk import Desk
 from joda._studio.folder import Folder
-from joda._studio.guard import OnlyHere, allowed, free_port
+from joda._studio.guard import Guard, free_port
 from joda._studio.live import Live
 from joda._studio.motions import Outdated, replayed, simulated
 from joda._studio.solids import shape
@@ -27,6 +27,7 @@ from joda.component import Component
 from joda.effects import AddedInertia
 from joda.field import evaluate
 from joda.measured.runs import write_run
+from joda.plain import plain
 from joda.profile import Joint
 from joda.scenes.motion import Motion
 
@@ -34,8 +35,8 @@ LID = """\
 <mujoco>
   <compiler angle="radian"/>
   <worldbody>
-    <geom type="plane" size="1 1 1" contype="0" conaffinity="0"/>
-    <geom type="box" size=".3 .2 .1" pos="0 0 -.12" contype="0" conaffinity="0"/>
+    <geom type="plane" size="1 1 1" pos="0 0 -.3"/>
+    <geom type="box" size=".3 .2 .1" pos="0 0 -.12"/>
     <body pos="-.3 0 0">
       <joint name="lid" axis="0 -1 0" range="0 1.5" damping="0.05" frictionloss="0.1"/>
       <geom type="box" size=".3 .2 .01" pos=".3 0 0" mass=".5" rgba="1 0 0 1"/>
@@ -439,31 +440,38 @@ def test_a_knock_at_the_end_leaves_the_frame_of_the_hands_chart():
 # --- who may ask, and what is answered
 
 
-@pytest.mark.parametrize(
-    ("host", "origin", "may"),
-    [
-        ("127.0.0.1:8642", None, True),
-        ("localhost:8642", "http://localhost:8642", True),
-        ("127.0.0.1:8642", "http://127.0.0.1:8642", True),
-        ("127.0.0.1:8642", "http://127.0.0.1:9000", False),
-        ("127.0.0.1:8642", "https://example.org", False),
-        ("127.0.0.1:8642", "null", False),
-        ("example.org:8642", None, False),
-        ("127.0.0.1.example.org", None, False),
-        ("", None, False),
-    ],
-)
-def test_only_this_machine_and_its_own_pages_may_ask(host, origin, may):
-    headers = [(b"host", host.encode()), *([(b"Origin", origin.encode())] if origin else [])]
-    assert allowed(headers) is may
+PORT = 8642
+HERE = f"127.0.0.1:{PORT}"
+OTHERS = {
+    "another host": {"host": "example.org:8642"},
+    "another port": {"host": "127.0.0.1:9000"},
+    "no port": {"host": "127.0.0.1"},
+    "a longer host": {"host": "127.0.0.1.example.org:8642"},
+    "a user": {"host": "me@127.0.0.1:8642"},
+    "no host": {"host": ""},
+    "a page elsewhere": {"origin": "https://example.org"},
+    "a page at another port": {"origin": "http://127.0.0.1:9000"},
+    "a page at another name": {"origin": f"http://localhost:{PORT}"},
+    "a page of nowhere": {"origin": "null"},
+    "no token": {"token": ""},
+    "another token": {"token": "x" * 43},
+    "a token with more behind": {"more": "x"},
+    "a cookie of another port": {"port": 9000},
+}
 
 
-@pytest.mark.parametrize("kind", ["http", "websocket"])
-def test_what_others_ask_reaches_nothing(kind):
+def asked(guard, kind="http", host=HERE, origin=None, port=PORT, token=None, more="", query=""):
+    """What the guard sends, and what it lets through."""
+    token = guard.address.partition("token=")[2] if token is None else token
+    cookie = f"other; joda_studio_{port}={token}{more}; theme=[dark]"
+    pairs = {"Host": host, "Origin": origin, "Cookie": cookie}
+    headers = [(name.encode(), value.encode()) for name, value in pairs.items() if value]
+    scope = {"type": kind, "path": "/", "headers": headers, "query_string": query.encode()}
     reached, sent = [], []
 
     async def application(scope, receive, send):
         reached.append(scope)
+        await send({"type": "http.response.start", "status": 200, "headers": []})
 
     async def receive():
         return {"type": f"{kind}.connect"}
@@ -471,12 +479,55 @@ def test_what_others_ask_reaches_nothing(kind):
     async def send(message):
         sent.append(message)
 
-    guarded = OnlyHere(application)
-    asyncio.run(guarded({"type": kind, "headers": [(b"host", b"example.org")]}, receive, send))
+    asyncio.run(guard.protecting(application)(scope, receive, send))
+    return sent, reached
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+@pytest.mark.parametrize("other", OTHERS)
+def test_what_others_ask_reaches_nothing(other, kind):
+    sent, reached = asked(Guard(PORT), kind, **OTHERS[other])
     assert not reached
-    assert sent[0].get("status") == 403 or sent == [{"type": "websocket.close", "code": 1008}]
-    asyncio.run(guarded({"type": kind, "headers": [(b"host", b"127.0.0.1:1")]}, receive, send))
+    if kind == "websocket":
+        assert sent == [{"type": "websocket.close", "code": 1008}]
+    else:
+        assert sent[0]["status"] == 403
+        said = sent[1]["body"].decode()
+        assert said.startswith("joda studio") and said.endswith(".\n") and said.count("\n") == 1
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
+def test_the_studios_own_page_may_ask(name, kind):
+    host = f"{name}:{PORT}"
+    sent, reached = asked(Guard(PORT), kind, host=host, origin=f"http://{host}")
     assert len(reached) == 1
+    assert (b"x-frame-options", b"DENY") in sent[0]["headers"]
+
+
+def test_the_address_gives_the_browser_a_cookie_once():
+    guard = Guard(PORT)
+    address, _, query = guard.address.partition("?")
+    assert address == f"http://{HERE}/" and len(query) > 40
+    sent, reached = asked(guard, token="", query=query)
+    headers = dict(sent[0]["headers"])
+    assert not reached and sent[0]["status"] == 303 and headers[b"location"] == b"/"
+    value, *rules = headers[b"set-cookie"].decode().split("; ")
+    assert value == f"joda_studio_{PORT}={query.removeprefix('token=')}"
+    assert set(rules) == {"Path=/", "HttpOnly", "SameSite=Strict"}
+    for kind, wrong in (("http", query + "x"), ("http", "token=%ff"), ("websocket", query)):
+        assert not asked(guard, kind, token="", query=wrong)[1]
+    assert Guard(PORT).address != guard.address
+
+
+@pytest.mark.parametrize("name", ["..", "../../evil.csv", "a\0b.csv", "\x1b[2J.csv", "x" * 999])
+def test_a_name_that_is_handed_over_is_no_path(desk, name):
+    before = set(desk.folder.path.rglob("*"))
+    samples = "".join(f"{k / 50},{0.5 + 0.3 * np.sin(k / 9):.5f}\n" for k in range(99))
+    desk.upload(name, f"time,position\n{samples}".encode())
+    (run,) = desk.runs
+    assert run.parent == desk.scratch("runs") and set(desk.folder.path.rglob("*")) == before
+    assert plain(run.name) == run.name and len(run.name) < 200
 
 
 def test_a_taken_port_is_told():
