@@ -100,6 +100,8 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
     if found.verdict == "not_enough_data" and worst:
         told = ", and ".join(map(_explained, worst))
         yield f"Not enough to tell whether the model is right: {told}."
+        if found.segment and found.segment.multiple < MULTIPLE:
+            yield f"All windows of 0.4 s are missed by less than {MULTIPLE:g} times the noise."
     elif found.verdict == "not_enough_data":
         yield (
             "Not enough to tell whether the model is right: too few samples, or too little motion "
@@ -125,13 +127,17 @@ def _worst(one: Missed) -> str:
 
 
 def _much(one: Missed) -> str:
-    return f"{one.multiple:.2g} times the noise" if one.multiple < 1e6 else "more than can be told"
+    return f"{_times(one.multiple)} the noise" if one.multiple < 1e6 else "more than can be told"
+
+
+def _times(multiple: float) -> str:
+    return f"{multiple:.0f} times" if multiple >= 10 else f"{multiple:.2g} times"
 
 
 def _explained(one: Missed) -> str:
     return (
         f"{_worst(one)}, of which errors of the measured start and force alone can make "
-        f"{one.explained:.2g} times the noise"
+        f"{_times(one.explained)} the noise"
     )
 
 
