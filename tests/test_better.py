@@ -82,3 +82,4 @@ def test_an_effect_is_not_placed_where_nobody_was(measured):
     assert visited_share(near, (0.0, 0.3)) == 0.0
     assert "hardly any run visited s = 0.00 to 0.30" in unseen_place(near, (0.0, 0.3))
     assert unseen_place(measured, None) is None
+    assert unseen_place(near, (0.0, 1.0)) is None  # a law, not a place

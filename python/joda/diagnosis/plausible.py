@@ -55,10 +55,13 @@ def implausible(measured: Measured, profile: Profile, effect: str | None = None)
 
 
 def unseen_place(measured: Measured, interval: Interval | None) -> str | None:
-    """Why nothing can be added at an interval, as a clause; None if runs have been there."""
-    if interval is None or visited_share(measured, interval) >= VISITED:
+    """Why nothing can be added at an interval, as a clause; None if runs have been there.
+
+    What acts all over the range is a law, and no run needs to have been everywhere for it.
+    """
+    a, b = interval or (0.0, 1.0)
+    if (a <= 0.0 and b >= 1.0) or visited_share(measured, (a, b)) >= VISITED:
         return None
-    a, b = interval
     return f"hardly any run visited s = {a:.2f} to {b:.2f}, where it acts"
 
 
