@@ -101,6 +101,9 @@ def test_the_diagnosis_is_as_the_contract_says(hidden):
         assert 0 <= one["probability"] <= 1
         assert one["direction"] in ("both", "positive", "negative")
         assert set(one["indistinguishable_from"]) <= set(NAMES)
+        assert len(one["interval_error"]) == 2 and one["magnitude_error"] > 0
+        assert one["probability"] >= 0.005
+    assert all(0 <= a < b <= 1 for a, b in told["unvisited"])
     likely = [one["probability"] for one in told["effects"]]
     assert likely == sorted(likely, reverse=True)
     assert sum(likely) <= 1 + 1e-9

@@ -1,0 +1,99 @@
+"""The words of a verdict: "Missing is" and "Right." only where all that they claim holds."""
+
+from dataclasses import replace
+
+import pytest
+
+from joda._hidden_effect import _judged
+from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.summary import summarised
+from joda.diagnosis.weighing import Weighed
+from joda.measured.comparison import Comparison
+
+DETENT = Finding(
+    effect="detent_internal",
+    interval=(0.3, 0.5),
+    interval_error=(0.01, 0.01),
+    probability=0.8,
+    direction="both",
+    magnitude=2.0,
+    magnitude_error=0.1,
+    unit="N·m",
+    explanation="A click-stop.",
+    held_out_error_before=0.01,
+    held_out_error_after=0.001,
+    indistinguishable_from=(),
+)
+SEAL = {"effect": "detent_internal", "interval": [0.31, 0.5], "direction": "both"}
+SEAL |= {"magnitude": 2.05, "unit": "N·m"}
+
+
+def weighed(*likely, verdict="missing_effect"):
+    names = ("detent_internal", "gravity_offset", "quadratic_damping")[: len(likely)]
+    return Weighed(verdict, likely, (10.0, tuple(0.1 for _ in likely)), names)
+
+
+@pytest.mark.parametrize(
+    ("probability", "after", "head"),
+    [
+        (0.8, 0.001, "Missing is a click-stop (detent) (probability 80 %)."),
+        (0.5, 0.001, "Best guess: a click-stop (detent) (probability 50 %)."),
+        (0.3, 0.001, "Best guess:"),
+        (0.8, 0.01, "Something is missing that no known effect explains. Best guess:"),
+    ],
+)
+def test_missing_is_said_only_of_what_is_likely_and_helps(probability, after, head):
+    one = replace(DETENT, probability=probability, held_out_error_after=after)
+    assert summarised(one, weighed(probability), one_way=False, bouncy=False).startswith(head)
+
+
+def test_two_that_cannot_be_told_apart_are_likely_together():
+    one = replace(DETENT, probability=0.4, indistinguishable_from=("gravity_offset",))
+    said = summarised(one, weighed(0.4, 0.35, 0.1), one_way=False, bouncy=False)
+    assert said.startswith("Missing is a click-stop (detent) or another pull of gravity")
+    said = summarised(one, weighed(0.3, 0.15, 0.1), one_way=False, bouncy=False)
+    assert said.startswith("Best guess:")
+
+
+def test_what_no_effect_explains_is_a_guess():
+    one = weighed(0.2, verdict="unexplained")
+    assert summarised(DETENT, one, one_way=False, bouncy=False).startswith("Best guess: a click")
+
+
+def diagnosis(*effects):
+    return Diagnosis("door", "missing_effect", "", effects, (), 1e-3, "rad", None, (), contacts=())
+
+
+def comparison(whole, windows):
+    return Comparison(
+        "door", "rad", (), whole, windows, 1e-3, None, (), 0.1, (), (), (), contacts=()
+    )
+
+
+BEFORE = comparison(0.1, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "seal", "after", "said"),
+    [
+        ({}, {}, comparison(0.05, 0.001), "Right."),
+        ({}, {"interval": [0.45, 0.9]}, comparison(0.05, 0.001), "overlap by 8 % only"),
+        ({}, {"magnitude": 2.3}, comparison(0.05, 0.001), "size is off by 3.0 times its ±"),
+        ({}, {"direction": "positive"}, comparison(0.05, 0.001), "direction is positive, not both"),
+        ({}, {}, comparison(0.05, 0.011), "unseen runs are not missed by less"),
+        ({}, {}, comparison(0.11, 0.001), "unseen runs are not missed by less"),
+        ({}, {}, None, "nothing was added"),
+        ({"effect": "backlash"}, {}, comparison(0.05, 0.001), "Wrong"),
+    ],
+)
+def test_right_is_said_only_if_all_of_it_is(change, seal, after, said):
+    told, right = _judged(diagnosis(replace(DETENT, **change)), SEAL | seal, BEFORE, after)
+    assert said in told
+    assert right == (told == "Right.")
+
+
+def test_where_no_effect_is_named_it_was_missed():
+    assert _judged(diagnosis(), SEAL, BEFORE, None) == (
+        "Missed: no effect was named (verdict: missing_effect).",
+        False,
+    )
