@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_compare import door, runs_of, scene_of
 
+from joda._refine import _worse
 from joda.component import Component
 from joda.diagnosis.better import improves, risen
 from joda.diagnosis.plausible import EXCESS, Needs, implausible, unseen_place
@@ -83,3 +84,19 @@ def test_an_effect_is_not_placed_where_nobody_was(measured):
     assert "hardly any run visited s = 0.00 to 0.30" in unseen_place(near, (0.0, 0.3))
     assert unseen_place(measured, None) is None
     assert unseen_place(near, (0.0, 1.0)) is None  # a law, not a place
+
+
+@pytest.mark.parametrize(
+    ("errors", "windows", "apart", "said"),
+    [
+        ((0.1, 0.01), (0.05, 0.002), None, None),
+        ((0.1, 0.01), (0.05, 0.002), (0.1, 0.104), None),
+        ((0.1, 0.01), (0.05, 0.002), (0.1, 0.2), "held out (--check) is missed by 0.2"),
+        ((0.1, 0.2), (0.05, 0.06), None, "missed by 0.2 instead of 0.1"),
+        ((0.1, 0.2), (0.05, 0.002), None, None),  # near a barrier whole runs part
+        ((0.0004, 0.0005), (0.0004, 0.0005), None, None),  # all of it noise
+    ],
+)
+def test_refine_writes_nothing_that_is_worse(errors, windows, apart, said):
+    reason = _worse(errors, windows, apart, noise=1e-3)
+    assert (reason is None) if said is None else (said in reason)

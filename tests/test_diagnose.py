@@ -102,7 +102,7 @@ def test_the_diagnosis_is_as_the_contract_says(hidden):
         assert one["direction"] in ("both", "positive", "negative")
         assert set(one["indistinguishable_from"]) <= set(NAMES)
         assert len(one["interval_error"]) == 2 and one["magnitude_error"] > 0
-        assert one["probability"] >= 0.005
+        assert one["probability"] >= 0.01
     assert all(0 <= a < b <= 1 for a, b in told["unvisited"])
     likely = [one["probability"] for one in told["effects"]]
     assert likely == sorted(likely, reverse=True)

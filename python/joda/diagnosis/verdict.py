@@ -36,8 +36,8 @@ RECORD_MORE = (
 )
 GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in both directions."
 GAUGE_BACK = "Measure the way back too, as slowly."
-NAMED, WORTH_NAMING, LEAST_NAMED = 5, 0.01, 0.005
-"""How many effects are named, the first and the others only of at least some probability."""
+NAMED, WORTH_NAMING = 5, 0.01
+"""How many effects are named, and only those of at least some probability."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def diagnosed(
     helps = first.held_out_error_after < first.held_out_error_before
     verdict = weighed.verdict if helps else "unexplained"
     summary = summarised(first, weighed, one_way, ranking.bouncy)
-    likely = tuple(one for one in findings if one.probability >= LEAST_NAMED)
+    likely = tuple(one for one in findings if one.probability >= WORTH_NAMING)
     said = _said(measured, verdict, summary, likely, experiment)
     return Diagnosed(said, profile if likely else None, findings, puzzling)
 
