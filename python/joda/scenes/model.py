@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.profile import Joint
+from joda.scenes.copies import refuse_copied_plugins
 
 _TYPES = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name
@@ -21,6 +22,7 @@ def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     """An MJCF or URDF file, parsed and compiled; raises JodaError."""
     if not path.is_file():
         raise JodaError(f"{path}: no such file; give an MJCF or URDF file.")
+    refuse_copied_plugins(path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         model = spec.compile()
