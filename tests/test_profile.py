@@ -207,7 +207,7 @@ LARGEST = {
 def test_the_largest_channel_is_read_and_one_more_is_refused(count, points, sentence, combine):
     parts = tuple(line(k / count, (k + 1) / count, points) for k in range(count))
     channel = Channel(combine=combine, components=parts)
-    assert _core.Channel(channel.text(), combine)(0.99)[0] == pytest.approx(1 - 0.01 * count)
+    assert _core.Channel(channel.text(), combine)(0.99)[0] == pytest.approx(0.99 * count % 1 or 1)
     with pytest.raises(ValueError) as caught:
         _core.Channel(f"{channel.text()}; {line(0, 1, 2).text()}", combine)
     assert str(caught.value) == sentence

@@ -36,13 +36,13 @@ def _check(path: Path, attached: bool, above: tuple[Path, ...]) -> None:
                     f'{path}: a <replicate> holds <plugin instance="{name}"/>, on which MuJoCo '
                     "crashes; take that line out and give each copy its profile with: joda attach"
                 )
-        elif attached and element.tag == "body":
-            if any(e.attributes.get("plugin") == PLUGIN for e in element.children):
-                raise JodaError(
-                    f'{path}: a body holds <plugin plugin="{PLUGIN}"> itself, which MuJoCo cannot '
-                    "attach to another model; put it into an <instance> of <extension> and <plugin "
-                    'instance="..."/> into the body'
-                )
+        alone = [e for e in element.children if e.attributes.get("plugin") == PLUGIN]
+        if attached and element.tag == "body" and alone:
+            raise JodaError(
+                f'{path}: a body holds <plugin plugin="{PLUGIN}"> itself, which MuJoCo cannot '
+                "attach to another model; put it into an <instance> of <extension> and <plugin "
+                'instance="..."/> into the body'
+            )
     for file in models.values():
         _check(file, True, (*above, path))
 
