@@ -24,8 +24,8 @@ namespace joda {
 
 inline constexpr double kMinWidth = 1e-9;  // narrowest interval or gap between control points
 inline constexpr double kMaxValue = 1e15;  // largest |y|; no coefficient of a cubic can overflow
-inline constexpr size_t kMaxComponents = 200;         // of one channel
-inline constexpr Eigen::Index kMaxPoints = 2000;      // of one channel: its components' together
+inline constexpr size_t kMaxComponents = 200;     // of one channel
+inline constexpr Eigen::Index kMaxPoints = 2000;  // of one channel: its components' together
 
 namespace internal {
 
@@ -126,10 +126,10 @@ inline void CheckSize(const std::vector<Component>& components) {
   for (const Component& c : components) points += c.x.size();
   const bool many = components.size() > kMaxComponents;
   if (!many && points <= kMaxPoints) return;
-  throw std::invalid_argument(
-      "the channel has " + std::to_string(many ? components.size() : points) +
-      (many ? " components" : " control points") + "; at most " +
-      std::to_string(many ? kMaxComponents : kMaxPoints) + " are possible");
+  throw std::invalid_argument("the channel has " +
+                              std::to_string(many ? components.size() : points) +
+                              (many ? " components" : " control points") + "; at most " +
+                              std::to_string(many ? kMaxComponents : kMaxPoints) + " are possible");
 }
 
 // All components of one channel; the text may be empty.

@@ -42,14 +42,14 @@ class JointDynamics {
 
  private:
   struct Joint {
-    int id;            // joint
-    int dof;           // its degree of freedom
-    int qpos;          // its place in qpos
-    int body;          // the body it moves
-    int equality;      // equality constraint whose row carries the damping, -1: none
-    int friction_row;  // expected place of its friction row among the friction rows
-    int state;         // its place in the instance's state
-    Handle handle;     // after the step being computed, until Advance
+    int id;              // joint
+    int dof;             // its degree of freedom
+    int qpos;            // its place in qpos
+    int body;            // the body it moves
+    int equality;        // equality constraint whose row carries the damping, -1: none
+    int friction_row;    // expected place of its friction row among the friction rows
+    int state;           // its place in the instance's state
+    Handle handle;       // after the step being computed, until Advance
     double applied = 0;  // the force that Compute took to the handle, until Advance
     Profile profile;
   };

@@ -146,7 +146,10 @@ def test_a_replicate_with_an_instance_is_refused_before_mujoco_crashes(tmp_path,
         f'{path}: a <replicate> holds <plugin instance="p"/>, on which MuJoCo crashes; take that '
         "line out and give each copy its profile with: joda attach"
     )
-    for command in (context, lambda model, joint: attach(model, profile(joint), tmp_path / "o.xml")):
+    for command in (
+        context,
+        lambda model, joint: attach(model, profile(joint), tmp_path / "o.xml"),
+    ):
         with pytest.raises(JodaError) as error:
             command(path, "j0")
         assert str(error.value) == sentence
