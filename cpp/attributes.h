@@ -24,6 +24,8 @@ namespace joda {
 
 inline constexpr double kMinWidth = 1e-9;  // narrowest interval or gap between control points
 inline constexpr double kMaxValue = 1e15;  // largest |y|; no coefficient of a cubic can overflow
+inline constexpr size_t kMaxComponents = 200;     // of one channel
+inline constexpr Eigen::Index kMaxPoints = 2000;  // of one channel: its components' together
 
 namespace internal {
 
@@ -85,6 +87,10 @@ inline void Validate(const Component& c, bool nonnegative) {
   }
   if (c.b - c.a < kMinWidth) fail("the interval is narrower than 1e-9 of the range");
   if (c.x.size() < 2) fail("at least two control points are needed");
+  if (c.x.size() > kMaxPoints) {
+    fail("it has " + std::to_string(c.x.size()) + " control points; at most " +
+         std::to_string(kMaxPoints) + " are possible");
+  }
   if (c.x.size() != c.y.size()) {
     fail("x has " + std::to_string(c.x.size()) + " numbers and y has " +
          std::to_string(c.y.size()) + "; they must be equally many");
@@ -113,6 +119,19 @@ inline Component ParseComponent(std::string_view interval, std::string_view x, s
   return out;
 }
 
+// Throws if the components are more than one channel may have; merging them takes the longer the
+// more there are (docs/physics.md).
+inline void CheckSize(const std::vector<Component>& components) {
+  Eigen::Index points = 0;
+  for (const Component& c : components) points += c.x.size();
+  const bool many = components.size() > kMaxComponents;
+  if (!many && points <= kMaxPoints) return;
+  throw std::invalid_argument("the channel has " +
+                              std::to_string(many ? components.size() : points) +
+                              (many ? " components" : " control points") + "; at most " +
+                              std::to_string(many ? kMaxComponents : kMaxPoints) + " are possible");
+}
+
 // All components of one channel; the text may be empty.
 inline std::vector<Component> ParseChannel(std::string_view text, bool nonnegative) {
   std::vector<Component> out;
@@ -139,6 +158,7 @@ inline std::vector<Component> ParseChannel(std::string_view text, bool nonnegati
                                   error.what());
     }
   }
+  CheckSize(out);
   return out;
 }
 

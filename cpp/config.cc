@@ -44,9 +44,11 @@ int FindBody(const mjModel* m, int instance) {
   const auto count = std::count(first, last, instance);
   if (count != 1) {
     throw std::invalid_argument(
-        std::to_string(count) +
-        " bodies refer to it; put <plugin instance=\"...\"/> into exactly the one body that the "
-        "joint moves");
+        count == 0 ? "no body refers to it; put <plugin instance=\"...\"/> into the one body that "
+                     "the joint moves"
+                   : std::to_string(count) +
+                         " bodies refer to it, as in a <replicate>; each needs an instance of its "
+                         "own, as joda attach writes them");
   }
   return static_cast<int>(std::find(first, last, instance) - first);
 }
@@ -140,6 +142,14 @@ void CheckFriction(const mjModel* m, int joint, const Profile& profile) {
                               "frictionloss=\"1e-12\" to the joint");
 }
 
+// Whether the degree of freedom has a friction row of its own as stiff as it can be: about -1 / h
+// and 0.9999. The discrete integrator uses that one, not the plugin's.
+bool HoldsInDiscrete(const mjModel* m, int dof) {
+  const mjtNum* solref = m->dof_solref + mjNREF * dof;
+  const double steps = -solref[1] * m->opt.timestep;
+  return solref[0] <= 0 && 0.5 <= steps && steps <= 1.001 && m->dof_solimp[mjNIMP * dof] >= 0.999;
+}
+
 void CheckGravityOffset(const mjModel* m, int joint, const GravityOffset& gravity) {
   const bool hinge = m->jnt_type[joint] == mjJNT_HINGE;
   if (hinge ? gravity.force == 0 : gravity.descent == 0) return;
@@ -163,6 +173,32 @@ void CheckInertia(const mjModel* m, int joint, const Effects& effects) {
                                 Print(1 / m->dof_invweight0[dof]) +
                                 ", and the handle of its effect \"backlash\" " +
                                 Print(effects.backlash.inertia) + "; at most half is possible");
+  }
+}
+
+// Throws where the integrator, or noslip, gives the effect no place in which it would be right.
+void CheckIntegrator(const mjModel* m, int joint, const Effects& effects) {
+  const bool discrete = m->opt.integrator == mjINT_DISCRETE;
+  const bool noslip = m->opt.noslip_iterations > 0;
+  const auto fail = [&](const char* effect, const std::string& what) {
+    throw std::invalid_argument(JointName(m, joint) + " has the effect \"" + effect + "\", " +
+                                what);
+  };
+  if (effects.backlash.play > 0 && m->opt.integrator == mjINT_RK4) {
+    fail("backlash",
+         "whose handle would have half its inertia with integrator=\"RK4\"; choose "
+         "integrator=\"implicitfast\"");
+  }
+  if (effects.presliding.stiffness > 0 && (discrete || noslip)) {
+    fail("presliding_friction",
+         std::string("which does nothing with ") +
+             (discrete ? "integrator=\"discrete\"; choose integrator=\"implicitfast\""
+                       : "noslip_iterations; set them to 0"));
+  }
+  if (effects.IsAsymmetric() && discrete && !HoldsInDiscrete(m, m->jnt_dofadr[joint])) {
+    fail("asymmetric_friction",
+         "which makes it creep at rest with integrator=\"discrete\"; write solreffriction=\"0 " +
+             Print(-1 / m->opt.timestep) + "\" solimpfriction=\"0.9999 0.9999\" on the joint");
   }
 }
 
@@ -198,9 +234,10 @@ void CheckProfile(const mjModel* m, int joint, const Profile& profile) {
   if (!profile.effects) return;
   CheckGravityOffset(m, joint, profile.effects->gravity);
   CheckInertia(m, joint, *profile.effects);
+  CheckIntegrator(m, joint, *profile.effects);
 }
 
-int CountStates(const Effects* effects) { return effects && effects->backlash.play > 0 ? 3 : 1; }
+int CountStates(const Effects* effects) { return effects && effects->backlash.play > 0 ? 4 : 1; }
 
 int CountStates(const mjModel* m, int instance) {
   int count = 0;

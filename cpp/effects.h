@@ -57,6 +57,10 @@ struct Effects {
   Backlash backlash;           // between the applied force and the part
   double added_inertia = 0;    // that the joint's armature must hold (kg m^2)
   const char* needs_row = "";  // an effect that needs the friction row, "": none of them does
+
+  bool IsAsymmetric() const {
+    return asymmetry.positive.coefficients().size() || asymmetry.negative.coefficients().size();
+  }
 };
 
 // Throws std::invalid_argument, one sentence; the text is the one of the attribute "effects".

@@ -114,11 +114,12 @@ double JointDynamics::SetFrictionRow(const Step& step, mjData* d, int row, const
 
 double JointDynamics::PushThroughPlay(const mjData* d, const mjtNum* state, double h,
                                       Joint* joint) {
-  const double applied = d->qfrc_applied[joint->dof];
+  joint->applied = d->qfrc_applied[joint->dof];
   joint->handle = {state[1], state[2]};
-  return MoveHandle(joint->profile.effects->backlash, h, applied, d->qvel[joint->dof],
+  const double pushed = joint->applied + state[3];
+  return MoveHandle(joint->profile.effects->backlash, h, pushed, d->qvel[joint->dof],
                     &joint->handle) -
-         applied;
+         pushed;
 }
 
 void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
@@ -181,6 +182,7 @@ void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
     if (computed && HasBacklash(joint.profile.effects.get())) {
       state[joint.state + 1] = joint.handle.gap;
       state[joint.state + 2] = joint.handle.velocity;
+      state[joint.state + 3] = d->qfrc_applied[joint.dof] - joint.applied;
     }
   }
 }

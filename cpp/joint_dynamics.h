@@ -29,7 +29,9 @@ class JointDynamics {
 
   // Remembers the dry friction of the step just taken, one number per joint in plugin_state: the
   // next step's friction continues from it, so that a held joint does not creep. A joint with
-  // backlash has two numbers more, the handle's.
+  // backlash has three numbers more: the handle's two, and the force that was applied after Compute
+  // (between mj_step1 and mj_step2, or by mjcb_control) and so reached the part directly. The next
+  // step gives it to the handle and takes it back from the part.
   void Advance(const mjModel* m, mjData* d, int instance) const;
 
   // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint
@@ -40,14 +42,15 @@ class JointDynamics {
 
  private:
   struct Joint {
-    int id;            // joint
-    int dof;           // its degree of freedom
-    int qpos;          // its place in qpos
-    int body;          // the body it moves
-    int equality;      // equality constraint whose row carries the damping, -1: none
-    int friction_row;  // expected place of its friction row among the friction rows
-    int state;         // its place in the instance's state
-    Handle handle;     // after the step being computed, until Advance
+    int id;              // joint
+    int dof;             // its degree of freedom
+    int qpos;            // its place in qpos
+    int body;            // the body it moves
+    int equality;        // equality constraint whose row carries the damping, -1: none
+    int friction_row;    // expected place of its friction row among the friction rows
+    int state;           // its place in the instance's state
+    Handle handle;       // after the step being computed, until Advance
+    double applied = 0;  // the force that Compute took to the handle, until Advance
     Profile profile;
   };
 

@@ -24,14 +24,22 @@ inline constexpr double kStiffRow = 1e4;
 // The damping row's D over the joint's inertia where there is no damping: as good as no row.
 inline constexpr double kIdleRow = 1e-12;
 
+// Whether a step that begins beyond the range ends there too: all along it the channel is constant.
+inline bool StaysBeyond(double s, double landing) {
+  return (s < 0 && landing < 0) || (s > 1 && landing > 1);
+}
+
 // Part of the springs' force that must act implicitly for stability, as a stiffness: what is
 // stiffer than kExplicitStiffness at the steepest place that the joint may reach within this step,
-// or would move it by more than a fraction of its range (kStride). `field` says whether the
-// conservative channel acts.
+// or would move it by more than a fraction of its range (kStride). A constant force needs nothing.
+// `field` says whether the conservative channel acts.
 inline double ImplicitStiffness(const Profile& p, bool field, double h, double s, double v,
                                 double force, double inertia) {
   const double soft = kExplicitStiffness * inertia / (h * h);
   const double gravity = p.effects ? p.effects->gravity.descent : 0;
+  if (StaysBeyond(s, s + h * (v + h / inertia * force) * p.per_range)) {
+    return std::max(0.0, gravity - soft);
+  }
   const double steepest = field ? p.conservative.MaxDescent() * p.per_range : 0;
   double stiffness = std::abs(force) * p.per_range * (1 / kStride);
   if (steepest + gravity > soft) {

@@ -36,9 +36,11 @@ def scene(
     flag: str = "",
     equality: bool = True,
     extra: str = "",
+    effects: str = "",
 ) -> str:
     """MJCF of a slide (mass) or hinge (inertia) along x, without gravity."""
     keys = {"conservative": conservative, "friction": friction, "damping": damping}
+    keys |= {"effects": effects}
     config = "".join(f'<config key="{k}" value="{v}"/>' for k, v in keys.items() if v)
     i = repr(inertia)
     body = f'<inertial pos="0 0 0" mass="{i}" diaginertia="{i} {i} {i}"/>'

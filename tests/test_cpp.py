@@ -1,4 +1,7 @@
-"""Builds the C++ tests and the C++ host with sanitizers, and runs them."""
+"""Builds the C++ tests and the C++ host with sanitizers, and runs them.
+
+The fuzzers begin at the session's seed, which stands at the top of every run of pytest.
+"""
 
 import os
 import subprocess
@@ -6,9 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import SEED
 
 ROOT = Path(__file__).parents[1]
-FUZZ_COUNT = 100_000 if os.environ.get("CI") else 2_000
+FUZZ_COUNT = 20_000 if os.environ.get("CI") else 2_000
 
 # cmake and ninja may be installed beside the interpreter without being on the path
 PATH = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
@@ -34,6 +38,7 @@ def test_cpp_tests_pass_under_sanitizers(tmp_path):
         "CMAKE_BUILD_TYPE": "Debug",
         "CMAKE_COMPILE_WARNING_AS_ERROR": "ON",
         "JODA_FUZZ_COUNT": FUZZ_COUNT,
+        "JODA_FUZZ_SEED": os.environ[SEED],
         "JODA_PYTHON": "OFF",
         "JODA_SANITIZE": "ON",
         "JODA_TESTS": "ON",

@@ -313,7 +313,7 @@ def test_a_saved_state_restarts_exactly(tmp_path, options):
     mujoco.mj_setState(model, fresh, saved, full)
     np.testing.assert_array_equal(run(model, fresh, 0.5, wobble), first)
     np.testing.assert_array_equal(run(model, copied, 0.5, wobble), first)
-    assert model.npluginstate == 3
+    assert model.npluginstate == 4
 
 
 @pytest.mark.parametrize("threads", [2, 4])

@@ -258,7 +258,7 @@ FILES = {
     "thousands of components": (
         "composed",
         lambda c: changed(*PART, to=c["channels"]["conservative"]["components"] * 3000)(c),
-        "components; a channel has at most 200.",
+        "must have at most 200 components",
     ),
     "a great range": (
         "composed",

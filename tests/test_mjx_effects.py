@@ -88,8 +88,9 @@ class Scene:
             d.qfrc_applied[:] = force
             mujoco.mj_step(self.model, d)
             positions.append(d.qpos.copy())
-            parts = [d.plugin_state[k : k + size] for k in self.model.plugin_stateadr[instances]]
-            states.append(np.pad(parts, ((0, 0), (0, 3 - size))))
+            first = self.model.plugin_stateadr[instances]
+            parts = [d.plugin_state[k : k + min(size, 3)] for k in first]
+            states.append(np.pad(parts, ((0, 0), (0, 3 - min(size, 3)))))
         return np.array(positions), np.array(states)
 
     def mjx(self, forces):

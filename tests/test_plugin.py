@@ -66,8 +66,8 @@ def test_unknown_attributes_are_refused():
         ('type="slide" axis="1 0 0" range="0.0 1.0"', 'type="ball"', "joint 'j' is a ball joint; a profile needs a hinge or a slide"),
         ('<joint name="j" type="slide" axis="1 0 0" range="0.0 1.0" frictionloss="1e-12"/>', "<freejoint name='j'/>", "joint 'j' is a free joint; a profile needs a hinge or a slide"),
         ('<joint name="j" type="slide" axis="1 0 0" range="0.0 1.0" frictionloss="1e-12"/>', "", "body 'b' has 0 joints, none at place 0"),
-        ('<plugin instance="p"/>', "", "0 bodies refer to it; put <plugin instance=\"...\"/> into exactly the one body"),
-        ('<body name="b">', '<body name="c"><geom size=".1"/><plugin instance="p"/></body><body name="b">', "2 bodies refer to it"),
+        ('<plugin instance="p"/>', "", "no body refers to it; put <plugin instance=\"...\"/> into the one body that the joint moves"),
+        ('<body name="b">', '<body name="c"><geom size=".1"/><plugin instance="p"/></body><body name="b">', "2 bodies refer to it, as in a <replicate>; each needs an instance of its own, as joda attach writes them"),
     ],
 )  # fmt: skip
 def test_a_wrong_place_is_refused_in_one_sentence(old, new, message):

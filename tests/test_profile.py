@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from joda import _core
+from joda import _core, schema
 from joda.component import Component
 from joda.errors import JodaError
-from joda.profile import CHANNELS, Joint, Profile
+from joda.profile import CHANNELS, Channel, Channels, Joint, Profile
 
 HINGE = Joint(name="door", type="hinge", range=(-0.5, 1.5), unit="rad")
 
@@ -100,6 +100,19 @@ MISTAKES = {
         f"{CONSERVATIVE}.interval": [0.5, 0.50000000001]
     },
     f"{WHERE}.interval: must have 2 numbers, not 3.": {f"{CONSERVATIVE}.interval": [0, 0.5, 1]},
+    f"{WHERE}.x: must have at most 2000 numbers, not 2001.": {
+        f"{CONSERVATIVE}.x": [k / 2000 for k in range(2001)]
+    },
+    "channels.friction.components: must have at most 200 components, not 201.": {
+        "channels.friction.components": [{"interval": [0, 1], "x": [0, 1], "y": [1, 2]}] * 201
+    },
+    "channels.friction: the components have 2002 control points together; at most 2000 are "
+    "possible.": {
+        "channels.friction.components": [
+            {"interval": [0, 1], "x": [k / 1000 for k in range(1001)], "y": [1] * 1001}
+        ]
+        * 2
+    },
     f"{WHERE}.label: must not hold ';', '|' or line breaks.": {f"{CONSERVATIVE}.label": "a;b"},
     "channels.friction: components[0].y is negative; friction and damping must not be.": {
         f"{FRICTION}.y": [-1, 1]
@@ -176,6 +189,48 @@ def test_what_is_no_json_document_has_its_sentence(tmp_path, content, sentence):
 def test_a_missing_file_has_its_sentence(tmp_path):
     path = tmp_path / "composed.json"
     assert read_error(path) == f"{path}: cannot be read (No such file or directory)."
+
+
+# --- the largest channels
+
+
+def line(a: float, b: float, points: int) -> Component:
+    """A straight line of a component through so many control points."""
+    x = tuple(k / (points - 1) for k in range(points))
+    return Component(interval=(a, b), x=x, y=x)
+
+
+LARGEST = {
+    "components": (200, 2, "the channel has 201 components; at most 200 are possible"),
+    "control points": (20, 100, "the channel has 2002 control points; at most 2000 are possible"),
+}
+
+
+@pytest.mark.parametrize(("count", "points", "sentence"), LARGEST.values(), ids=LARGEST)
+@pytest.mark.parametrize("combine", ["sum", "max"])
+def test_the_largest_channel_is_read_and_one_more_is_refused(count, points, sentence, combine):
+    parts = tuple(line(k / count, (k + 1) / count, points) for k in range(count))
+    channel = Channel(combine=combine, components=parts)
+    assert _core.Channel(channel.text(), combine)(0.99)[0] == pytest.approx(0.99 * count % 1 or 1)
+    with pytest.raises(ValueError) as caught:
+        _core.Channel(f"{channel.text()}; {line(0, 1, 2).text()}", combine)
+    assert str(caught.value) == sentence
+    profile = Profile(joint=HINGE, channels=Channels(conservative=channel))
+    with pytest.raises(JodaError, match=r"^joint 'door': conservative takes no more: .* at most"):
+        profile.with_component("conservative", line(0, 1, 2))
+    with pytest.raises(JodaError, match="at most"):
+        text = f"{channel.text()}; {line(0, 1, 2).text()}"
+        Profile.from_attributes(HINGE, {"conservative": text})
+
+
+def test_the_schema_states_the_limits():
+    definitions = schema("composed")["$defs"]
+    for name in ("Channel", "Resistance"):
+        assert definitions[name]["properties"]["components"]["maxItems"] == 200
+        assert "at most 2000 control points" in definitions["Channel"]["description"]
+    for name in ("Component", "StribeckFriction"):
+        for key in "xy":
+            assert definitions[name]["properties"][key]["maxItems"] == 2000
 
 
 # --- mistakes in the plugin's attributes: the reader in Python, then the plugin's own

@@ -12,6 +12,10 @@ MIN_WIDTH = 1e-9
 """Narrowest interval, and narrowest gap between control points, in normalised position."""
 MAX_VALUE = 1e15
 """Largest magnitude of a control point's value; no coefficient of a cubic can overflow."""
+MAX_COMPONENTS = 200
+"""Most components of one channel."""
+MAX_POINTS = 2000
+"""Most control points of one channel, all its components' together."""
 
 LONGEST_TEXT = 10_000
 """Characters of a text; a page has fewer."""
@@ -25,6 +29,10 @@ class Frozen(BaseModel):
     )
 
 
+Points = Annotated[tuple[float, ...], Field(max_length=MAX_POINTS)]
+"""Numbers of a curve's control points."""
+
+
 class Curve(Frozen):
     """A PCHIP curve on an interval of the joint's position.
 
@@ -35,8 +43,8 @@ class Curve(Frozen):
     """
 
     interval: tuple[float, float]
-    x: tuple[float, ...]
-    y: tuple[float, ...]
+    x: Points
+    y: Points
 
     @model_validator(mode="after")
     def _check_curve(self) -> Self:

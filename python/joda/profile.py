@@ -14,11 +14,11 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
-from joda.component import Component, Frozen, numbers
+from joda.component import MAX_COMPONENTS, MAX_POINTS, Component, Frozen, numbers
 from joda.effects import AddedInertia, AnyEffect, Effect, GravityOffset
 from joda.errors import JodaError
 from joda.files import read_json
@@ -35,8 +35,6 @@ ATTRIBUTES = (
 
 FARTHEST, NARROWEST = 1e6, 1e-9
 """Bounds of a joint's range, rad or m: beyond them its positions are not finite or not distinct."""
-MOST_COMPONENTS = 200
-"""Of a channel; more would only be slow."""
 
 
 class File(Frozen):
@@ -66,16 +64,21 @@ class File(Frozen):
 
 
 class Channel(Frozen):
-    """Components and how they are combined: summed, or the largest of those that cover s."""
+    """Components and how they are combined: summed, or the largest of those that cover s.
+
+    There are at most 200 components in it, which together have at most 2000 control points.
+    """
 
     combine: Literal["sum", "max"] = "sum"
-    components: tuple[Component, ...] = ()
+    components: Annotated[tuple[Component, ...], Field(max_length=MAX_COMPONENTS)] = ()
 
     @model_validator(mode="after")
-    def _check_count(self) -> Self:
-        if len(self.components) > MOST_COMPONENTS:
+    def _bearable(self) -> Self:
+        points = sum(len(component.x) for component in self.components)
+        if points > MAX_POINTS:
             raise ValueError(
-                f"{len(self.components)} components; a channel has at most {MOST_COMPONENTS}"
+                f"the components have {points} control points together; at most {MAX_POINTS} are "
+                "possible"
             )
         return self
 
@@ -194,9 +197,14 @@ class Profile(File):
         )
 
     def with_component(self, channel: str, component: Component) -> Self:
-        """The profile with one more component in a channel."""
+        """The profile with one more component in a channel; raises JodaError if it is full."""
         old: Channel = getattr(self.channels, channel)
-        new = type(old)(combine=old.combine, components=(*old.components, component))
+        try:
+            new = type(old)(combine=old.combine, components=(*old.components, component))
+        except ValidationError as error:
+            raise JodaError(
+                f"joint '{self.joint.name}': {channel} takes no more: {describe(error)}"
+            ) from None
         channels = self.channels.model_copy(update={channel: new})
         return self.model_copy(update={"channels": channels})
 
@@ -260,8 +268,11 @@ def describe(error: ValidationError) -> str:
     elif first["type"] == "float_parsing":
         what = f"must be a number, not {first['input']!r}"
     elif first["type"] == "too_long":
-        count = first["ctx"]
-        what = f"must have {count['max_length']} numbers, not {count['actual_length']}"
+        most, count = first["ctx"]["max_length"], first["ctx"]["actual_length"]
+        last = first["loc"][-1]
+        noun = "components" if last == "components" else "numbers"
+        limit = most if last in ("interval", "range") else f"at most {most}"
+        what = f"must have {limit} {noun}, not {count}"
     return f"{key}: {what}." if key else f"{what}."
 
 

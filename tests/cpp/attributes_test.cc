@@ -69,6 +69,27 @@ TEST_CASE("components that cannot be evaluated are refused") {
   CHECK(Error("0 1 | 0 0.9 | 1 2") == "component 1: x must begin at 0 and end at 1");
 }
 
+TEST_CASE("a channel has at most 200 components and 2000 control points") {
+  std::string text;
+  for (int k = 0; k < 200; ++k) text += "0 1 | 0 1 | 1 1;";
+  CHECK(ParseChannel(text, false).size() == 200);
+  CHECK(Error(text + "0 1 | 0 1 | 1 1") ==
+        "the channel has 201 components; at most 200 are possible");
+  const auto curve = [](int points) {
+    std::string x, y;
+    for (int k = 0; k < points; ++k) {
+      x += std::to_string(static_cast<double>(k) / (points - 1)) + " ";
+      y += "1 ";
+    }
+    return "0 1 | " + x + "| " + y + ";";
+  };
+  CHECK(Error(curve(2000)) == "");
+  CHECK(Error(curve(2001)) == "component 1: it has 2001 control points; at most 2000 are possible");
+  CHECK(Error(curve(1000) + curve(1000)) == "");
+  CHECK(Error(curve(1000) + curve(1001)) ==
+        "the channel has 2001 control points; at most 2000 are possible");
+}
+
 TEST_CASE("friction and damping must not be negative") {
   CHECK(Error("0 1 | 0 1 | 1 -1") == "");
   CHECK(Error("0 1 | 0 1 | 1 -1", true) ==

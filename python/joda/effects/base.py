@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from joda.component import Curve, Frozen, numbers
+from joda.component import Curve, Frozen, Points, numbers
 
 Direction = Literal["positive", "negative"]
 
@@ -96,7 +96,7 @@ class CurveEffect(Curve, Effect):
     """An effect whose size is a curve over the joint's position; by default all over the range."""
 
     interval: tuple[float, float] = (0.0, 1.0)
-    x: tuple[float, ...] = (0.0, 1.0)
+    x: Points = (0.0, 1.0)
 
     @model_validator(mode="after")
     def _not_negative(self) -> Self:

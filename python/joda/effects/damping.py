@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from joda.component import Points
 from joda.effects.base import CurveEffect, Direction, parameter
 
 
@@ -17,7 +18,7 @@ class DirectionDependentDamping(CurveEffect):
 
     effect: Literal["direction_dependent_damping"] = "direction_dependent_damping"
     direction: Direction = Field(description="in which damping is larger; positive: q grows")
-    y: tuple[float, ...] = parameter("additional damping", "N·m·s/rad", "N·s/m", (0.1, 50))
+    y: Points = parameter("additional damping", "N·m·s/rad", "N·s/m", (0.1, 50))
 
 
 class QuadraticDamping(CurveEffect):
@@ -32,4 +33,4 @@ class QuadraticDamping(CurveEffect):
     direction: Literal["both", "positive", "negative"] = Field(
         default="both", description="in which it acts; positive: q grows"
     )
-    y: tuple[float, ...] = parameter("drag", "N·m·s²/rad²", "N·s²/m²", (0.01, 50))
+    y: Points = parameter("drag", "N·m·s²/rad²", "N·s²/m²", (0.01, 50))

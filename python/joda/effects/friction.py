@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from joda.component import Points
 from joda.effects.base import CurveEffect, Direction, Effect, parameter
 
 
@@ -20,7 +21,7 @@ class AsymmetricFriction(CurveEffect):
 
     effect: Literal["asymmetric_friction"] = "asymmetric_friction"
     direction: Direction = Field(description="in which friction is larger; positive: q grows")
-    y: tuple[float, ...] = parameter("additional friction", "N·m", "N", (0.05, 5))
+    y: Points = parameter("additional friction", "N·m", "N", (0.05, 5))
 
 
 class StribeckFriction(CurveEffect):
@@ -43,7 +44,7 @@ class StribeckFriction(CurveEffect):
         gt=0,
     )
     exponent: float = parameter("form of the fall", "1", "1", (0.5, 2), default=2.0, gt=0)
-    y: tuple[float, ...] = parameter("additional friction at rest", "N·m", "N", (0.05, 5))
+    y: Points = parameter("additional friction at rest", "N·m", "N", (0.05, 5))
 
 
 class LoadDependentFriction(Effect):

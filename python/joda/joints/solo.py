@@ -19,7 +19,7 @@ from joda.field.jaxeffects import Effects, from_effects
 from joda.joints import laws
 from joda.joints.parameters import Slot
 from joda.joints.rig import gravity_factors
-from joda.joints.stiffness import implicit_stiffness, reach
+from joda.joints.stiffness import implicit_stiffness, reach, stays_beyond
 from joda.profile import CHANNELS, Profile
 
 Array = jax.Array
@@ -194,9 +194,10 @@ def step(prepared: Prepared, state: State, force: Array, h: float) -> State:
     lifted, descent = laws.gravity(own.gravity_offset, q)
     spring = jaxfield.evaluate(conservative, s)[0] + lifted
     far = reach(v, spring, seen, 1 / span, h)
-    steepest = jaxfield.max_descent(conservative, s - far, s + far) + descent * span
+    near = jaxfield.max_descent(conservative, s - far, s + far)
+    constant = stays_beyond(s, v, spring, seen, 1 / span, h)
     drag = jaxfield.evaluate(damping, s)[0] + laws.damping(own, s, v)
-    drag = drag + h * implicit_stiffness(spring, steepest, seen, 1 / span, h)
+    drag = drag + h * implicit_stiffness(spring, near, descent, constant, seen, 1 / span, h)
     weight = _weight(joint, q)
     up, down = laws.friction(own, s, v, weight + force)
     bound = jaxfield.evaluate(friction, s)[0] + 0.5 * (up + down)

@@ -25,15 +25,36 @@ def reach(v: Array, force: Array, inertia: Array, per_range: Array, h: Array | f
     return h * (jnp.abs(v) + h / inertia * jnp.abs(force)) * per_range
 
 
+def stays_beyond(
+    s: Array, v: Array, force: Array, inertia: Array, per_range: Array, h: Array | float
+) -> Array:
+    """Whether a step that begins beyond the range ends there too: the channel is constant there.
+
+    Args:
+        s: normalised position.
+        v, force, inertia, per_range, h: as for `reach`.
+    """
+    landing = s + h * (v + h / inertia * force) * per_range
+    return ((s < 0) & (landing < 0)) | ((s > 1) & (landing > 1))
+
+
 def implicit_stiffness(
-    force: Array, steepest: Array, inertia: Array, per_range: Array, h: Array | float
+    force: Array,
+    near: Array,
+    descent: Array,
+    constant: Array,
+    inertia: Array,
+    per_range: Array,
+    h: Array | float,
 ) -> Array:
     """The stiffness that acts implicitly, N·m/rad or N/m.
 
     Args:
         force, inertia, per_range, h: as for `reach`.
-        steepest: the field's steepest descent within reach, N·m or N per range.
+        near: the channel's steepest descent within reach, N·m or N per range.
+        descent: that of the gravity offset, N·m/rad or N/m.
+        constant: whether the channel `stays_beyond` the range: it is not stiff there.
     """
-    stride = jnp.abs(force) * per_range / STRIDE
+    steepest = jnp.maximum(jnp.abs(force) * per_range / STRIDE, near * per_range + descent)
     soft = EXPLICIT_STIFFNESS * inertia / h**2
-    return jnp.maximum(0.0, jnp.maximum(stride, steepest * per_range) - soft)
+    return jnp.maximum(0.0, jnp.where(constant, descent, steepest) - soft)

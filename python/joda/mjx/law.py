@@ -10,7 +10,7 @@ from mujoco import mjx
 from joda.field import jaxfield
 from joda.field.jaxeffects import Backlash
 from joda.joints import laws
-from joda.joints.stiffness import IDLE_ROW, implicit_stiffness, reach
+from joda.joints.stiffness import IDLE_ROW, implicit_stiffness, reach, stays_beyond
 from joda.mjx.fields import Prepared
 from joda.mjx.internals import Rows
 from joda.profile import CHANNELS
@@ -43,14 +43,14 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
     order = dict(zip(CHANNELS, prepared.orders, strict=True))
 
     force, descent = jax.vmap(laws.gravity)(own.gravity_offset, q)
-    steepest, drag, up = descent / per_range, jnp.zeros_like(v), jnp.zeros_like(v)
+    near, drag, up = (jnp.zeros_like(v) for _ in range(3))
     if spring:
         stacks = prepared.conservative
         force = force + _each(stacks, order["conservative"], jaxfield.evaluate, s)[0]
         far = reach(v, force, inertia, per_range, h)
         near = _each(stacks, order["conservative"], jaxfield.max_descent, s - far, s + far)
-        steepest = steepest + near
-    stiffness = implicit_stiffness(force, steepest, inertia, per_range, h)
+    constant = stays_beyond(s, v, force, inertia, per_range, h)
+    stiffness = implicit_stiffness(force, near, descent, constant, inertia, per_range, h)
     if damper:
         drag = _each(prepared.damping, order["damping"], jaxfield.evaluate, s)[0]
         drag = drag + jax.vmap(laws.damping)(own, s, v)

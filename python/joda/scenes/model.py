@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from joda.errors import JodaError
 from joda.profile import Joint, describe
+from joda.scenes.copies import refuse_copied_plugins
 
 _TYPES = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name
@@ -24,6 +25,7 @@ def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     """An MJCF or URDF file, parsed and compiled; raises JodaError."""
     if not path.is_file():
         raise JodaError(f"{path}: no such file; give an MJCF or URDF file.")
+    refuse_copied_plugins(path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         model = spec.compile()
