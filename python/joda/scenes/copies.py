@@ -16,7 +16,7 @@ def refuse_copied_plugins(path: Path) -> None:
     """Raises JodaError if the model has MuJoCo copy what it cannot."""
     try:
         _check(path, attached=False, above=())
-    except (MjcfError, OSError):
+    except (MjcfError, OSError, RecursionError):  # a file that includes itself
         return  # MuJoCo, or who edits the text, says what is wrong with it
 
 
