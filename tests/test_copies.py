@@ -144,7 +144,7 @@ def test_a_replicate_with_an_instance_is_refused_before_mujoco_crashes(tmp_path,
     path = write(tmp_path, text)
     sentence = (
         f'{path}: a <replicate> holds <plugin instance="p"/>, on which MuJoCo crashes; take that '
-        "line out and give each copy its profile with: joda attach"
+        "line out and give each copy its profile with: joda attach."
     )
     for command in (
         context,
@@ -154,6 +154,18 @@ def test_a_replicate_with_an_instance_is_refused_before_mujoco_crashes(tmp_path,
             command(path, "j0")
         assert str(error.value) == sentence
     assert not (tmp_path / "o.xml").exists()
+
+
+def test_a_model_that_attaches_itself_is_told_before_mujoco_crashes(tmp_path):
+    path = write(tmp_path, TWICE.replace("child.xml", "in.xml"))
+    with pytest.raises(JodaError, match=r"in\.xml: attaches itself, by way of its <asset>; remove"):
+        context(path, "j")
+
+
+def test_a_model_that_includes_itself_is_told(tmp_path):
+    path = write(tmp_path, scene('<include file="in.xml"/>'))
+    with pytest.raises(JodaError, match=r"in\.xml: MuJoCo cannot load it: .*in\.xml"):
+        context(path, "j")
 
 
 def test_what_that_sentence_says_to_do_works(tmp_path):
@@ -181,7 +193,7 @@ def test_an_instance_without_a_name_cannot_be_attached_and_that_is_told(tmp_path
     assert str(error.value) == (
         f'{child}: a body holds <plugin plugin="joda.joint_dynamics"> itself, which MuJoCo cannot '
         "attach to another model; put it into an <instance> of <extension> and <plugin "
-        'instance="..."/> into the body'
+        'instance="..."/> into the body.'
     )
     attach(child, profile("j", **GIVEN), tmp_path / "named.xml")
     write(tmp_path, TWICE.replace("child.xml", "named.xml"))

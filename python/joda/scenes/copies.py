@@ -22,7 +22,7 @@ def refuse_copied_plugins(path: Path) -> None:
 
 def _check(path: Path, attached: bool, above: tuple[Path, ...]) -> None:
     if path in above:
-        return
+        raise JodaError(f"{path}: attaches itself, by way of its <asset>; remove that <model>.")
     source = Source(path)
     models = {
         element.attributes.get("name", ""): source.folder / element.attributes.get("file", "")
@@ -34,14 +34,14 @@ def _check(path: Path, attached: bool, above: tuple[Path, ...]) -> None:
             for name in _instances(element, models):
                 raise JodaError(
                     f'{path}: a <replicate> holds <plugin instance="{name}"/>, on which MuJoCo '
-                    "crashes; take that line out and give each copy its profile with: joda attach"
+                    "crashes; take that line out and give each copy its profile with: joda attach."
                 )
         alone = [e for e in element.children if e.attributes.get("plugin") == PLUGIN]
         if attached and element.tag == "body" and alone:
             raise JodaError(
                 f'{path}: a body holds <plugin plugin="{PLUGIN}"> itself, which MuJoCo cannot '
                 "attach to another model; put it into an <instance> of <extension> and <plugin "
-                'instance="..."/> into the body'
+                'instance="..."/> into the body.'
             )
     for file in models.values():
         _check(file, True, (*above, path))

@@ -186,7 +186,7 @@ class Source:
             elif moves or inner.path != _join(self.folder, element.attributes["file"]):
                 element.set(file=os.path.relpath(inner.path, there))
 
-    def _include(self, document: Document) -> None:
+    def _include(self, document: Document, above: tuple[Path, ...] = ()) -> None:
         for element in _raw(document.root):
             if element.tag != "include":
                 continue
@@ -195,8 +195,10 @@ class Source:
             path = next((path for path in tried if path.is_file()), None)
             if path is None:
                 raise MjcfError(f"{document.path}: the included file {name} does not exist")
+            if path in above:
+                raise MjcfError(f"{path}: includes itself")
             element.included = Document(path, path.read_bytes())
-            self._include(element.included)
+            self._include(element.included, (*above, path))
 
 
 def _join(folder: Path, path: str | Path) -> Path:
