@@ -51,6 +51,8 @@ OWN_SHAPE = {
 """The same of single effects."""
 DEFINITION = 0.08
 """Part of its interval's width by which what counts as its end may differ."""
+TOLERATED = 0.02
+"""Part of what an effect explains that another law of its shape may fail to."""
 HIDDEN = 0.5
 """Part of the size that may hide in what is left, by the root of the share of the misfit left."""
 FARTHEST = 5.0
@@ -108,12 +110,16 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
         left: share of the model's misfit beyond the noise that it leaves, 0 to 1.
     """
     fitted = _fitted(asked, found)
-    best, data = fitted.told(fitted.x), from_data(fitted)
+    gain = max(asked.fit.loss - found.fit.loss, 0.0)
+    best = fitted.told(fitted.x)
+    data = from_data(fitted, TOLERATED * gain * (found.hypothesis.remains == KNOWN_SHAPE))
     magnitude, a, b = best
     shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.remains])
     part = shape + HIDDEN * float(np.sqrt(np.clip(left, 0.0, 1.0)))
     seen, visited = _seen(asked, found)
     beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
+    if _at_bound(found):
+        beyond = FARTHEST
     size = np.linalg.norm([data[0], part * magnitude, beyond * magnitude])
     width = max(DEFINITION, part, STRETCHED * beyond) * (b - a)
     ends = tuple(
@@ -123,8 +129,13 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
     return Uncertainty(float(size), (ends[0], ends[1]))
 
 
-def from_data(fitted: _Fitted) -> Array:
-    """Standard deviations of magnitude and ends as the runs alone tell them, shape (3,)."""
+def from_data(fitted: _Fitted, tolerance: float = 0.0) -> Array:
+    """Standard deviations of magnitude and ends as the runs alone tell them, shape (3,).
+
+    Args:
+        fitted: the effect.
+        tolerance: by how much its loss may rise besides, as its law is known by its shape only.
+    """
     judge, unknowns, x = fitted.judge, fitted.unknowns, fitted.x
     about = judge.linear(fitted.make, unknowns, x, fitted.found.fit.start)
     H, slopes = about.normals()
@@ -134,7 +145,7 @@ def from_data(fitted: _Fitted) -> Array:
     rng = np.random.default_rng(0)
     normal = rng.multivariate_normal(x, covariance, DRAWS, method="svd")
     drawn = _bootstrap(fitted, H, slopes, prior, rng)
-    profiled = _profiled(fitted, covariance, worse)
+    profiled = _profiled(fitted, (1 + tolerance / worse) * covariance, worse + tolerance)
     parts = np.stack([_spread(fitted, normal), _spread(fitted, drawn), profiled])
     return np.asarray(parts.max(axis=0))
 
@@ -166,6 +177,15 @@ def _seen(asked: Asked, found: Guess) -> tuple[float, tuple[float, float]]:
         )
         magnitude *= here / all_over if all_over > 0 else 1.0
     return magnitude, (float(low), float(high))
+
+
+def _at_bound(found: Guess) -> bool:
+    """Whether the scale of a law that is known by its shape is as large as it may be: what is seen
+    may then be the far end of something much larger."""
+    hypothesis = found.hypothesis
+    shaped = hypothesis.remains == KNOWN_SHAPE and hypothesis.ends == 0
+    high, step = hypothesis.unknowns.high[-1], hypothesis.unknowns.step[-1]
+    return bool(shaped and found.x[-1] > high - step)
 
 
 def _gaps(interval: tuple[float, float], visited: tuple[float, float]) -> list[float]:
