@@ -153,7 +153,8 @@ def test_other_people_s_scenes_are_seldom_doubted(name):
         for k in range(model.njnt)
         if joint_type(model, k) in ("hinge", "slide") and np.ptp(model.jnt_range[k]) > 0
     ]
-    assert sum(map(bool, found)) == COUNTED[name]
+    of_mass = [[one for one in doubts if "its range" not in one] for doubts in found]
+    assert sum(map(bool, of_mass)) == COUNTED[name]
 
 
 def test_compare_generate_and_the_command_say_it(tmp_path):

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from urllib.request import urlopen
+from urllib.request import HTTPCookieProcessor, build_opener
 
 import mujoco
 import pytest
@@ -75,7 +75,8 @@ def test_the_studio_answers_until_it_is_interrupted(command, folder):
     )
     try:
         address = process.stdout.readline().split()[0]
-        with urlopen(address) as page:
+        # the address has a token, for which the studio gives a cookie
+        with build_opener(HTTPCookieProcessor()).open(address) as page:
             assert "joda studio" in page.read().decode()
         process.send_signal(signal.SIGINT)
         assert process.communicate(timeout=60)[1] == ""

@@ -126,7 +126,7 @@ def _multiple(error: float, sigma: float) -> float:
 def _missed(run: Run, sigma: float, window: Window) -> Missed:
     first, last = run.time[window.samples[[0, -1]]]
     multiple = _multiple(rms(window.misfit), sigma)
-    return Missed(run.name, multiple, window.scatter / sigma, (float(first), float(last)))
+    return Missed(run.name, multiple, window.explained / sigma, (float(first), float(last)))
 
 
 def _known(error: float) -> float | None:

@@ -77,9 +77,15 @@ def where(
     if found or not beyond:
         return found, LENGTHS[0]
     for length in LENGTHS[1:]:
-        if found := failing(window_rows(measured, length)):
+        if found := _clearly(measured, failing(window_rows(measured, length))):
             return found, length
-    return failing(_whole_rows(measured, paths)), 0.0
+    return _clearly(measured, failing(_whole_rows(measured, paths))), 0.0
+
+
+def _clearly(measured: Measured, found: Sequence[Failing]) -> list[Failing]:
+    """What is missed by several noises: in longer windows small errors of all kinds pile up."""
+    least = BLIND * measured.floor
+    return [place for place in found if place.error > least]
 
 
 def failing(rows: Array) -> list[Failing]:
@@ -102,7 +108,8 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
     """A row per window; slow sampling makes windows longer.
 
     Columns: normalised position, velocity, direction / 2, time, load; RMS misfit, samples, sum of
-    squares in units of the noise, residual force, its standard deviation.
+    squares in units of the noise (the position's, and what the force's makes of it), residual
+    force, its standard deviation.
     """
     rows = []
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
@@ -115,7 +122,7 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
 def _tells(window: Window, sigma: float) -> bool:
     """Whether its misfit is more than errors of its start and force can make, or near the noise."""
     error = rms(window.misfit)
-    return error < BLIND * sigma or error > BLIND * window.scatter
+    return error < BLIND * sigma or error > BLIND * window.explained
 
 
 def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
@@ -128,10 +135,14 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
         if duration <= LONGEST and len(there) == len(run.time):
             whole = measured.replayer.windows(run, sigma, duration)
             force, doubt = (whole[0].force, whole[0].doubt) if len(whole) == 1 else (force, doubt)
+            if abs(force) < BLIND * doubt:
+                continue  # it drifts, but no force on the whole makes it
+        off = measured.replayer.scatter(run, sigma)
         for samples in np.array_split(there, PIECES):
             if len(samples) > 1:
                 misfit = path[samples] - run.position[samples]
-                rows.append(_row(measured, run, sigma, Window(samples, misfit, force, doubt)))
+                piece = Window(samples, misfit, force, doubt, pushed=off)
+                rows.append(_row(measured, run, sigma, piece))
     return np.array(rows).reshape(-1, COLUMNS)
 
 
@@ -143,7 +154,7 @@ def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[flo
     speed = float(np.diff(run.position[ends])[0] / np.diff(run.time[ends])[0])
     gravity = float(np.interp(middle, found.positions, found.gravity_force))
     load = float(run.force[window.samples].mean()) + gravity
-    square = float(np.sum((window.misfit / sigma) ** 2))
+    square = float(np.sum(window.misfit**2) / (sigma**2 + window.pushed**2))
     place = (middle - lo) / (hi - lo)
     row = [place, speed, 0.5 * float(np.sign(speed)), float(run.time[ends].mean()), load]
     return [*row, rms(window.misfit), len(window.misfit), square, window.force, window.doubt]

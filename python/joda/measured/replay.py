@@ -61,7 +61,8 @@ class Window:
             best within its measurement's error.
         force: how much force the model has too much on the whole, N·m or N.
         doubt: its standard deviation from the noise of position and force.
-        scatter: RMS by which errors of the start and of the force alone move the replay, rad or m.
+        scatter: RMS by which errors of the start alone move the replay, rad or m.
+        pushed: the same of errors of the recorded force.
     """
 
     samples: NDArray[np.intp]
@@ -69,6 +70,12 @@ class Window:
     force: float
     doubt: float
     scatter: float = 0.0
+    pushed: float = 0.0
+
+    @property
+    def explained(self) -> float:
+        """RMS by which errors of start and force together move the replay, rad or m."""
+        return float(np.hypot(self.scatter, self.pushed))
 
 
 class Replayer:
@@ -295,7 +302,7 @@ def _fitted(
 
 
 def _with_force(window: Window, run: Run, inertia: float) -> Window:
-    """The window, with what errors of the recorded force add to its doubt and scatter.
+    """The window, with what errors of the recorded force add to its doubt, and how they move it.
 
     White noise of acceleration moves a free joint by a random walk of its velocity: a variance of
     noise² gap t³ / 3 after a time t.
@@ -308,5 +315,5 @@ def _with_force(window: Window, run: Run, inertia: float) -> Window:
     return replace(
         window,
         doubt=float(np.hypot(window.doubt, off / np.sqrt(count))),
-        scatter=float(np.hypot(window.scatter, moved)),
+        pushed=moved,
     )

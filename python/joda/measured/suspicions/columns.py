@@ -20,7 +20,9 @@ def unread(run: Run | QuasiStatic) -> str:
     if isinstance(run, Run) and run.forced:
         return ""
     name, parts = ("force", FORCE) if timed else ("time", TIME)
-    alike = [other for other in run.unread if _alike(other.lower(), parts)]
+    # columns of several joints (`force:JOINT`) are spoken of where they are read
+    others = [name for name in run.unread if ":" not in name]
+    alike = [other for other in others if _alike(other.lower(), parts)]
     if not alike:
         return ""
     taken = (
