@@ -27,6 +27,8 @@ LONGEST = 10.0
 BLIND = 3.0
 """Error, in units of the noise and of what errors of start and force make, up to which they are
 not enough to blame the model."""
+SLIGHT = 0.01
+"""Mean residual force of a whole run, in units of what acts on it, that is none."""
 AGREE = 0.8
 """Part of the evidence that must have the sign of the mean force for that force to be told."""
 FORCE = 8
@@ -135,7 +137,7 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
         if duration <= LONGEST and len(there) == len(run.time):
             whole = measured.replayer.windows(run, sigma, duration)
             force, doubt = (whole[0].force, whole[0].doubt) if len(whole) == 1 else (force, doubt)
-            if abs(force) < BLIND * doubt:
+            if abs(force) < max(BLIND * doubt, SLIGHT * _usual_force(measured, run)):
                 continue  # it drifts, but no force on the whole makes it
         off = measured.replayer.scatter(run, sigma)
         for samples in np.array_split(there, PIECES):
@@ -144,6 +146,14 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
                 piece = Window(samples, misfit, force, doubt, pushed=off)
                 rows.append(_row(measured, run, sigma, piece))
     return np.array(rows).reshape(-1, COLUMNS)
+
+
+def _usual_force(measured: Measured, run: Run) -> float:
+    """RMS of what acts on the joint in a run, by load or, where there is none, by its speed."""
+    gravity = np.interp(run.position, measured.context.positions, measured.context.gravity_force)
+    load = float(np.sqrt(np.mean((run.force + gravity) ** 2)))
+    pace = float(np.ptp(run.position)) / float(np.ptp(run.time)) ** 2
+    return max(load, measured.single.inertia * pace)
 
 
 def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[float]:
