@@ -57,6 +57,8 @@ HIDDEN = 0.5
 """Part of the size that may hide in what is left, by the root of the share of the misfit left."""
 FARTHEST = 5.0
 """Largest doubt of what is extrapolated, in units of the magnitude."""
+REACHING = 0.5
+"""Part of the range over which a pull to an end is felt that is more than a local one's."""
 STRETCHED = 0.25
 """Doubt of an extrapolated effect's ends, by that of its magnitude, in units of the width."""
 PLAUSIBLE = 2.0
@@ -113,12 +115,12 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
     gain = max(asked.fit.loss - found.fit.loss, 0.0)
     best = fitted.told(fitted.x)
     data = from_data(fitted, TOLERATED * gain * (found.hypothesis.remains == KNOWN_SHAPE))
-    magnitude, a, b = best
+    magnitude, a, b = map(float, best)
     shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.remains])
     part = shape + HIDDEN * float(np.sqrt(np.clip(left, 0.0, 1.0)))
     seen, visited = _seen(asked, found)
     beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
-    if _at_bound(found):
+    if _at_bound(found) or (_shaped(found) and _far_end((a, b))):
         beyond = FARTHEST
     size = np.linalg.norm([data[0], part * magnitude, beyond * magnitude])
     width = max(DEFINITION, part, STRETCHED * beyond) * (b - a)
@@ -182,10 +184,20 @@ def _seen(asked: Asked, found: Guess) -> tuple[float, tuple[float, float]]:
 def _at_bound(found: Guess) -> bool:
     """Whether the scale of a law that is known by its shape is as large as it may be: what is seen
     may then be the far end of something much larger."""
-    hypothesis = found.hypothesis
-    shaped = hypothesis.remains == KNOWN_SHAPE and hypothesis.ends == 0
-    high, step = hypothesis.unknowns.high[-1], hypothesis.unknowns.step[-1]
-    return bool(shaped and found.x[-1] > high - step)
+    high, step = found.hypothesis.unknowns.high[-1], found.hypothesis.unknowns.step[-1]
+    return _shaped(found) and bool(found.x[-1] > high - step)
+
+
+def _shaped(found: Guess) -> bool:
+    """Whether the law is known by its shape, and has a scale but no ends."""
+    return found.hypothesis.remains == KNOWN_SHAPE and found.hypothesis.ends == 0
+
+
+def _far_end(interval: tuple[float, float]) -> bool:
+    """Whether a pull to one end is felt over most of the range: it may be the far end of a stronger
+    one with a shorter reach, as 1 / distance² looks alike from afar."""
+    a, b = interval
+    return (a <= 0.0) != (b >= 1.0) and b - a > REACHING
 
 
 def _gaps(interval: tuple[float, float], visited: tuple[float, float]) -> list[float]:
