@@ -120,12 +120,12 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
     part = shape + HIDDEN * float(np.sqrt(np.clip(left, 0.0, 1.0)))
     seen, visited = _seen(asked, found)
     beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
-    if _at_bound(found) or (_shaped(found) and _far_end((a, b))):
+    if from_afar := _at_bound(found) or (_shaped(found) and _far_end((a, b))):
         beyond = FARTHEST
     size = np.linalg.norm([data[0], part * magnitude, beyond * magnitude])
     width = max(DEFINITION, part, STRETCHED * beyond) * (b - a)
     ends = tuple(
-        float(np.linalg.norm([spread, width * (0.0 < end < 1.0), gap]))
+        float(np.linalg.norm([spread, width * (from_afar or 0.0 < end < 1.0), gap]))
         for end, spread, gap in zip((a, b), data[1:], _gaps((a, b), visited), strict=True)
     )
     return Uncertainty(float(size), (ends[0], ends[1]))
