@@ -55,11 +55,11 @@ TOLERATED = 0.02
 """Part of what an effect explains that another law of its shape may fail to."""
 HIDDEN = 0.5
 """Part of the size that may hide in what is left, by the root of the share of the misfit left."""
-FARTHEST = 5.0
+FARTHEST = 10.0
 """Largest doubt of what is extrapolated, in units of the magnitude."""
 REACHING = 0.5
 """Part of the range over which a pull to an end is felt that is more than a local one's."""
-STRETCHED = 0.25
+STRETCHED = 0.125
 """Doubt of an extrapolated effect's ends, by that of its magnitude, in units of the width."""
 PLAUSIBLE = 2.0
 """How much larger a strength may be than the effect's largest, a priori (one standard
