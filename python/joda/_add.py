@@ -7,7 +7,7 @@ from typing import Any
 
 from joda._diagnose import check_effect
 from joda.diagnosis.findings import read_diagnosis
-from joda.diagnosis.mending import Error, mend, parted
+from joda.diagnosis.mending import Error, Mended, error, mend, parted
 from joda.diagnosis.outcome import (
     beside,
     held_out,
@@ -110,7 +110,11 @@ def add(
     if told.get("joint", own.name) != own.name:
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
     train, held = parted(measured)
-    mended = mend(train, held, name, direction, near, progress)
+    if reason := _no_help(told, name):
+        before = error(held)
+        mended = Mended(train.profile, None, before, before, reason)
+    else:
+        mended = mend(train, held, name, direction, near, progress)
     notes: list[str] = []
     if mended.effect:
         progress("drawing")
@@ -165,6 +169,19 @@ def _chosen(
     check_effect(effect)
     said = found.get(effect, {})
     return effect, said.get("direction"), _interval(said.get("interval"), path)
+
+
+def _no_help(told: dict[str, Any], effect: str) -> str | None:
+    """Why an effect need not be tried, a clause: the diagnosis itself found it no better."""
+    for one in told["effects"]:
+        before, after = one.get("held_out_error_before"), one.get("held_out_error_after")
+        known = isinstance(before, float) and isinstance(after, float)
+        if one["effect"] == effect and known and after >= before:
+            return (
+                "the diagnosis found windows held out of its fit missed by no less with it "
+                f"({before:.2g} → {after:.2g})"
+            )
+    return None
 
 
 def _interval(said: Any, path: Path) -> tuple[float, float] | None:

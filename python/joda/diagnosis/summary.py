@@ -67,9 +67,13 @@ def _unexplained(what: str, weighed: Weighed, one_way: bool, bouncy: bool) -> st
     if bouncy and weighed.excess[0] < MUCH:
         return "The ends of the range throw the joint back more than the model's: not explained."
     share = 100 * min(weighed.share, 1.0)
-    part = f"{share:.0f} %" if share > 1 else "less than 1 %"
+    same = SAME if one_way and " or " in what else ""
+    if share <= 1:
+        return (
+            f"Best guess: {what}{same}; it leaves less than 1 % of the misfit, as others may too."
+        )
+    part = f"{share:.0f} %"
     if share < MOST:
-        same = SAME if one_way and " or " in what else ""
         return (
             f"Best guess: {what}, but not only that{same}; it leaves {part} of the misfit, which "
             "no known effect explains."

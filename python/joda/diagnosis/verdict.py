@@ -17,6 +17,8 @@ from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import strengths_off, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, weigh
+from joda.measured.adequacy import MULTIPLE
+from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
@@ -88,6 +90,7 @@ def diagnosed(
         summary = (
             f"The model is adequate: nothing beyond the noise ({measured.floor:.2g} "
             f"{measured.unit}) that an effect would explain.{strengths_off(ranking)}"
+            f"{_astray(measured)}"
         )
         return Diagnosed(_said(measured, "adequate", summary, (), None))
     held = Holdout(ranking.asked)
@@ -129,6 +132,21 @@ def _looked_again(
     rough = measured.with_curves([curve.noisier(factor) for curve in measured.curves])
     ranking = rank(asked(rough), exclude, told)
     return ranking, replace(weigh(ranking, strictness), verdict="unexplained")
+
+
+def _astray(measured: Measured) -> str:
+    """That whole runs are missed by much although windows are not, as a further sentence."""
+    off = [
+        rms((path - run.position)[~np.isnan(path)]) / sigma
+        for run, sigma, path in zip(measured.runs, measured.sigma, measured.paths(), strict=True)
+    ]
+    worst = max((one for one in off if np.isfinite(one)), default=0.0)
+    if worst < MULTIPLE:
+        return ""
+    return (
+        f" Whole runs are missed by up to {worst:.0f} times the noise all the same; joda compare "
+        "says where, and how much of it their starts make."
+    )
 
 
 def _said(

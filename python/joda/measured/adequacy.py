@@ -44,12 +44,14 @@ class Adequacy:
             measurement's own errors do not explain; None if there is none.
         pattern: probability that a true model leaves as clear a pattern of residual force (Wald and
             Wolfowitz's runs test and a sign test, Bonferroni-corrected); None with too few windows.
+        whole: whether all that acts on the joint in its scene is replayed, and all of the runs.
     """
 
     verdict: Adequate
     run: Missed | None
     segment: Missed | None
     pattern: float | None
+    whole: bool
 
 
 def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
@@ -72,13 +74,13 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     elif any(map(_fault, found.missed)) or (pattern is not None and pattern < CHANCE):
         verdict = "beyond_noise"
     elif (
-        not complete
+        not (complete and measured.whole)
         or max(map(_multiple, found.missed)) >= MULTIPLE
         or pattern is None
         or _moving(measured) < WINDOWS
     ):
         verdict = "not_enough_data"
-    return Adequacy(verdict, run, segment, pattern)
+    return Adequacy(verdict, run, segment, pattern, measured.whole)
 
 
 def _multiple(one: Missed) -> float:

@@ -102,6 +102,11 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
         yield f"Not enough to tell whether the model is right: {told}."
         if found.segment and found.segment.multiple < MULTIPLE:
             yield f"All windows of 0.4 s are missed by less than {MULTIPLE:g} times the noise."
+    elif found.verdict == "not_enough_data" and not found.whole:
+        yield (
+            "Not enough to tell whether the model is right: nothing in what is replayed is beyond "
+            "the noise, but not all is replayed (below)."
+        )
     elif found.verdict == "not_enough_data":
         yield (
             "Not enough to tell whether the model is right: too few samples, or too little motion "

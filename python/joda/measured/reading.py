@@ -20,6 +20,7 @@ from joda.measured.slow import as_curve
 from joda.measured.suspicions import suspicions
 from joda.profile import Profile
 from joda.scenes.angles import range_doubt
+from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact
 from joda.scenes.model import describe_joint, find_joint, joint_name, load
 from joda.scenes.native import whole_profile
@@ -50,6 +51,7 @@ class Measured:
         curves: measured, each beside the model's.
         notes: what is suspicious about them.
         contacts: of the scene that resist the joint where it was measured.
+        whole: whether all that acts on the joint there is replayed, and all of the runs.
     """
 
     context: Context
@@ -62,6 +64,7 @@ class Measured:
     curves: tuple[Gauged, ...]
     notes: tuple[str, ...]
     contacts: tuple[Contact, ...]
+    whole: bool
 
     def changed(
         self, profile: Profile | None = None, runs: Sequence[int] | None = None
@@ -153,7 +156,8 @@ def read_measured(
     notes = [*checked(read, found, step), *unused]
     clear = clear_of_contacts(compiled, number, profile.joint, read)
     read = clear.measured
-    notes += clear.notes
+    besides = acting_besides(compiled, number)
+    notes += [*clear.notes, *filter(None, [besides])]
     timed = tuple(run for run in read if isinstance(run, Run))
     noises = [smoothing.noise(run.time, run.position) for run in timed]
     usual = float(np.median(noises)) if noises else 0.0
@@ -187,4 +191,5 @@ def read_measured(
         curves=tuple(curves),
         notes=tuple(notes),
         contacts=clear.contacts,
+        whole=not besides and not any(contact.hinders for contact in clear.contacts),
     )
