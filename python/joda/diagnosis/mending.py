@@ -21,11 +21,11 @@ from joda.measured.errors import Errors, errors
 from joda.measured.gauge import Gauged
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
-from joda.measured.runs import Run
 from joda.profile import Profile
 
 NEARLY = 0.95
 """Part of the error before, and of the loss, to which an effect must bring runs held out."""
+NO_LESS = "it does not lower the error on what was held out of the fit"
 STRENGTHS = (1.0, 3.0, 10.0)
 """Of an effect whose place is known: the trials, in units of the usual one."""
 FEWEST = 4
@@ -79,8 +79,8 @@ def parted(measured: Measured) -> tuple[Measured, Measured]:
         kept = [k for k in range(count) if k not in held]
         return measured.changed(runs=kept), measured.changed(runs=held)
     cuts = [3 * len(run.time) // 4 for run in measured.runs]
-    first = tuple(_cut(run, slice(0, at)) for run, at in zip(measured.runs, cuts, strict=True))
-    last = tuple(_cut(run, slice(at, None)) for run, at in zip(measured.runs, cuts, strict=True))
+    first = tuple(run.part(slice(0, at)) for run, at in zip(measured.runs, cuts, strict=True))
+    last = tuple(run.part(slice(at, None)) for run, at in zip(measured.runs, cuts, strict=True))
     return measured.with_runs(first), measured.with_runs(last)
 
 
@@ -98,11 +98,6 @@ def _held(curve: Gauged) -> NDArray[np.bool_]:
     n = len(curve.direction)
     stretch = np.arange(n) * min(STRETCHES, max(n // SAMPLES, FEWEST)) // n
     return np.asarray(stretch % 4 == 2)
-
-
-def _cut(run: Run, part: slice) -> Run:
-    velocity = None if run.velocity is None else run.velocity[part]
-    return Run(run.name, run.time[part], run.position[part], velocity, run.force[part], run.forced)
 
 
 def error(measured: Measured, profile: Profile | None = None) -> Error:
@@ -150,14 +145,17 @@ def mend(
         most = NEARLY * Likelihood(held).loss(train.profile)
     reasons = []
     for one in sorted(tried, key=lambda one: one.score):
-        after, anew = _replayed(held, one.profile)
         reason = implausible(train, one.profile, effect)
-        if not reason and (one.unseen >= most or after.window >= NEARLY * before.window):
-            reason = "it does not lower the error on what was held out of the fit"
-        if not reason and replays and anew:
-            reason = worse(replays, anew)
-        if not reason:
-            return Mended(one.profile, effect, before, after)
+        if not reason and one.unseen >= most:
+            reason = NO_LESS
+        if not reason:  # replays take longest
+            after, anew = _replayed(held, one.profile)
+            if after.window >= NEARLY * before.window:
+                reason = NO_LESS
+            elif replays and anew:
+                reason = worse(replays, anew)
+            if not reason:
+                return Mended(one.profile, effect, before, after)
         reasons.append(reason)
     reason = reasons[0] if reasons else "these data can tell nothing of it"
     return Mended(train.profile, None, before, before, reason)

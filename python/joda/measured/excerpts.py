@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from joda.measured.runs import Run
 
@@ -27,7 +26,7 @@ def excerpts(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[int, ...], lis
     """
     if _share(runs) >= 1:
         return tuple(runs), tuple(range(len(runs))), []
-    thinned = [_part(run, np.arange(0, len(run.time), _every(run))) for run in runs]
+    thinned = [run.part(slice(None, None, _every(run))) for run in runs]
     share = _share(thinned)
     parts: list[Run] = []
     of: list[int] = []
@@ -67,16 +66,5 @@ def _stretches(run: Run, share: float) -> list[Run]:
         samples = np.flatnonzero((run.time >= begin) & (run.time <= begin + length))
         if len(samples) > 1:
             name = f"{run.name} from {run.time[samples[0]]:.4g} s"
-            out.append(replace(_part(run, samples), name=name))
+            out.append(replace(run.part(samples), name=name))
     return out
-
-
-def _part(run: Run, samples: NDArray[np.intp]) -> Run:
-    velocity = None if run.velocity is None else run.velocity[samples]
-    return replace(
-        run,
-        time=run.time[samples],
-        position=run.position[samples],
-        velocity=velocity,
-        force=run.force[samples],
-    )

@@ -112,15 +112,7 @@ def _without(one: Measurement, inside: NDArray[np.bool_]) -> Measurement | None:
     pieces = known(masked)
     if not pieces:
         return None
-    part = slice(pieces[0][0], pieces[-1][-1] + 1)
-    velocity = None if one.velocity is None else one.velocity[part]
-    return replace(
-        masked,
-        time=one.time[part],
-        position=one.position[part],
-        velocity=velocity,
-        force=masked.force[part],
-    )
+    return masked.part(slice(pieces[0][0], pieces[-1][-1] + 1))
 
 
 def _touching(contacts: Sequence[Contact], joint: Joint) -> str:

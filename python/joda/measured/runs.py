@@ -1,6 +1,6 @@
 """Measurements of a joint, one CSV file each: timed runs, and quasi-static curves."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +44,16 @@ class Run:
     forced: bool
     origin: float = 0.0
     unread: tuple[str, ...] = ()
+
+    def part(self, samples: slice | NDArray[np.intp]) -> "Run":
+        """The run with some of its samples only."""
+        return replace(
+            self,
+            time=self.time[samples],
+            position=self.position[samples],
+            velocity=None if self.velocity is None else self.velocity[samples],
+            force=self.force[samples],
+        )
 
 
 @dataclass(frozen=True)
