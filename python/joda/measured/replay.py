@@ -26,8 +26,11 @@ MOST = 1000
 """Most windows of a run that are replayed."""
 AT_ONCE = 100_000
 """Steps of a whole run that are held in memory together."""
-HORIZON = 2.0
-"""How much of a whole run, s, tells its start."""
+FIRST_HORIZON, LONGER, HORIZON = 30, 4, 5.0
+"""How much of a whole run tells its start: at first so many samples, then so many times as much, up
+to so many seconds. A start that is far off runs into an end soon, and then tells nothing."""
+SETTLED = 0.1
+"""Change of a sum of squared residuals below which a start is no better."""
 ENSEMBLE = 8
 """Replays that tell how far errors of the start and the force move a whole run."""
 DENSEST = 50_000
@@ -76,6 +79,14 @@ class Window:
     def explained(self) -> float:
         """RMS by which errors of start and force together move the replay, rad or m."""
         return float(np.hypot(self.scatter, self.pushed))
+
+
+@dataclass(frozen=True)
+class _Prior:
+    """What smoothed samples tell of a run's start: position and velocity, shape (2,) each."""
+
+    mean: Array
+    deviation: Array
 
 
 class Replayer:
@@ -146,32 +157,63 @@ class Replayer:
 
         Those of the smoothed samples, moved within their errors to where the model follows the
         first `HORIZON` seconds best: a velocity that is a little off is a position that is far off
-        at the end of a run.
+        at the end of a run. A joint that seems to be at rest is tried at rest and moving.
         """
         begun = smoothing.smooth(time, position, time[:1], sigma)
-        rests = smoothing.begins_at_rest(time, position, sigma)
-        first = np.array([begun.position[0], 0.0 if rests else begun.velocity[0]])
-        doubt = np.array([begun.position_error[0], 0.0 if rests else begun.velocity_error[0]])
-        early = time <= HORIZON
-        forces = np.tile(force[early], (3, 1))
+        prior = _Prior(
+            np.array([begun.position[0], begun.velocity[0]]),
+            np.array([begun.position_error[0], begun.velocity_error[0]]),
+        )
+        tried = [np.zeros(2)]
+        if smoothing.begins_at_rest(time, position, sigma):
+            tried.append(np.array([0.0, -prior.mean[1] / prior.deviation[1]]))
+        fitted = [self._fitted_start(time, position, force, sigma, prior, z) for z in tried]
+        _, best, covariance = min(fitted, key=lambda one: one[0])
+        factor = prior.deviation[:, None] * np.linalg.cholesky(covariance)
+        return prior.mean + prior.deviation * best, factor
+
+    def _fitted_start(
+        self, time: Array, position: Array, force: Array, sigma: float, prior: "_Prior", z: Array
+    ) -> tuple[float, Array, Array]:
+        """Gauss-Newton over longer and longer horizons.
+
+        Args:
+            time, position, force, sigma: of the run.
+            prior: of the start.
+            z: where to begin, in prior standard deviations, shape (2,).
+
+        Returns:
+            sum of squares, its minimiser and the covariance there, both in prior standard
+            deviations; what the model fails to follow makes the samples tell less.
+        """
         off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
-        covariance = np.eye(2)
-        near, step = np.zeros(2), np.zeros(2)
-        least = np.inf
-        for _ in range(TRIES):
-            tried = np.clip(near + step, -START, START)
-            found = self._replay(time[early], first + doubt * (tried + off), forces) / sigma
-            misfit = found[0] - position[early] / sigma
-            square = float(misfit @ misfit + tried @ tried)
-            if square >= least or not np.isfinite(found).all():
-                step = step / 4
-                continue
-            least, near = square, tried
-            rows = np.vstack([(found[1:] - found[0]).T, np.eye(2)])
-            wanted = np.concatenate([misfit, tried])
-            step = np.linalg.lstsq(rows, -wanted, rcond=None)[0]
-            covariance = np.linalg.inv(rows.T @ rows)
-        return first + doubt * near, doubt[:, None] * np.linalg.cholesky(covariance)
+        covariance, least = np.eye(2), np.inf
+        used, most = FIRST_HORIZON, int(np.searchsorted(time, HORIZON, side="right"))
+        while True:
+            early = slice(0, max(min(used, most), smoothing.LEAST))
+            forces = np.tile(force[early], (3, 1))
+            step, least = np.zeros(2), np.inf
+            for _ in range(TRIES):
+                tried = np.clip(z + step, -START, START)
+                starts = prior.mean + prior.deviation * (tried + off)
+                found = self._replay(time[early], starts, forces) / sigma
+                misfit = found[0] - position[early] / sigma
+                square = float(misfit @ misfit + tried @ tried)
+                if square >= least - SETTLED or not np.isfinite(found).all():
+                    if square < least + SETTLED:
+                        break
+                    step = step / 4
+                    continue
+                least, z = square, tried
+                slopes = (found[1:] - found[0]).T
+                precision = slopes.T @ slopes
+                step = -np.linalg.solve(precision + np.eye(2), slopes.T @ misfit + tried)
+                overdispersion = max(float(misfit @ misfit) / len(misfit), 1.0)
+                covariance = np.linalg.inv(precision / overdispersion + np.eye(2))
+            if used >= min(most, len(time)):
+                break
+            used *= LONGER
+        return least, z, covariance
 
     def windows(self, run: Run, sigma: float, length: float = WINDOW) -> list[Window]:
         """The run in windows one after another; where the force is unknown there are none.

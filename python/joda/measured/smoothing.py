@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 WINDOWS = (0.02, 0.03, 0.045, 0.07)
-"""Half widths (s) that are tried, from the narrowest on."""
+"""Half widths (s) that are tried, from the narrowest on, of a motion of usual pace."""
+USUAL_PACE = 0.15
+"""Pace (s) from which a motion counts as usual; a faster one has proportionally narrower windows."""
+FASTEST = 0.9
+"""Quantile of a motion's speeds that tells its pace."""
+CLEAR_MOTION, SEEN_MOTION = 10.0, 0.1
+"""Displacement, in noises, that tells a speed; part of the samples that must do so."""
 LEAST = 7
 """Fewest samples in a window."""
 REST = 2.0
@@ -137,11 +143,35 @@ def smooth(time: Array, position: Array, at: Array, sigma: float) -> Smooth:
     Returns:
         arrays of shape (m,).
     """
-    low = np.maximum(np.searchsorted(time, at - 1.01 * WINDOWS[-1]) - LEAST, 0)
-    high = np.searchsorted(time, at + 1.01 * WINDOWS[-1]) + LEAST
+    halves = _half_widths(time, position, sigma)
+    low = np.maximum(np.searchsorted(time, at - 1.01 * halves[-1]) - LEAST, 0)
+    high = np.searchsorted(time, at + 1.01 * halves[-1]) + LEAST
     near = [slice(a, b) for a, b in zip(low, high, strict=True)]  # what no window reaches is left
     pairs = zip(near, at, strict=True)
-    return Smooth(*np.array([_local(time[k], position[k], t0, sigma) for k, t0 in pairs]).T)
+    local = [_local(time[k], position[k], t0, sigma, halves) for k, t0 in pairs]
+    return Smooth(*np.array(local).T)
+
+
+def pace(time: Array, position: Array, sigma: float) -> float:
+    """Time in which a motion goes through all that it visits, at its higher speeds.
+
+    Args:
+        time: s, increasing, shape (n,).
+        position: shape (n,).
+        sigma: noise of the position.
+
+    Returns:
+        s; infinite where the position hardly changes.
+    """
+    lag = 2
+    while lag < len(time) // 2:
+        moved = np.abs(position[lag:] - position[:-lag])
+        clear = moved > CLEAR_MOTION * sigma
+        if clear.sum() > max(SEEN_MOTION * len(moved), 3):
+            speed = moved[clear] / (time[lag:] - time[:-lag])[clear]
+            return float(np.ptp(position) / np.quantile(speed, FASTEST))
+        lag *= 2
+    return np.inf
 
 
 def begins_at_rest(time: Array, position: Array, sigma: float) -> bool:
@@ -152,29 +182,39 @@ def begins_at_rest(time: Array, position: Array, sigma: float) -> bool:
         position: shape (n,).
         sigma: noise of the position.
     """
-    soon = time[min(max(LEAST, int(np.searchsorted(time, time[0] + WINDOWS[0]))), len(time) - 1)]
+    half = _half_widths(time, position, sigma)[0]
+    soon = time[min(max(LEAST, int(np.searchsorted(time, time[0] + half))), len(time) - 1)]
     found = smooth(time, position, np.array([time[0], soon]), sigma)
     first, later = np.abs(found.velocity)
     zero = REST * found.velocity_error
     return bool(first < zero[0] and (later < zero[1] or first < SOON * later))
 
 
-def _local(time: Array, position: Array, t0: float, sigma: float) -> tuple[float, ...]:
+def _half_widths(time: Array, position: Array, sigma: float) -> Array:
+    """Of the windows, s, from the narrowest on."""
+    return np.array(WINDOWS) * min(pace(time, position, sigma) / USUAL_PACE, 1.0)
+
+
+def _local(
+    time: Array, position: Array, t0: float, sigma: float, halves: Array
+) -> tuple[float, ...]:
     """Position, velocity and their errors at one time."""
-    near = _window(time, position, t0, sigma)
+    near = _window(time, position, t0, sigma, halves)
     t, y = time[near] - t0, position[near]
     value, slope, value_error, slope_error = _polynomial(t, y, sigma, 2)
     bent = _polynomial(t, y, sigma, 3)[1] - slope
     return value, slope, 2 * value_error, float(np.hypot(2 * slope_error, bent))
 
 
-def _window(time: Array, position: Array, t0: float, sigma: float) -> NDArray[np.intp]:
+def _window(
+    time: Array, position: Array, t0: float, sigma: float, halves: Array
+) -> NDArray[np.intp]:
     """The widest window, as indices, whose velocity agrees with those of all narrower ones."""
     away = np.abs(time - t0)
     widest = np.sort(np.argsort(away, kind="stable")[: min(LEAST, len(time))])
     least = len(widest)
     low, high = -np.inf, np.inf
-    for half in WINDOWS:
+    for half in halves:
         near = np.flatnonzero(away <= half)
         if len(near) < least:
             continue
