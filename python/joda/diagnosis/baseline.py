@@ -163,5 +163,6 @@ def _yields(measured: Measured) -> bool:
 
 
 def usable(windows: Windows) -> NDArray[np.bool_]:
-    """Which windows tell of the joint: enough samples, and no knock at an end of the range."""
-    return np.asarray((windows.count >= LEAST) & ~windows.knocks)
+    """Which windows tell of the joint: enough samples, and neither a knock at an end of the range
+    nor nothing but rest there."""
+    return np.asarray((windows.count >= LEAST) & ~windows.knocks & ~windows.rests)

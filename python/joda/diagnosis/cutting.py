@@ -12,7 +12,10 @@ from joda.measured import smoothing
 from joda.measured.runs import Run, known
 
 SHORTEST, LONGEST = 0.1, 0.5
-"""Of windows, s."""
+"""Of windows, s, unless the joint goes through its range in less than `QUICK` of the shortest."""
+QUICK = 2.0
+SPEEDS = 10_000
+"""Most speeds of a run that are looked at."""
 TRAVEL = 0.15
 """What part of the range a window goes through at the usual speed."""
 FEWEST = 12
@@ -74,7 +77,7 @@ def windows_of(
             begun = smoothing.smooth(time, position, time[0] + h * begins, sigma)
             velocity, doubt = begun.velocity.copy(), begun.velocity_error.copy()
             if smoothing.begins_at_rest(time, position, sigma):
-                velocity[0], doubt[0] = 0.0, 0.1 * doubt[0] / LOOSE
+                velocity[0], doubt[0] = 0.0, 0.5 * doubt[0] / LOOSE
             force = np.interp(time[0] + h * np.arange(steps), time, run.force[piece])
             fresh = np.arange(many) == 0
             start = np.stack([begun.position, velocity], axis=1)
@@ -105,23 +108,31 @@ def windows_of(
         rows=rows,
         whitener=_whitener(rows, time, spread, push / inertia),
         knocks=_knocks(rows, (position - lo) / span, spread / span),
+        rests=_rests(rows, (position - lo) / span, spread / span),
     )
 
 
 def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
     """Of the windows, by the joint's usual speed and the sampling, s."""
-    speeds, gaps = [], []
-    for run, sigma in zip(runs, sigmas, strict=True):
-        apart = np.interp(run.time[0] + 0.05 * np.arange(10_000), run.time, run.position)
-        apart = apart[: max(int(np.ptp(run.time) / 0.05), 2)]
-        speed = np.abs(np.diff(apart)) / 0.05
-        speeds.append(speed[speed > 4 * sigma / 0.05])
-        gaps.append(np.diff(run.time))
-    moving = np.concatenate(speeds)
-    usual = float(np.median(moving)) if len(moving) else 0.0
+    pairs = list(zip(runs, sigmas, strict=True))
+    speeds = np.concatenate([_speeds(run, sigma, SHORTEST / 2) for run, sigma in pairs])
+    shortest = SHORTEST
+    fastest = min(smoothing.pace(run.time, run.position, sigma) for run, sigma in pairs)
+    if fastest < QUICK * SHORTEST:
+        shortest = fastest / QUICK
+        speeds = np.concatenate([_speeds(run, sigma, shortest / 2) for run, sigma in pairs])
+    usual = float(np.median(speeds)) if len(speeds) else 0.0
     length = TRAVEL * span / usual if usual else LONGEST
-    least = FEWEST * float(np.median(np.concatenate(gaps)))
-    return max(min(max(length, SHORTEST), LONGEST), least)
+    gaps = np.concatenate([np.diff(run.time) for run in runs])
+    return max(min(max(length, shortest), LONGEST), FEWEST * float(np.median(gaps)))
+
+
+def _speeds(run: Run, sigma: float, apart: float) -> Array:
+    """Over times that are so far apart (s), where they are clearly more than the noise makes."""
+    count = min(int(np.ptp(run.time) / apart) + 1, SPEEDS)
+    path = np.interp(run.time[0] + apart * np.arange(count), run.time, run.position)
+    speed = np.abs(np.diff(path)) / apart
+    return np.asarray(speed[speed > 4 * sigma / apart])
 
 
 def _thinned(window: Integers) -> NDArray[np.bool_]:
@@ -180,6 +191,13 @@ def _before_knocks(begins: Integers, index: Integers, s: Array, noise: Array) ->
 def _knocks(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
     """Whether the joint comes to an end of its range in a window, at some speed."""
     return np.array([knock is not None for knock in _each_knock(rows, s, noise)], bool)
+
+
+def _rests(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
+    """Whether all of a window's samples are at an end of the range."""
+    reach = STOP + 3 * noise
+    low, high = s < reach, s > 1 - reach
+    return np.array([low[own].all() or high[own].all() for own in (r[r >= 0] for r in rows)], bool)
 
 
 def _each_knock(rows: Integers, s: Array, noise: Array) -> list[int | None]:

@@ -16,7 +16,7 @@ from joda.diagnosis.ranking import Ranking, Told, rank
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import strengths_off, summarised
 from joda.diagnosis.uncertainty import uncertainty
-from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, weigh
+from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, excess_of, weigh
 from joda.measured.adequacy import MULTIPLE
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
@@ -25,6 +25,9 @@ from joda.profile import Profile
 
 LONGER, LONGEST = 9.0, 1.5
 """How much longer the windows of a second look are, and at most how long, s."""
+NOTICED = 0.1
+"""Excess per sample of the model in longer windows from which effects are sought there too,
+although there was none in shorter ones."""
 SLOWEST = 0.02
 """Part of the range per second that a motion is proposed at, at the least."""
 STRICTLY, LOOSELY = 0.7, 3.0
@@ -84,6 +87,13 @@ def diagnosed(
         again, anew = _looked_again(measured, ranking, strictness, exclude, told)
         if anew.verdict == "missing_effect" or anew.share < weighed.share:
             ranking, weighed = again, anew
+    elif weighed.verdict == "adequate" and measured.runs:
+        longer = asked(measured, _longer(ranking))
+        if excess_of(longer) > NOTICED:
+            again = rank(longer, exclude, told)
+            anew = weigh(again, STRICTLY, wholly=True)
+            if anew.verdict != "adequate":
+                ranking, weighed = again, anew
     if weighed.verdict == "adequate" and (why := too_little(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if weighed.verdict == "adequate":
@@ -124,14 +134,18 @@ def _looked_again(
     """
     judge = first.asked.judge
     if measured.runs:
-        length = min(LONGER * judge.windows.length, LONGEST)
-        ranking = rank(asked(measured, length), exclude, told)
+        ranking = rank(asked(measured, _longer(first)), exclude, told)
         return ranking, weigh(ranking, STRICTLY, wholly=True)
     left = first.guesses[0].fit.squares / np.maximum(judge.windows.count, 1)
     factor = max(float(np.sqrt(np.median(left[judge.counts]))), 1.0)
     rough = measured.with_curves([curve.noisier(factor) for curve in measured.curves])
     ranking = rank(asked(rough), exclude, told)
     return ranking, replace(weigh(ranking, strictness), verdict="unexplained")
+
+
+def _longer(first: Ranking) -> float:
+    """Length of the windows of a second look, s."""
+    return min(LONGER * first.asked.judge.windows.length, LONGEST)
 
 
 def _astray(measured: Measured) -> str:

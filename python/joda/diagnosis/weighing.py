@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from joda.diagnosis.asking import Asked
 from joda.diagnosis.hypotheses.base import KNOWN_LAW
 from joda.diagnosis.judge import BEND
 from joda.diagnosis.ranking import WORST, Ranking, levelled
@@ -64,6 +65,15 @@ class Weighed:
         return left[0] / max(own, LITTLE) if left else 1.0
 
 
+def excess_of(asked: Asked) -> float:
+    """Of the model as it is, per sample, beyond what noise makes."""
+    return _excess(asked.fit.loss, max(asked.judge.samples, 1.0))
+
+
+def _excess(loss: float, count: float) -> float:
+    return loss / count - BEND * float(np.log1p(1 / BEND))
+
+
 def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Weighed:
     """The verdict on a ranking, and how likely each effect is the missing one.
 
@@ -78,12 +88,8 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
         return Weighed("adequate", (), (0.0, ()))
     first = guesses[0]
 
-    def excess(loss: float, count: float) -> float:
-        """Per sample, beyond what noise makes."""
-        return loss / count - BEND * float(np.log1p(1 / BEND))
-
-    own = excess(levelled(judge, ranking.asked.fit, ranking.level), samples)
-    left = np.array([excess(guess.score, ranking.told) for guess in guesses])
+    own = _excess(levelled(judge, ranking.asked.fit, ranking.level), samples)
+    left = np.array([_excess(guess.score, ranking.told) for guess in guesses])
     noise = min(left.min(), CHANCE * float(np.sqrt(2 / ranking.told)))  # not known better
     own, left = max(own - noise, 0.0), left - noise
     noisy = ranking.level > WORST  # more than noise is left of all
@@ -99,7 +105,7 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
     doubtful = likely[0] < HARDLY or ranking.bouncy
     if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and doubtful):
         loss = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
-        calm = excess(loss, samples) < MUCH and not ranking.bouncy
+        calm = _excess(loss, samples) < MUCH and not ranking.bouncy
         said: Verdict = "adequate" if calm else "unexplained"
     elif weights[0] <= strange:
         said = "unexplained"

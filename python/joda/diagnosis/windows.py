@@ -39,6 +39,7 @@ class Windows:
         rows: sample of each place, -1 for filling; shape (m, most samples).
         whitener: turns each window's misfit into residuals of variance 1, shape (m, most, most).
         knocks: whether the joint hits an end of its range there, shape (m,).
+        rests: whether it only rests at one, which tells of the stop and not of the joint.
     """
 
     h: float
@@ -55,6 +56,7 @@ class Windows:
     rows: Integers
     whitener: Array
     knocks: NDArray[np.bool_]
+    rests: NDArray[np.bool_]
 
     @property
     def length(self) -> float:
@@ -142,6 +144,7 @@ def evenly(
         rows=rows,
         whitener=np.tile(np.eye(most) / sigma, (len(at), 1, 1)),
         knocks=np.zeros(len(at), bool),
+        rests=np.zeros(len(at), bool),
     )
 
 

@@ -32,8 +32,8 @@ FINEST = 1e-6
 """Least noise, in units of the range."""
 STEPS = 5_000_000
 """Most timesteps of a run that are simulated."""
-LEAST = 0.3
-"""The same of a run, in units of the runs' usual noise: one encoder measured them all."""
+LEAST = 0.7
+"""The same of a run, in units of the noise of all runs together: one encoder measured them all."""
 
 
 @dataclass(frozen=True)
@@ -159,10 +159,9 @@ def read_measured(
     besides = acting_besides(compiled, number)
     notes += [*clear.notes, *filter(None, [besides])]
     timed = tuple(run for run in read if isinstance(run, Run))
-    noises = [smoothing.noise(run.time, run.position) for run in timed]
-    usual = float(np.median(noises)) if noises else 0.0
+    usual = smoothing.pooled_noise([(run.time, run.position) for run in timed])
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
-    sigma = tuple(max(noise, least) for noise in noises)
+    sigma = tuple(max(smoothing.noise(run.time, run.position), least) for run in timed)
     own = single(found, profile, compiled, number)
     replayer = Replayer(found, profile, own, step)
     static = [curve for curve in read if isinstance(curve, QuasiStatic)]

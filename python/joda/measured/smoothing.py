@@ -6,10 +6,12 @@ of all narrower ones: the rule of intersecting confidence intervals (Goldenshlug
 1997). What the parabola bends is told by a cubic in the same window.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 Array = NDArray[np.float64]
 
@@ -27,6 +29,8 @@ REST = 2.0
 """Errors within which a velocity counts as zero."""
 SOON = 0.8
 """Part of the velocity soon after that a joint which begins at rest does not have at once."""
+KEPT = 0.8
+"""Part of the departures, the smaller ones, that tell the noise."""
 CONFIDENCE = 1.0
 """Half width of the intervals, in standard deviations."""
 
@@ -50,10 +54,7 @@ class Smooth:
 
 
 def noise(time: Array, position: Array) -> float:
-    """Standard deviation of the noise in a position, from what a local cubic cannot follow.
-
-    Fourth divided differences, scaled to that of white noise; their median, so that knocks and
-    stops hardly count. Of a quantised position at least the steps' own, a twelfth of their square.
+    """Standard deviation of the noise in a position, see `pooled_noise`.
 
     Args:
         time: s, shape (n,).
@@ -62,10 +63,43 @@ def noise(time: Array, position: Array) -> float:
     Returns:
         in the position's unit; 0 for fewer than 5 samples.
     """
-    if len(time) < 5:
+    return pooled_noise([(time, position)])
+
+
+def pooled_noise(signals: Sequence[tuple[Array, Array]]) -> float:
+    """Standard deviation of one sensor's noise, from what a local cubic cannot follow.
+
+    Fourth divided differences, scaled to that of white noise; the root mean square of the smaller
+    ones, so that knocks and stops hardly count. Stretches in which a quantised position does not
+    change tell nothing. At least the steps' own, a twelfth of their square.
+
+    Args:
+        signals: time (s) and position of each run, shape (n,) each.
+
+    Returns:
+        in the positions' unit; 0 where all have fewer than 5 samples.
+    """
+    long = [(time, position) for time, position in signals if len(time) >= 5]
+    if not long:
         return 0.0
-    white = deviation(departures(time, position))
-    return max(white, resolution(position) / 12**0.5)
+    away = np.concatenate([departures(time, position) for time, position in long])
+    changes = np.concatenate([_changes(position) for _, position in long])
+    white = trimmed_deviation(away[changes] if changes.any() else away)
+    return max(white, resolution(np.concatenate([position for _, position in long])) / 12**0.5)
+
+
+def _changes(position: Array) -> NDArray[np.bool_]:
+    """Whether any two of five successive samples differ, shape (n - 4,)."""
+    return np.ptp(np.lib.stride_tricks.sliding_window_view(position, 5), axis=1) > 0
+
+
+def trimmed_deviation(values: Array) -> float:
+    """Standard deviation of noise about zero, from the smaller `KEPT` of the values: those of a
+    normal distribution make the part kept - 2 z phi(z) of its variance, for kept = P(|x| < z)."""
+    size = np.sort(np.abs(values))[: max(int(KEPT * len(values)), 1)]
+    z = norm.ppf(0.5 + KEPT / 2)
+    part = KEPT - 2 * z * norm.pdf(z)
+    return float(np.sqrt(np.sum(size**2) / len(values) / part))
 
 
 def force_error(time: Array, force: Array, forced: bool) -> Array:

@@ -1,6 +1,7 @@
 """The effects beyond the templates as hypotheses."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Literal
 
@@ -39,6 +40,10 @@ from joda.effects import (
 from joda.profile import Profile
 
 Way = Literal["positive", "negative"]
+End = Literal["both", "low", "high"]
+
+ENDS: dict[End, tuple[float, float]] = {"both": (0.0, 1.0), "low": (0.0, 0.02), "high": (0.98, 1.0)}
+"""Where an end of the range acts."""
 
 KNOTS = 9
 """Control points of a free curve."""
@@ -239,11 +244,20 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
             lambda x: span * float(x[0]),
             "rad" if units.hinge else "m",
         )
-    yield _effect(
-        "end_stop_restitution",
-        [(0.35, 0.95, 0.02)],
-        [[0.45], [0.7]],
-        lambda x: EndStopRestitution(restitution=float(x[0])),
-        lambda x: float(x[0]),
-        "1",
+    for end in ENDS:
+        yield _restitution(end)
+
+
+def _restitution(end: End) -> Hypothesis:
+    """How much of its speed the joint gets back at one end of its range, or at both."""
+    return replace(
+        _effect(
+            "end_stop_restitution",
+            [(0.05, 0.95, 0.02)],
+            [[0.3], [0.6]],
+            lambda x: EndStopRestitution(restitution=float(x[0]), end=end),
+            lambda x: float(x[0]),
+            "1",
+        ),
+        interval=lambda x: ENDS[end],
     )

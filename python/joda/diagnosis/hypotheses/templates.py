@@ -31,6 +31,12 @@ BARRIER = (0.2, 3.0, 0.02)
 """Of a latch, in units of its hold."""
 CENTRES = ((0.5,), (0.27, 0.73))
 """Of one well, and of two, in their interval; their outer flanks run out more slowly."""
+LOCAL = {
+    "constant_friction_hinge": "position_dependent_friction",
+    "constant_damping_hinge": "position_dependent_damping",
+}
+"""What a constant resistance is called that acts on less than `WHOLE` of the range."""
+WHOLE = 0.8
 TAIL = 0.5
 """Force halfway between a well's largest and its end, in units of that."""
 RARE = 3.0
@@ -256,17 +262,23 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
 
     def one(place: str) -> Hypothesis:
         whole = place == "whole"
+        label = name if whole else LOCAL.get(name, name)
 
         def write(profile: Profile, x: Array) -> Profile:
             y, interval = float(unit * x[0]), ends(place, x)
             if whole:
-                part = Component(label=name, interval=interval, x=(0, 1), y=(y, y))
+                part = Component(label=label, interval=interval, x=(0, 1), y=(y, y))
                 return profile.with_component(channel, part)
             edge = float(x[1])
             first, last = (y if at in (0.0, 1.0) else 0.0 for at in interval)
             at = (0.0, edge, 1 - edge, 1.0)
-            part = Component(label=name, interval=interval, x=at, y=(first, y, y, last))
+            part = Component(label=label, interval=interval, x=at, y=(first, y, y, last))
             return profile.with_component(channel, part)
+
+        def itself(x: Array) -> bool:
+            """Whether it is not the same as the whole range's."""
+            a, b = between(x)
+            return label == name or b - a < WHOLE
 
         def between(x: Array) -> tuple[float, float]:
             """From the middle of one edge to that of the other."""
@@ -278,7 +290,7 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
         soft = [] if whole else [EDGE]
         same = whole and channel == "conservative" and not units.hinge
         return Hypothesis(
-            name,
+            label,
             "both",
             unknowns_of(STRENGTH, *soft, *bounds),
             np.array([(TRIAL, *[EDGE[0]] * len(soft), *t) for t in tries]),
@@ -288,6 +300,7 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
             unit_of(units, int(channel == "damping")),
             len(bounds),
             RARE if same else 0.0,
+            itself=itself,
         )
 
     yield one("whole")
