@@ -157,7 +157,12 @@ def read_measured(
     clear = clear_of_contacts(compiled, number, profile.joint, read)
     read = clear.measured
     besides = acting_besides(compiled, number)
-    notes += [*clear.notes, *filter(None, [besides])]
+    notes += clear.notes
+    if besides:
+        notes.append(
+            f"In the scene more acts on joint '{name}' than itself, gravity and contacts: "
+            f"{', '.join(besides)}; a replay of the joint by itself leaves that out."
+        )
     timed = tuple(run for run in read if isinstance(run, Run))
     noises = [smoothing.noise(run.time, run.position) for run in timed]
     usual = float(np.median(noises)) if noises else 0.0
