@@ -81,7 +81,11 @@ def compare(
         failing_window=length,
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
         failing_force=tuple(failing_force(measured.curves, described)),
-        notes=(*measured.notes, *left_out(measured.runs, LENGTHS[0]), *([note] if note else [])),
+        notes=(
+            *(note for note in measured.notes if note != measured.barred),
+            *left_out(measured.runs, LENGTHS[0]),
+            *([note] if note else []),
+        ),
         contacts=measured.contacts,
     )
     files: dict[Path, bytes | str] = {}

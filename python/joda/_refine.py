@@ -149,8 +149,8 @@ def refine(
         )
     before, found = profiles[name], context(source, name)
     notes = [*checked([*measured, *held_out], found, float(compiled.opt.timestep)), *unused, *more]
-    clear = clear_of_contacts(compiled, number, found.joint, measured)
-    other = clear_of_contacts(compiled, number, found.joint, held_out) if held_out else None
+    clear = clear_of_contacts(compiled, number, found, before, measured)
+    other = clear_of_contacts(compiled, number, found, before, held_out) if held_out else None
     notes += [*clear.notes, *(other.notes if other else [])]
     begin = before
     for _ in range(finer):

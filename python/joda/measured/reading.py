@@ -52,6 +52,7 @@ class Measured:
         notes: what is suspicious about them.
         contacts: of the scene that resist the joint where it was measured.
         whole: whether all that acts on the joint there is replayed, and all of the runs.
+        barred: the note on where the scene would not have let the joint; empty if there is none.
     """
 
     context: Context
@@ -65,6 +66,7 @@ class Measured:
     notes: tuple[str, ...]
     contacts: tuple[Contact, ...]
     whole: bool
+    barred: str
 
     def changed(
         self, profile: Profile | None = None, runs: Sequence[int] | None = None
@@ -154,7 +156,7 @@ def read_measured(
     step = float(compiled.opt.timestep)
     read, unused = read_logs(compiled, number, runs, passive)
     notes = [*checked(read, found, step), *unused]
-    clear = clear_of_contacts(compiled, number, profile.joint, read)
+    clear = clear_of_contacts(compiled, number, found, profile, read)
     read = clear.measured
     besides = acting_besides(compiled, number)
     notes += clear.notes
@@ -197,4 +199,5 @@ def read_measured(
         notes=tuple(notes),
         contacts=clear.contacts,
         whole=not besides and not any(contact.hinders for contact in clear.contacts),
+        barred=clear.barred,
     )
