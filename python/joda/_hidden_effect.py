@@ -98,10 +98,12 @@ def hidden_effect(
     truth = f"{named(effect)}, {_where(case.seal)}, {_size(case.seal)}"
     say(f"Hidden is {truth}." if reveal else "What is hidden is sealed in sealed.json.")
 
-    say(f"\n1. Is the model good? (compare, {folder / 'compare.html'})")
+    say("")
+    say(f"1. Is the model good? (compare, {folder / 'compare.html'})")
     found = compare(model, joint, runs, report=folder / "compare.html", force=True)
     say(of_comparison(found)[0])
-    say(f"\n2. What does it lack? (diagnose, {folder / 'diagnosis.html'})")
+    say("")
+    say(f"2. What does it lack? (diagnose, {folder / 'diagnosis.html'})")
     written = folder / "diagnosis.json"
     diagnosis = diagnose(
         model, joint, runs, json=written, report=folder / "diagnosis.html", force=True
@@ -110,15 +112,18 @@ def hidden_effect(
         say(sentence)
     before, after = compare(model, joint, unseen), None
     if diagnosis.effects:
-        say(f"\n3. Add it. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
+        say("")
+        say(f"3. Add it. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
         added = add(model, joint, written, runs, folder / "new.xml", force=True)
         say(of_added(added)[0])
         if added.scene:
-            say(f"\n4. Runs that no step has seen. (compare, {folder / 'unseen.html'})")
+            say("")
+            say(f"4. Runs that no step has seen. (compare, {folder / 'unseen.html'})")
             page = folder / "unseen.html"
             after = compare(added.scene, joint, unseen, report=page, force=True)
             say(_unseen(before, after))
-    say("\nThe seal is opened:")
+    say("")
+    say("The seal is opened:")
     judgement, right = _judged(diagnosis, case.seal, before, after)
     say(f"  hidden: {truth}")
     for one in diagnosis.effects[:1]:

@@ -11,6 +11,7 @@ from joda.component import Frozen
 from joda.interaction.pulling import Pull, apart, number, pulled
 from joda.interaction.surroundings import Surroundings, touching
 from joda.joints.rig import rig
+from joda.plain import line
 from joda.profile import Profile
 from joda.scenes.motion import Motion, settle
 
@@ -126,7 +127,7 @@ class Behaviour(Frozen):
                 f"fastest closing by itself: let go at s = {self.fastest.start:.2f}, shut after "
                 f"{self.fastest.seconds:.2f} s with {self.fastest.speed:.3g} {speed}{at_edge}"
             )
-        return "\n".join(lines)
+        return "\n".join(map(line, lines))
 
 
 def behaviour(context: Context, profile: Profile, around: Surroundings | None = None) -> Behaviour:

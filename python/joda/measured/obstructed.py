@@ -120,9 +120,9 @@ def _barred(barrier: Barrier, read: Sequence[Measurement], contacts: Sequence[Co
         for pair, one in list(pairs.items())[:TOLD]
     )
     return (
-        f"The scene blocks joint '{barrier.joint.name}' where it was measured to move: {where}, and "
-        f"{', '.join(counts)} lie deeper in that than speed and forces can bring it; the scene is "
-        "wrong there, or the position's zero or sign."
+        f"The scene blocks joint '{barrier.joint.name}' where it was measured to move: {where}, "
+        f"and {', '.join(counts)} lie deeper in that than speed and forces can bring it; the scene "
+        "is wrong there, or the position's zero or sign."
     )
 
 
