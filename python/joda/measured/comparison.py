@@ -165,11 +165,12 @@ def _places(comparison: Comparison) -> Iterator[str]:
             "load": f"under a load of {a:.3g} to {b:.3g} {force}",
         }[place.by]
         if place.force is None:
-            how = "in either direction of force, by turns"
+            how = "without a force of one sign"
         else:
             much = "much" if place.force > 0 else "little"
             how = (
                 f"where the model pushes {abs(place.force):.2g} {force} too {much} towards +q in "
                 "the mean"
             )
-        yield f"By {place.by}: {100 * place.share:.0f} % of the error is {where}, {how}."
+        share = f"{100 * place.share:.0f}" if place.share >= 0.01 else "less than 1"
+        yield f"By {place.by}: {share} % of the error is {where}, {how}."
