@@ -16,8 +16,8 @@ import joda
 from joda import JodaError
 from joda.component import Component
 from joda.diagnosis.outcome import read_runs
-from joda.measured.excerpts import DURATION, SAMPLES
 from joda.measured.comparison import sentences
+from joda.measured.excerpts import DURATION, SAMPLES
 from joda.measured.reading import read_measured
 from joda.measured.runs import read_measurement
 from joda.profile import Channels, Profile, Resistance

@@ -17,7 +17,7 @@ from joda.diagnosis.phrases import named
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied
 from joda.hidden import EFFECTS, draw, write
-from joda.hidden.cases import PUSHED, VISIBLE
+from joda.hidden.cases import PUSHED, VISIBLE, overlap
 from joda.measured.comparison import Comparison
 from joda.measured.comparison import sentences as of_comparison
 
@@ -197,10 +197,9 @@ def _off(
     out = []
     if one.direction != seal["direction"]:
         out.append(f"the direction is {seal['direction']}, not {one.direction}")
-    (a, b), (c, d) = one.interval, seal["interval"]
-    overlap = max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c))
-    if overlap < PLACED:
-        out.append(f"the places overlap by {100 * overlap:.0f} % only")
+    common = overlap(one.interval, seal["interval"])
+    if common < PLACED:
+        out.append(f"the places overlap by {100 * common:.0f} % only")
     off = abs(one.magnitude - seal["magnitude"])
     if off > one.magnitude_error:
         out.append(

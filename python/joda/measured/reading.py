@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +14,7 @@ from joda.joints.single import Single, single
 from joda.measured import smoothing
 from joda.measured.driven import read_logs
 from joda.measured.gauge import Gauged, gauged
-from joda.measured.obstructed import clear_of_contacts
+from joda.measured.obstructed import Clear, clear_of_contacts
 from joda.measured.replay import Replayer
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow import as_curve
@@ -153,26 +154,47 @@ def read_measured(
     found = context(source, name)
     bare = Profile(joint=describe_joint(compiled, number))
     profile = whole_profile(compiled, number, profiles_of(spec, compiled).get(name, bare))
-    step = float(compiled.opt.timestep)
     read, unused = read_logs(compiled, number, runs, passive)
-    notes = [*checked(read, found, step), *unused]
+    notes = [*checked(read, found, float(compiled.opt.timestep)), *unused]
     clear = clear_of_contacts(compiled, number, found, profile, read)
-    read = clear.measured
-    besides = acting_besides(compiled, number)
     notes += clear.notes
-    if besides:
+    if besides := acting_besides(compiled, number):
         notes.append(
             f"In the scene more acts on joint '{name}' than itself, gravity and contacts: "
             f"{', '.join(besides)}; a replay of the joint by itself leaves that out."
         )
-    timed = tuple(run for run in read if isinstance(run, Run))
+    return taken(compiled, number, found, profile, clear, notes, whole=not besides)
+
+
+def taken(
+    model: mujoco.MjModel,
+    joint: int,
+    found: Context,
+    profile: Profile,
+    clear: Clear,
+    notes: Sequence[str] = (),
+    whole: bool = True,
+) -> Measured:
+    """A joint with measurements that are read, checked, and clear of contacts; raises JodaError.
+
+    Args:
+        model: the compiled scene.
+        joint: its id.
+        found: the joint.
+        profile: all that acts on it (`joda.scenes.native`).
+        clear: the measurements.
+        notes: what is suspicious about them.
+        whole: whether all that acts on the joint, but for contacts, is replayed.
+    """
+    notes, step = list(notes), float(model.opt.timestep)
+    timed = tuple(run for run in clear.measured if isinstance(run, Run))
     noises = [smoothing.noise(run.time, run.position) for run in timed]
     usual = float(np.median(noises)) if noises else 0.0
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     sigma = tuple(max(noise, least) for noise in noises)
-    own = single(found, profile, compiled, number)
+    own = single(found, profile, model, joint)
     replayer = Replayer(found, profile, own, step)
-    static = [curve for curve in read if isinstance(curve, QuasiStatic)]
+    static = [curve for curve in clear.measured if isinstance(curve, QuasiStatic)]
     if len(timed) == 1 and (
         slow := as_curve(timed[0], sigma[0], profile, own.inertia, replayer.whole)
     ):
@@ -198,6 +220,6 @@ def read_measured(
         curves=tuple(curves),
         notes=tuple(notes),
         contacts=clear.contacts,
-        whole=not besides and not any(contact.hinders for contact in clear.contacts),
+        whole=whole and not any(contact.hinders for contact in clear.contacts),
         barred=clear.barred,
     )
