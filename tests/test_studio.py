@@ -556,7 +556,7 @@ def test_runs_of_a_driven_joint_are_for_who_says_that_it_was_off(desk, tmp_path)
     write_run(tmp_path / "a.csv", replace(run, position=noisy, forced=False))
     with (
         closing(Desk(scene)) as opened,
-        pytest.raises(JodaError, match="'servo' acts on joint 'lid'.* with --passive"),
+        pytest.raises(JodaError, match=r"'servo' acts on joint 'lid'.* with --passive"),
     ):
         opened.add_run("a.csv")
     with closing(Desk(scene, passive=True)) as opened:
