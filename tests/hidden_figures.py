@@ -7,6 +7,8 @@ import numpy as np
 from hidden_cases import CONTAINED, HARD
 from hidden_coverage import coverage, reliability
 
+from joda.hidden.cases import overlap
+
 SURE = 0.9
 BINS = (0.0, 0.5, 0.7, SURE, 1.0 + 1e-9)
 NEAR = 1.5
@@ -59,10 +61,9 @@ def fine(row: dict) -> bool:
     return found(row) if row["second"] else right(row)
 
 
-def overlap(row: dict) -> float:
-    """Intersection over union of the intervals."""
-    (a, b), (c, d) = row["seal"]["interval"], first(row)["interval"]
-    return max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c))
+def shared(row: dict) -> float:
+    """Intersection over union of the true interval and the one said."""
+    return overlap(row["seal"]["interval"], first(row)["interval"])
 
 
 def local(row: dict) -> bool:
@@ -128,7 +129,7 @@ def figures(rows: list[dict]) -> Iterator[Figure]:
             f"calibration: right at p {a:g} to {b:.3g}", "", some, lambda row: not misled(row)
         )
     placed = [row for row in of("forced", "add", "place") if right(row) and local(row)]
-    yield from middle("place: intersection over union", "≥ 0.7", [overlap(row) for row in placed])
+    yield from middle("place: intersection over union", "≥ 0.7", [shared(row) for row in placed])
     adds = [row for row in of("add") if "floor" in row]
     ratios = [row["after_error"] / row["floor"] for row in adds if right(row)]
     near = [row for row in adds if right(row)]

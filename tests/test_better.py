@@ -53,13 +53,15 @@ def test_a_force_that_nothing_needs_is_refused(measured):
     assert 1.0 < needs < 200.0  # pushes of some N·m
     for force, refused in ((2 * needs, False), (2 * EXCESS * needs, True)):
         effect = StribeckFriction(velocity=0.1, y=(force, force))
-        reason = implausible(measured, measured.profile.with_effect(effect), "stribeck_friction")
+        reason = implausible(
+            Needs(measured), measured.profile.with_effect(effect), "stribeck_friction"
+        )
         assert bool(reason) == refused, reason
         part = Component(
             label="detent_internal", interval=(0.3, 0.6), x=(0, 0.5, 1), y=(0, force, 0)
         )
         profile = measured.profile.with_component("conservative", part)
-        assert bool(implausible(measured, profile, "detent_internal")) == refused
+        assert bool(implausible(Needs(measured), profile, "detent_internal")) == refused
 
 
 def test_where_no_run_was_is_told_in_closed_form(measured):

@@ -16,6 +16,7 @@ import joda
 from joda import JodaError
 from joda.component import Component
 from joda.diagnosis.outcome import read_runs
+from joda.measured.comparison import sentences
 from joda.measured.excerpts import DURATION, SAMPLES
 from joda.measured.reading import read_measured
 from joda.measured.runs import read_measurement
@@ -101,6 +102,11 @@ def finer(log: Log, hertz: float) -> Log:
     return Log(t, *(np.interp(t, log.time, x) for x in (log.position, log.force)))
 
 
+def stepped(log: Log, steps) -> np.ndarray:
+    """Times in steps that repeat."""
+    return np.cumsum(np.resize(steps, len(log.time)))
+
+
 def placed(log: Log, position) -> Log:
     return replace(log, position=position)
 
@@ -176,8 +182,33 @@ REFUSED = {
     ),
     "frame counter": (
         lambda g: timed(g, 100).text(slope="%.6f"),
-        "in steps of 1, as if it counted samples",
-        "multiply it by the seconds between",
+        "in steps of 1, as if it counted samples or frames",
+        "divide it by the sampling rate in Hz",
+    ),
+    "counter that starts late": (
+        lambda g: replace(g, time=41000.0 + np.arange(len(g.time))).text(slope="%.9g"),
+        "time goes from 41000 to 41599 in steps of 1, as if it counted",
+        "divide it by the sampling rate in Hz",
+    ),
+    "counter of frames, some lost": (
+        lambda g: replace(g, time=stepped(g, [1] * 7 + [2] * 2 + [5])).text(),
+        "mostly in steps of 1, as if it counted samples or frames",
+        "divide it by the sampling rate in Hz",
+    ),
+    "ms that jitter": (
+        lambda g: replace(g, time=stepped(g, [8, 9, 8, 10, 7])).text(),
+        "in steps of 8: too far apart",
+        "milliseconds, divide it by 1000",
+    ),
+    "ms of 60 Hz": (
+        lambda g: replace(g, time=stepped(g, [17, 16, 17])).text(),
+        "in steps of 17: too far apart",
+        "milliseconds, divide it by 1000",
+    ),
+    "ms of 1 kHz that are no integers": (
+        lambda g: replace(g, time=stepped(g, [1.02, 0.97, 1.01])).text(),
+        "in steps of 1.01: too far apart",
+        "milliseconds, divide it by 1000",
     ),
     "steps of 10 s": (
         lambda g: timed(g, 1e3).text(),
@@ -454,6 +485,13 @@ def test_what_is_doubtful_is_said_and_used(name, door, good, tmp_path):
     make, noted = DOUBTED[name]
     path = written(tmp_path, make, good)
     assert any(noted in note for note in read_measured(door, "door", [path]).notes)
+
+
+def test_where_no_window_can_be_replayed_no_nan_is_said(door, good, tmp_path):
+    path = written(tmp_path, lambda g: replace(g, time=0.4 * np.arange(len(g.time))).text(), good)
+    found = joda.compare(door, "door", [path])
+    assert found.rmse_window is None
+    assert not any("nan" in said for said in (*found.notes, *sentences(found)))
 
 
 BUTTON = scene(SLIDE.format("0 0.003"), step=0.0002, damping=0.2, friction=0.02, mass=0.005)

@@ -10,11 +10,13 @@ import json
 import logging
 import os
 import re
+import shlex
 import traceback
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import mujoco
+import numpy as np
 import pytest
 from forked import Forked
 from messages_server import KEY, error, message, serve
@@ -194,6 +196,49 @@ def test_a_name_in_reports_pictures_and_files_names(forked, tmp_path):
     assert len(list(folder.glob("s.*.png"))) == 1 and os.listdir(tmp_path) == ["work"]
     for path in folder.iterdir():
         check_whole(path)
+
+
+FORGED = "\nForged: all is well"
+LINES = {"joint": "door" + FORGED, "body": "leaf\r\t" + FORGED, "geom": "[red]pane" + FORGED}
+CELLAR = """<mujoco><compiler angle="radian"/><worldbody>
+  <body name={body}><joint name={joint} axis="0 0 1" range="0 1.5"/>
+    <geom name={geom} type="box" size=".3 .02 .2" pos=".3 0 0" mass="1"/></body>
+  <body name={body2} pos=".3 .35 0"><geom name={geom2} type="box" size=".1 .1 .1"/></body>
+</worldbody></mujoco>"""
+SAYS = {
+    "context": "context m.xml --joint #0",
+    "attach": "attach m.xml c.json --joint #0 -o new.xml",
+    "generate": "generate m.xml --joint #0 -o gen --proposer offline --rounds 1",
+    "revise": "revise gen --feedback 'it slams' --proposer offline",
+    "compare": "compare m.xml r.csv --joint #0 --report r.html -o r.png",
+    "diagnose": "diagnose m.xml r.csv --joint #0",
+    "improve": "improve m.xml r.csv --joint #0 -o better.xml",
+    "simulate": "simulate m.xml --joint #0 --push 5 --duration .5 -o m.csv",
+    "plot": "plot new.xml",
+    "not found": "context m.xml --joint no",
+}
+
+
+def test_a_name_of_several_lines_forges_none(forked, tmp_path):
+    def quoted(text):
+        return re.sub("[\x00-\x1f]", lambda m: f"&#{ord(m[0])};", quoteattr(text))
+
+    names = {key: quoted(text) for key, text in LINES.items()}
+    names |= {key + "2": quoted(text + "2") for key, text in LINES.items()}
+    (tmp_path / "m.xml").write_text(CELLAR.format(**names))
+    (tmp_path / "c.json").write_text(json.dumps(profile()))
+    time = np.arange(0, 4, 0.01)
+    rows = zip(time, 0.35 + 0.3 * np.sin(2 * time), strict=True)
+    (tmp_path / "r.csv").write_text("time,position\n" + "".join(f"{t},{q}\n" for t, q in rows))
+    said = ""
+    for name, command in SAYS.items():
+        ended = forked.run(shlex.split(command), tmp_path, 120)
+        assert ended.status == 2 * (name == "not found"), ended.stderr
+        said += ended.stdout + ended.stderr
+    assert harmless(said) and r"door\nForged: all is well" in said and "[red]pane" in said
+    assert not [text for text in said.splitlines() if text.startswith("Forged")]
+    facts = json.loads((tmp_path / "gen" / "history.json").read_text())["rounds"][0]["facts"]
+    assert not [text for text in facts.splitlines() if text.startswith("Forged")]
 
 
 @pytest.mark.parametrize("name", WRITABLE)

@@ -13,6 +13,7 @@ from joda import JodaError, add, attach, compare, context, diagnose, generate, i
 from joda.component import Component
 from joda.interaction.behaviour import behaviour
 from joda.interaction.surroundings import surroundings
+from joda.measured.comparison import sentences
 from joda.measured.reading import read_measured
 from joda.measured.runs import QuasiStatic, Run, read_run, write_run
 from joda.profile import Channels, Profile, Resistance
@@ -302,6 +303,89 @@ def test_refine_refuses_what_lies_in_a_contact(tmp_path):
     attach(model, Profile(joint=context(model, "j").joint, channels=channels), tmp_path / "s.xml")
     with pytest.raises(JodaError, match=r"'front' touches 'post' .* that is where bad\.csv lie"):
         refine(tmp_path / "s.xml", "j", [bad], tmp_path / "new.xml")
+
+
+# --- what the scene bars
+GATE = DOOR.replace('<joint name="pull" type="slide" axis="1 0 0" range="0 .3"/>', "").format(
+    mass=4
+)
+"""The door, and a chest that stays."""
+OPEN = GATE.replace("<option", '<option><flag contact="disable"/></option><option')
+BARRED = "The scene blocks joint '{}' where it was measured to move: '{}' touches '{}' from s = "
+
+
+def swung(folder, name="swung.csv", noise=2e-4):
+    """The door, pushed through where the chest is."""
+    return pushed(OPEN, "hinge", to_and_fro(1.5, 3.0), folder, name, 3.0, 0.05, noise)
+
+
+def test_a_run_through_a_contact_is_a_fault_of_the_scene(tmp_path):
+    path = write(tmp_path, GATE, "model.xml")
+    run = swung(tmp_path)
+    inside = int(np.sum(read_run(run).position > CORNER + 0.02))
+    found = compare(path, "hinge", [run], json=tmp_path / "c.json")
+    assert found.adequacy.verdict == "beyond_noise"
+    says = BARRED.format("hinge", "leaf", "drawer") + f"{CORNER / 1.6:.3f}"
+    said = " ".join(sentences(found))
+    assert f"Beyond the noise: {says[0].lower()}{says[1:]}" in said
+    count, total = map(
+        int, re.search(r"and (\d+) of (\d+) samples of swung.csv lie", said).groups()
+    )
+    assert total == 301 and 30 < count <= inside
+    assert not any("scene blocks" in note for note in found.notes)
+    assert json.loads((tmp_path / "c.json").read_text())["adequacy"]["barred"].startswith(says)
+    runs = [run, *(swung(tmp_path, f"more{k}.csv") for k in range(3))]
+    diagnosed = diagnose(path, "hinge", runs, json=tmp_path / "d.json")
+    assert any(note.startswith(says) for note in diagnosed.notes)
+    improved = improve(path, "hinge", runs, tmp_path / "new.xml")
+    assert any(note.startswith(says) for note in improved.notes)
+
+
+def test_a_curve_through_a_contact_is_one_too(tmp_path):
+    path = write(tmp_path, slide(geom='solref=".01 1"'), "model.xml")
+    there = np.concatenate([np.linspace(0.05, 0.95, 60), np.linspace(0.95, 0.05, 60)])
+    rows = "\n".join(f"{q:.6f},{1 + 0.01 * q:.6f}" for q in there)
+    (tmp_path / "c.csv").write_text(f"position,force\n{rows}\n")
+    barred = read_measured(path, "j", [tmp_path / "c.csv"]).barred
+    assert barred.startswith(BARRED.format("j", "front", "post") + "0.500 to 0.950")
+
+
+@pytest.mark.parametrize(
+    ("option", "geom", "force", "noise"),
+    [
+        ('gravity="0 0 0"', 'solref=".02 .3"', 40.0, 1e-5),
+        ('gravity="6 0 0"', 'solref=".1 1" solimp=".5 .8 .02"', 15.0, 1e-3),
+        ('gravity="0 0 0" cone="elliptic"', 'solref=".004 1"', 80.0, 2e-4),
+        ('gravity="9 0 0" integrator="implicitfast"', 'solref="-500 -5"', 5.0, 2e-4),
+    ],
+)
+def test_a_run_that_bumps_into_a_contact_as_it_is_proves_nothing(
+    option, geom, force, noise, tmp_path
+):
+    text = slide(geom=geom).replace('gravity="0 0 0"', option)
+    path = write(tmp_path, text, "model.xml")
+    run = pushed(text, "j", to_and_fro(force, 2.3), tmp_path, "run.csv", start=0.15, noise=noise)
+    measured = read_measured(path, "j", [run])
+    assert measured.barred == "" and any("left out there" in note for note in measured.notes)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [{"free": "<freejoint/>"}, {"geom": 'condim="3" solref="-1 -1"'}],
+    ids=["moved", "soft"],
+)
+def test_what_yields_bars_nothing(changed, tmp_path):
+    path = write(tmp_path, slide(**changed), "model.xml")
+    run = pushed(slide(at="5"), "j", to_and_fro(3, 2.0), tmp_path, "run.csv", start=0.4)
+    assert read_measured(path, "j", [run]).barred == ""
+
+
+def test_a_run_with_unknown_forces_proves_nothing(tmp_path):
+    path = write(tmp_path, GATE, "model.xml")
+    lines = swung(tmp_path).read_text().splitlines()
+    lines[100] = lines[100].rpartition(",")[0] + ","
+    (tmp_path / "gap.csv").write_text("\n".join(lines) + "\n")
+    assert read_measured(path, "hinge", [tmp_path / "gap.csv"]).barred == ""
 
 
 # --- generate

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 from contextlib import closing
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -544,6 +545,30 @@ def test_what_the_command_raises_in_the_child_is_raised(desk, tmp_path):
     asked = Work().diagnose(desk.scene, "lid", (tmp_path / "no.csv",), tmp_path / "d", print)
     with pytest.raises(JodaError, match=r"no\.csv: cannot be read"):
         asyncio.run(asked)
+
+
+def test_runs_of_a_driven_joint_are_for_who_says_that_it_was_off(desk, tmp_path):
+    motor = '<actuator><motor name="servo" joint="lid"/></actuator></mujoco>'
+    scene = tmp_path / "driven.xml"
+    scene.write_text(LID.replace("</mujoco>", motor))
+    run = simulate(desk.scene, "lid", release=1.1, duration=2, output=tmp_path / "a.csv").run
+    noisy = run.position + 1e-3 * np.random.default_rng(1).normal(size=len(run.position))
+    write_run(tmp_path / "a.csv", replace(run, position=noisy, forced=False))
+    with (
+        closing(Desk(scene)) as opened,
+        pytest.raises(JodaError, match=r"'servo' acts on joint 'lid'.* with --passive"),
+    ):
+        opened.add_run("a.csv")
+    with closing(Desk(scene, passive=True)) as opened:
+        opened.add_run("a.csv")
+        shown = replayed(scene, "lid", opened.runs, True, passive=True)
+        assert shown.runs == compare(scene, "lid", opened.runs, passive=True).runs
+        work, output = Work(), tmp_path / "d.json"
+        asked = work.diagnose(scene, "lid", opened.runs, output, lambda *told: None, True)
+        found = asyncio.run(asked)
+        assert found["joint"] == "lid" and found["verdict"]
+    with pytest.raises(JodaError, match="with --passive"):
+        asyncio.run(Work().diagnose(scene, "lid", opened.runs, output, lambda *told: None))
 
 
 def test_what_else_goes_wrong_in_the_child_is_for_the_terminal():

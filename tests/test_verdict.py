@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from joda import diagnose
 from joda._hidden_effect import _judged
+from joda.diagnosis import verdict
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.summary import summarised
 from joda.diagnosis.weighing import Weighed
+from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
 
 DETENT = Finding(
@@ -58,6 +61,36 @@ def test_two_that_cannot_be_told_apart_are_likely_together():
 def test_what_no_effect_explains_is_a_guess():
     one = weighed(0.2, verdict="unexplained")
     assert summarised(DETENT, one, one_way=False, bouncy=False).startswith("Best guess: a click")
+
+
+@pytest.mark.parametrize(
+    ("size", "error", "sized"),
+    [(0.0, 0.013, False), (2e-5, 0.4, False), (0.3, 2.9, True), (0.2, 0.21, True), (5, 0.1, True)],
+)
+def test_a_size_of_zero_is_no_effect(size, error, sized):
+    assert replace(DETENT, magnitude=size, magnitude_error=error).sized == sized
+
+
+@pytest.mark.parametrize("none", [1, None])
+def test_what_has_no_size_is_not_named(none, tmp_path, monkeypatch):
+    """A joint with damping that its model lacks: the first effect, or all, found with size 0."""
+    case = draw(11, "constant_damping_hinge")
+    write(case, tmp_path)
+    runs = [tmp_path / run.name for run in case.train[:3]]
+    found, names = verdict.finding, []
+
+    def emptied(*args):
+        one = found(*args)
+        names.append(one.effect)
+        return replace(one, magnitude=0.0) if len(names) <= (none or 100) else one
+
+    monkeypatch.setattr(verdict, "finding", emptied)
+    told = diagnose(tmp_path / "model.xml", case.joint, runs)
+    assert names[0] == "constant_damping_hinge"
+    assert names[0] not in [one.effect for one in told.effects]
+    if none is None or len(names) == 1:
+        assert told.verdict == "unexplained" and not told.effects
+        assert told.summary == "Something is missing that no known effect explains."
 
 
 def diagnosis(*effects):

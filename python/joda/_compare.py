@@ -11,7 +11,7 @@ from joda.files import check_target, write_together
 from joda.measured.adequacy import Adequacy, adequacy
 from joda.measured.comparison import Comparison, sentences
 from joda.measured.curves import curve_error, failing_force
-from joda.measured.errors import Errors, errors
+from joda.measured.errors import Errors, errors, known
 from joda.measured.failing import LENGTHS, Failing, where, window_rows
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
 from joda.measured.reading import Measured, read_measured
@@ -73,15 +73,19 @@ def compare(
         joint=described.name,
         unit=described.unit,
         runs=found.runs,
-        rmse=found.known(found.whole),
-        rmse_window=found.known(found.window),
-        noise_floor=found.known(found.noise),
+        rmse=known(found.whole),
+        rmse_window=known(found.window),
+        noise_floor=known(found.noise),
         adequacy=judged,
         failing=tuple(places),
         failing_window=length,
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
         failing_force=tuple(failing_force(measured.curves, described)),
-        notes=(*measured.notes, *left_out(measured.runs, LENGTHS[0]), *([note] if note else [])),
+        notes=(
+            *(note for note in measured.notes if note != measured.barred),
+            *left_out(measured.runs, LENGTHS[0]),
+            *([note] if note else []),
+        ),
         contacts=measured.contacts,
     )
     files: dict[Path, bytes | str] = {}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from joda.plain import line
 from joda.profile import Joint
 from joda.scenes.actuators import actuators_on
 from joda.scenes.angles import range_doubt
@@ -98,7 +99,7 @@ class Context(BaseModel):
             "names": ", ".join(self.names[:12]),
             "part of": ", ".join(self.around),
         }
-        return "\n".join(f"{name + ':':12} {text}" for name, text in rows.items())
+        return "\n".join(f"{name + ':':12} {line(text)}" for name, text in rows.items())
 
 
 def context(model: str | Path, joint: str) -> Context:

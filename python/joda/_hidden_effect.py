@@ -17,7 +17,7 @@ from joda.diagnosis.phrases import named
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied
 from joda.hidden import EFFECTS, draw, write
-from joda.hidden.cases import PUSHED, VISIBLE
+from joda.hidden.cases import PUSHED, VISIBLE, overlap
 from joda.measured.comparison import Comparison
 from joda.measured.comparison import sentences as of_comparison
 
@@ -98,10 +98,12 @@ def hidden_effect(
     truth = f"{named(effect)}, {_where(case.seal)}, {_size(case.seal)}"
     say(f"Hidden is {truth}." if reveal else "What is hidden is sealed in sealed.json.")
 
-    say(f"\n1. Is the model good? (compare, {folder / 'compare.html'})")
+    say("")
+    say(f"1. Is the model good? (compare, {folder / 'compare.html'})")
     found = compare(model, joint, runs, report=folder / "compare.html", force=True)
     say(of_comparison(found)[0])
-    say(f"\n2. What does it lack? (diagnose, {folder / 'diagnosis.html'})")
+    say("")
+    say(f"2. What does it lack? (diagnose, {folder / 'diagnosis.html'})")
     written = folder / "diagnosis.json"
     diagnosis = diagnose(
         model, joint, runs, json=written, report=folder / "diagnosis.html", force=True
@@ -110,15 +112,18 @@ def hidden_effect(
         say(sentence)
     before, after = compare(model, joint, unseen), None
     if diagnosis.effects:
-        say(f"\n3. Add it. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
+        say("")
+        say(f"3. Add it. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
         added = add(model, joint, written, runs, folder / "new.xml", force=True)
         say(of_added(added)[0])
         if added.scene:
-            say(f"\n4. Runs that no step has seen. (compare, {folder / 'unseen.html'})")
+            say("")
+            say(f"4. Runs that no step has seen. (compare, {folder / 'unseen.html'})")
             page = folder / "unseen.html"
             after = compare(added.scene, joint, unseen, report=page, force=True)
             say(_unseen(before, after))
-    say("\nThe seal is opened:")
+    say("")
+    say("The seal is opened:")
     judgement, right = _judged(diagnosis, case.seal, before, after)
     say(f"  hidden: {truth}")
     for one in diagnosis.effects[:1]:
@@ -192,10 +197,9 @@ def _off(
     out = []
     if one.direction != seal["direction"]:
         out.append(f"the direction is {seal['direction']}, not {one.direction}")
-    (a, b), (c, d) = one.interval, seal["interval"]
-    overlap = max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c))
-    if overlap < PLACED:
-        out.append(f"the places overlap by {100 * overlap:.0f} % only")
+    common = overlap(one.interval, seal["interval"])
+    if common < PLACED:
+        out.append(f"the places overlap by {100 * common:.0f} % only")
     off = abs(one.magnitude - seal["magnitude"])
     if off > one.magnitude_error:
         out.append(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from joda._attach import attached
 from joda._context import Context, context
-from joda.diagnosis.plausible import implausible
+from joda.diagnosis.plausible import Needs, implausible
 from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
 from joda.files import check_target, write_together
@@ -19,13 +19,14 @@ from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
 from joda.measured.driven import read_logs
 from joda.measured.excerpts import excerpts
 from joda.measured.obstructed import clear_of_contacts
-from joda.measured.reading import checked, read_measured
+from joda.measured.reading import checked, taken
 from joda.measured.runs import QuasiStatic, Run
 from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.refining.curvefit import CurveProblem
 from joda.refining.refinement import history, picture, unseen
 from joda.scenes.model import find_joint, joint_name, load
+from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
 
 if TYPE_CHECKING:
@@ -149,8 +150,9 @@ def refine(
         )
     before, found = profiles[name], context(source, name)
     notes = [*checked([*measured, *held_out], found, float(compiled.opt.timestep)), *unused, *more]
-    clear = clear_of_contacts(compiled, number, found.joint, measured)
-    other = clear_of_contacts(compiled, number, found.joint, held_out) if held_out else None
+    whole = whole_profile(compiled, number, before)
+    clear = clear_of_contacts(compiled, number, found, whole, measured)
+    other = clear_of_contacts(compiled, number, found, whole, held_out) if held_out else None
     notes += [*clear.notes, *(other.notes if other else [])]
     begin = before
     for _ in range(finer):
@@ -175,7 +177,8 @@ def refine(
         apart = unseen_runs.rms(parameters.start), unseen_runs.rms(result.theta)
     if reason := _worse(errors, windows, apart, problem.sigma):
         raise JodaError(f"{target}: not written, as {reason}.")
-    if timed and (reason := implausible(read_measured(source, name, runs, passive), after)):
+    needs = Needs(taken(compiled, number, found, whole, clear)) if timed else None
+    if reason := implausible(needs, after):
         raise JodaError(f"{target}: not written, as {reason}.")
     hidden = unseen(begin, parameters, result.covariance)
     also, mended = _beyond(parameters, result.theta, compiled, number, found)

@@ -29,9 +29,14 @@ def plain(text: str) -> str:
     return UNSEEN.sub(lambda match: json.dumps(match[0])[1:-1], text)
 
 
+def line(text: str) -> str:
+    """The same in one line: line feeds and tabs, which a name may hold, are escaped too."""
+    return plain(text).replace("\n", "\\n").replace("\t", "\\t")
+
+
 def one_line(text: str) -> str:
-    """The same in one line of bounded length; what is left out is from the middle."""
-    line = plain(text).replace("\n", " ").replace("\t", " ")
-    if len(line) > LONGEST:
-        line = f"{line[: LONGEST - END - 3]}...{line[-END:]}"
-    return line
+    """A sentence in one line of bounded length; what is left out is from the middle."""
+    said = plain(text).replace("\n", " ").replace("\t", " ")
+    if len(said) > LONGEST:
+        said = f"{said[: LONGEST - END - 3]}...{said[-END:]}"
+    return said

@@ -13,6 +13,7 @@ def studio(
     joint: str | None = None,
     runs: Sequence[str | Path] = (),
     *,
+    passive: bool = False,
     folder: str | Path | None = None,
     port: int | None = None,
     browser: bool = True,
@@ -27,6 +28,7 @@ def studio(
         joint: its name or address, see `joda.scenes.model.find_joint`; by default the one that
             carries a profile, or that is the only one.
         runs: measured CSV files to show beside the model; more can be added on the page.
+        passive: whether the actuators on the joint, if there are any, were off.
         folder: of the project: nothing outside of it is read or written. By default the scene's.
         port: of the page on 127.0.0.1; by default 8642, or if that is taken another one.
         browser: whether to open the page in a browser.
@@ -42,7 +44,7 @@ def studio(
     from joda._studio.guard import free_port
 
     place = Path(folder) if folder is not None else None
-    with closing(Desk(Path(scene), joint, place)) as desk:
+    with closing(Desk(Path(scene), joint, place, passive)) as desk:
         for run in runs:
             desk.add_run(Path(run).absolute())
         number = free_port(port)

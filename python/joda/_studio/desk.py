@@ -42,16 +42,24 @@ class Desk:
         opened: its profile, as opened.
         timeline: its profile, and those before and after.
         runs: the measured ones.
+        passive: whether the actuators on the joint were off meanwhile.
         kept: the profiles that are in files: as opened, and those that were saved.
     """
 
-    def __init__(self, scene: Path, joint: str | None = None, folder: Path | None = None) -> None:
+    def __init__(
+        self,
+        scene: Path,
+        joint: str | None = None,
+        folder: Path | None = None,
+        passive: bool = False,
+    ) -> None:
         """Opens a scene.
 
         Args:
             scene: MJCF or URDF.
             joint: name or address; None: the one that carries a profile, or that is the only one.
             folder: of the project; None: the scene's.
+            passive: whether the actuators on the joint were off while it was measured.
 
         Raises:
             JodaError: the file lies outside the folder or cannot be loaded, or which joint is meant
@@ -70,6 +78,7 @@ class Desk:
         self.timeline = Timeline(self.opened)
         self.kept = [self.opened]
         self.runs: tuple[Path, ...] = ()
+        self.passive = passive
         self._dragged: Profile | None = None
         self._scratch = tempfile.TemporaryDirectory(prefix="joda_studio_")
         self._written: tuple[Profile, Path] | None = None
@@ -156,7 +165,7 @@ class Desk:
     def _take(self, path: Path) -> None:
         if path in self.runs:
             raise JodaError(f"{path.name}: is there already.")
-        read_measured(self.scene, self.joint, [path])
+        read_measured(self.scene, self.joint, [path], self.passive)
         self.runs = (*self.runs, path)
 
     def drop_run(self, path: Path) -> None:

@@ -116,10 +116,10 @@ class Live:
             return simulated(desk.written(profile), desk.joint, stale, hand=True)
 
         def paths(profile: Profile, stale: Stale) -> Replayed:
-            return replayed(desk.written(profile), desk.joint, runs, False, stale)
+            return replayed(desk.written(profile), desk.joint, runs, False, desk.passive, stale)
 
         def replay(profile: Profile, stale: Stale) -> Replayed:
-            return replayed(desk.written(profile), desk.joint, runs, True, stale)
+            return replayed(desk.written(profile), desk.joint, runs, True, desk.passive, stale)
 
         return {
             "release": (release, start),

@@ -75,7 +75,12 @@ class Replayed:
 
 
 def replayed(
-    scene: Path, joint: str, runs: tuple[Path, ...], windows: bool, stale: Stale = never
+    scene: Path,
+    joint: str,
+    runs: tuple[Path, ...],
+    windows: bool,
+    passive: bool = False,
+    stale: Stale = never,
 ) -> Replayed:
     """Replays measured runs.
 
@@ -84,13 +89,14 @@ def replayed(
         joint: its name or address.
         runs: CSV files; quasi-static curves among them are only named in the notes.
         windows: whether the errors of windows are wanted too, which takes longer.
+        passive: whether the actuators on the joint were off.
         stale: asked from run to run.
 
     Raises:
         JodaError: a file cannot be read, or what it holds cannot be of this joint.
         Outdated: a newer profile waits.
     """
-    measured = read_measured(scene, joint, runs)
+    measured = read_measured(scene, joint, runs, passive)
 
     def begin(name: str) -> None:
         if stale():

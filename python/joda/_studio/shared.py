@@ -68,7 +68,9 @@ class Shared:
         runs, path = desk.runs, desk.scratch("diagnosis.json")
         self.diagnosis, self.outcome = None, []
         found = await self._working(
-            lambda: self.work.diagnose(desk.written(profile), desk.joint, runs, path, self._told)
+            lambda: self.work.diagnose(
+                desk.written(profile), desk.joint, runs, path, self._told, desk.passive
+            )
         )
         if found is not None and runs == desk.runs:
             self.diagnosis, self.diagnosed = found, profile
@@ -80,7 +82,14 @@ class Shared:
         output, diagnosis = desk.scratch("added.xml"), desk.scratch("diagnosis.json")
         added = await self._working(
             lambda: self.work.add(
-                desk.written(profile), desk.joint, desk.runs, diagnosis, effect, output, self._told
+                desk.written(profile),
+                desk.joint,
+                desk.runs,
+                diagnosis,
+                effect,
+                output,
+                self._told,
+                desk.passive,
             )
         )
         if added is None:

@@ -34,11 +34,16 @@ class Work:
         """Whether something is being done."""
 
     async def diagnose(
-        self, scene: Path, joint: str, runs: tuple[Path, ...], output: Path, told: Told
+        self,
+        scene: Path,
+        joint: str,
+        runs: tuple[Path, ...],
+        output: Path,
+        told: Told,
+        passive: bool = False,
     ) -> dict[str, Any]:
         """As `joda diagnose --json`; returns what it wrote, see `_ask` for what is raised."""
-        request = {"do": "diagnose", "scene": str(scene), "joint": joint, "output": str(output)}
-        await self._ask(request | {"runs": list(map(str, runs))}, told)
+        await self._ask(_request("diagnose", scene, joint, runs, output, passive), told)
         return dict(json.loads(output.read_text("utf-8")))
 
     async def add(
@@ -50,11 +55,11 @@ class Work:
         effect: str,
         output: Path,
         told: Told,
+        passive: bool = False,
     ) -> dict[str, Any]:
         """As `joda add`: its JSON, and its sentences; see `_ask` for what is raised."""
-        request = {"do": "add", "scene": str(scene), "joint": joint, "output": str(output)}
-        request |= {"diagnosis": str(diagnosis), "effect": effect}
-        return await self._ask(request | {"runs": list(map(str, runs))}, told)
+        request = _request("add", scene, joint, runs, output, passive)
+        return await self._ask(request | {"diagnosis": str(diagnosis), "effect": effect}, told)
 
     def stop(self) -> None:
         """Ends what is being done."""
@@ -116,18 +121,27 @@ class Work:
             await process.wait()
 
 
+def _request(
+    do: str, scene: Path, joint: str, runs: tuple[Path, ...], output: Path, passive: bool
+) -> dict[str, Any]:
+    """What a child is asked, as JSON."""
+    files = {"scene": str(scene), "runs": list(map(str, runs)), "output": str(output)}
+    return {"do": do, "joint": joint, "passive": passive, **files}
+
+
 def _do(request: dict[str, Any], told: Told) -> dict[str, Any]:
     """What is asked for; raises JodaError."""
     scene, joint, runs, output = (request[key] for key in ("scene", "joint", "runs", "output"))
+    passive = request["passive"]
     if request["do"] == "diagnose":
         joda.diagnose(
-            scene, joint, runs, json=output, force=True,
+            scene, joint, runs, json=output, passive=passive, force=True,
             progress=lambda done, total, what: told(done / max(total, 1), what),
         )  # fmt: skip
         return {}
     added = joda.add(
-        scene, joint, request["diagnosis"], runs, output, effect=request["effect"], force=True,
-        progress=lambda what: told(None, what),
+        scene, joint, request["diagnosis"], runs, output, effect=request["effect"],
+        passive=passive, force=True, progress=lambda what: told(None, what),
     )  # fmt: skip
     from joda._add import sentences
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from joda.cli import interrupt
-from joda.cli.options import Model
+from joda.cli.options import Model, Passive
 from joda.cli.say import say
 
 
@@ -20,6 +20,7 @@ def studio(
         str | None,
         typer.Option(help="A name, body:NAME[:K] or #K [default: the one there is]."),
     ] = None,
+    passive: Passive = False,
     folder: Annotated[
         Path | None,
         typer.Option(help="Nothing outside of it is read or written [default: SCENE's]."),
@@ -40,5 +41,8 @@ def studio(
     def ready(address: str) -> None:
         say(f"{address}   (Ctrl-C ends it)")
 
-    run(scene, joint, runs or (), folder=folder, port=port, browser=browser, ready=ready)
+    run(
+        scene, joint, runs or (), passive=passive, folder=folder, port=port, browser=browser,
+        ready=ready,
+    )  # fmt: skip
     interrupt.forget()

@@ -33,7 +33,7 @@ def context(
     found = run(model, joint)
     if as_json:
         write_text(as_json, plain(found.model_dump_json(indent=2)) + "\n")
-    say("\n".join((found.describe(), *found.doubts)))
+    say(*found.describe().split("\n"), *found.doubts)
     if as_json:
         say(as_json)
 

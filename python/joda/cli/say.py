@@ -3,12 +3,13 @@
 import sys
 from typing import Any
 
-from joda.plain import one_line, plain
+from joda.plain import line, one_line
 
 
-def say(what: Any) -> None:
-    """Prints a text, or what can be one, at once: nothing in it acts on the terminal."""
-    print(plain(str(what)), flush=True)
+def say(*lines: Any) -> None:
+    """Prints texts, or what can be one, a line each: nothing in them acts on the terminal."""
+    for what in lines:
+        print(line(str(what)), flush=True)
 
 
 def complain(sentence: str) -> None:

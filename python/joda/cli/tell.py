@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def print_json(value: Any) -> None:
     """The value as indented JSON."""
-    say(json.dumps(value, indent=2, ensure_ascii=False))
+    say(*json.dumps(value, indent=2, ensure_ascii=False).split("\n"))
 
 
 def with_text_paths(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -78,7 +78,7 @@ def tell_round(round: "Round") -> None:
     for effect in round.proposal.effect_proposals:
         where = f"{effect.start_ratio:g} to {effect.end_ratio:g}"
         say(f"  - {effect.effect_name}, s = {where}: {effect.reason}")
-    say(textwrap.indent(round.facts, "  "))
+    say(*textwrap.indent(round.facts, "  ").split("\n"))
     for sentence in (*round.unmet, *round.notes):
         say(f"  ! {sentence}")
 
@@ -219,7 +219,7 @@ def tell_checks(checks: "Iterable[Check]") -> None:
 
 def tell_templates(found: "Iterable[Template]") -> None:
     """A paragraph per template, no wider than the terminal."""
-    say("\n\n".join(map(_paragraph, found)))
+    say(*"\n\n".join(map(_paragraph, found)).split("\n"))
 
 
 def _paragraph(template: "Template") -> str:

@@ -11,6 +11,10 @@ from joda.files import read_json
 from joda.plain import plain
 from joda.scenes.contacts import Contact
 
+NO_SIZE = 0.05
+"""Size of an effect, in its standard deviations, up to which it is none; that of one which is seen
+from afar only is a tenth (`joda.diagnosis.uncertainty`)."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -44,6 +48,11 @@ class Finding:
     held_out_error_before: float
     held_out_error_after: float
     indistinguishable_from: tuple[str, ...]
+
+    @property
+    def sized(self) -> bool:
+        """Whether its size is anything but zero."""
+        return abs(self.magnitude) > NO_SIZE * self.magnitude_error
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from joda.diagnosis.asking import asked
 from joda.diagnosis.better import worse
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS
-from joda.diagnosis.plausible import implausible, unseen_place
+from joda.diagnosis.plausible import Needs, implausible, unseen_place
 from joda.diagnosis.reshaping import Likelihood, checked, reshaped
 from joda.measured.errors import Errors, errors
 from joda.measured.gauge import Gauged
@@ -143,9 +143,10 @@ def mend(
         profile = _guessed(train, effect, direction, near)
         tried = list(reshaped(train, held, profile, effect, told)) if profile else []
         most = NEARLY * Likelihood(held).loss(train.profile)
+    needs = Needs(train) if train.runs else None
     reasons = []
     for one in sorted(tried, key=lambda one: one.score):
-        reason = implausible(train, one.profile, effect)
+        reason = implausible(needs, one.profile, effect)
         if not reason and one.unseen >= most:
             reason = NO_LESS
         if not reason:  # replays take longest

@@ -32,21 +32,20 @@ GRID = 201
 """Positions at which a curve's largest value is looked for."""
 
 
-def implausible(measured: Measured, profile: Profile, effect: str | None = None) -> str | None:
+def implausible(needs: "Needs | None", profile: Profile, effect: str | None = None) -> str | None:
     """Why a fitted profile cannot be meant, as a clause; None if it can.
 
     Args:
-        measured: the joint, its profile before, and its runs.
+        needs: what the runs can need of the joint; None where there are none, but only curves.
         profile: the fitted one.
         effect: name of what was added; None: all of the profile counts.
     """
-    if not measured.runs:
+    if needs is None:
         return None
-    needs = Needs(measured)
     force = needs.exerted(of_effect(profile, effect) if effect else profile)
     if force <= EXCESS * needs.force:
         return None
-    unit = measured.profile.joint.force_unit
+    unit = profile.joint.force_unit
     return (
         f"it would exert up to {force:.2g} {unit}, {force / needs.force:.0f} times the "
         f"{needs.force:.2g} {unit} that the runs' accelerations, the inertia, gravity, the "

@@ -43,6 +43,7 @@ GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in bot
 GAUGE_BACK = "Measure the way back too, as slowly."
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
+NO_EFFECT = "Something is missing that no known effect explains."
 
 
 @dataclass(frozen=True)
@@ -105,15 +106,20 @@ def diagnosed(
         return Diagnosed(_said(measured, "adequate", summary, (), None))
     held = Holdout(ranking.asked)
     named = range(min(NAMED, len(ranking.guesses)))
-    findings = tuple(
-        finding(
+    every = {
+        k: finding(
             measured, ranking, held, k, weighed, indistinguishable(ranking, weighed, k, one_way)
         )
         for k in named
         if k == 0 or weighed.probabilities[k] > WORTH_NAMING
-    )
-    profile = ranking.guesses[0].written(ranking.asked.base)
+    }
+    sized = [k for k, one in every.items() if one.sized]
     experiment = _next(measured, ranking, weighed, one_way)
+    if not sized:
+        said = _said(measured, "unexplained", NO_EFFECT, (), experiment)
+        return Diagnosed(said, puzzling=puzzling)
+    findings = tuple(every[k] for k in sized)
+    profile = ranking.guesses[sized[0]].written(ranking.asked.base)
     first = findings[0]
     helps = first.held_out_error_after < first.held_out_error_before
     verdict = weighed.verdict if helps else "unexplained"

@@ -2,6 +2,7 @@
 
 import json
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -162,3 +163,9 @@ def _seal(names: list[str], hidden: list[Hidden], visible: list[float]) -> dict[
     if not seals:
         return {"effect": None}
     return seals[0] | ({"second": seals[1]} if len(seals) > 1 else {})
+
+
+def overlap(one: Sequence[float], other: Sequence[float]) -> float:
+    """Intersection over union of two intervals, 0 to 1."""
+    (a, b), (c, d) = one, other
+    return float(max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c)))

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from joda._context import Context
 from joda.component import Frozen
 from joda.interaction.pulling import Pull, apart, number, pulled
-from joda.interaction.surroundings import Surroundings, told
+from joda.interaction.surroundings import Surroundings, touching
 from joda.joints.rig import rig
+from joda.plain import line
 from joda.profile import Profile
 from joda.scenes.motion import Motion, settle
 
@@ -41,7 +42,7 @@ class Stretch(Frozen):
     Attributes:
         start: interval of normalised positions where it is let go.
         goes: what it then does; blocked where something of the scene is, or is in the way from
-            the closed end.
+            the closed end, or does not let the joint be.
         end: normalised position where it comes to rest, the mean over the stretch.
     """
 
@@ -65,7 +66,7 @@ class Closing(Frozen):
 
 
 class Behaviour(Frozen):
-    """A joint's behaviour: by itself, or in its scene where that touches it.
+    """A joint's behaviour: by itself, or in its scene where more acts on it.
 
     Attributes:
         closed_end: which end counts as closed; the low end where the model does not tell.
@@ -74,7 +75,7 @@ class Behaviour(Frozen):
             moving: detents, balances.
         opening, closing: moved slowly by a hand from the closed end to the other, and back.
         fastest: None where it closes from nowhere by itself.
-        touched: what of the scene touches it, and where; empty if nothing does.
+        touched: what of the scene touches it, and where, or acts on it; empty if nothing does.
     """
 
     closed_end: End
@@ -126,7 +127,7 @@ class Behaviour(Frozen):
                 f"fastest closing by itself: let go at s = {self.fastest.start:.2f}, shut after "
                 f"{self.fastest.seconds:.2f} s with {self.fastest.speed:.3g} {speed}{at_edge}"
             )
-        return "\n".join(lines)
+        return "\n".join(map(line, lines))
 
 
 def behaviour(context: Context, profile: Profile, around: Surroundings | None = None) -> Behaviour:
@@ -135,7 +136,7 @@ def behaviour(context: Context, profile: Profile, around: Surroundings | None = 
     Args:
         context: the joint.
         profile: of that joint.
-        around: what touches it in its scene: then the whole scene is simulated as it is.
+        around: what acts on it in its scene: then the whole scene is simulated as it is.
 
     Returns:
         the facts.
@@ -147,21 +148,26 @@ def behaviour(context: Context, profile: Profile, around: Surroundings | None = 
     lo, hi = context.joint.range
     closed: End = "high_end" if context.closed_end == "high_end" else "low_end"
     shut, open_ = (0.0, 1.0) if closed == "low_end" else (1.0, 0.0)
-    begin = around.reference if around and around.inside(shut) else shut
+
+    def possible(s: float) -> bool:
+        return around is None or around.allows(model, joint, s)
+
+    begin = shut
+    if around and not possible(shut) and abs(around.reference - open_) > AT_END:
+        begin = around.reference
     opening, reached = pulled(model, joint, begin, open_, context)
-    if around:
-        opening = _held(opening, around)
-    if not opening.held_by:
+    if possible(open_) and not (around and not opening.arrived and around.near(opening.at)):
         reached = open_
-    back = reached if abs(reached - shut) > AT_END else open_
-    closing, _ = pulled(model, joint, back, shut, context)
+    opened = abs(reached - shut) > AT_END
+    back = reached if opened else open_
+    closing = pulled(model, joint, back, shut, context)[0] if opened or possible(back) else opening
+    if around:
+        alone = rig(context, profile)
+        opening = _held(opening, around, pulled(alone, 0, begin, open_, context)[0])
+        closing = _held(closing, around, pulled(alone, 0, back, shut, context)[0])
     far = (min(shut, reached), max(shut, reached))
-
-    def free(s: float) -> bool:
-        return around is None or (far[0] <= s <= far[1] and not around.inside(s))
-
     starts = STARTS if around is None else IN_SCENE
-    freely = np.array([free(s) for s in starts])
+    freely = np.array([far[0] <= s <= far[1] and possible(s) for s in starts])
     motions = [
         settle(model, joint, lo + s * (hi - lo), PATIENCE) if own else None
         for s, own in zip(starts, freely, strict=True)
@@ -174,16 +180,24 @@ def behaviour(context: Context, profile: Profile, around: Surroundings | None = 
         let_go=_stretches(starts, rests),
         settles_at=_settles(starts[freely], rests[freely]),
         opening=opening,
-        closing=_held(closing, around) if around else closing,
+        closing=closing,
         fastest=_fastest(starts, motions, rests, closed, context),
-        touched=told(around.contacts) if around else "",
+        touched=around.words if around else "",
     )
 
 
-def _held(way: Pull, around: Surroundings) -> Pull:
-    """The same with what is in the way, where the hand got stuck."""
-    near = () if way.arrived else around.near(way.at)
-    return way.model_copy(update={"held_by": told(near)}) if near else way
+def _held(way: Pull, around: Surroundings, alone: Pull) -> Pull:
+    """The same with what is in the way where the hand got stuck, if it is not the joint itself.
+
+    Args:
+        way: in the scene.
+        around: the scene.
+        alone: the same way of the joint by itself.
+    """
+    if way.arrived:
+        return way
+    near = touching(around.near(way.at))
+    return way.model_copy(update={"held_by": near or (around.acting if alone.arrived else "")})
 
 
 def _snaps(way: Pull) -> str:

@@ -1,4 +1,4 @@
-"""The scene around a joint, where it touches what the joint moves."""
+"""The scene around a joint, where more acts on it than a joint by itself feels."""
 
 import tempfile
 from collections.abc import Sequence
@@ -11,8 +11,11 @@ import numpy as np
 from joda._attach import attach
 from joda.profile import Profile
 from joda.scenes.actuators import acting_on
+from joda.scenes.assembly import put, taut
+from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact, contacts_along
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
+from joda.scenes.motion import at_home
 
 NEAR = 0.02
 """How near a contact (in normalised position) a joint that got stuck there may be."""
@@ -22,19 +25,34 @@ TOLD = 3
 
 @dataclass(frozen=True)
 class Surroundings:
-    """A scene that touches what a joint moves, other than as a stop at an end of its range.
+    """A scene in which more acts on a joint than itself, gravity and stops at its range's ends.
 
     Attributes:
         path: of the model.
         joint: its name or address.
         contacts: over its whole range.
+        besides: tendons, equality constraints and media that act on it.
         reference: its reference position, normalised.
     """
 
     path: Path
     joint: str
     contacts: tuple[Contact, ...]
+    besides: tuple[str, ...]
     reference: float
+
+    @property
+    def words(self) -> str:
+        """What acts on it."""
+        return ", ".join(filter(None, [touching(self.contacts), self.acting]))
+
+    @property
+    def acting(self) -> str:
+        """What acts on it besides contacts; empty if nothing does."""
+        if not self.besides:
+            return ""
+        does = "acts" if len(self.besides) == 1 else "act"
+        return f"{' and '.join(self.besides)} {does} on joint '{self.joint}'"
 
     def scene(self, profile: Profile) -> tuple[mujoco.MjModel, int]:
         """The scene with a profile on the joint, compiled, and the joint's id.
@@ -58,27 +76,37 @@ class Surroundings:
             if one.interval[0] - NEAR <= position <= one.interval[1] + NEAR
         )
 
-    def inside(self, position: float) -> bool:
-        """Whether something presses at a normalised position."""
+    def allows(self, model: mujoco.MjModel, joint: int, position: float) -> bool:
+        """Whether its scene lets the joint be at a normalised position.
+
+        Nothing presses there, what equality constraints couple to it can move along, and tendons
+        reach so far.
+        """
         ends = (one.interval for one in self.contacts if one.presses)
-        return any(a <= position <= b for a, b in ends)
+        if any(a <= position <= b for a, b in ends):
+            return False
+        lo, hi = model.jnt_range[joint]
+        data = at_home(model)
+        there = put(model, data, joint, float(lo + position * (hi - lo)))
+        return there and not taut(model, data, joint)
 
 
 def surroundings(path: Path, joint: str) -> Surroundings | None:
-    """What touches the joint in its scene; None if nothing does. Raises JodaError."""
+    """What acts on the joint in its scene; None if nothing does. Raises JodaError."""
     model = load_model(path)
     number = find_joint(model, joint)
     described = describe_joint(model, number)
     found = contacts_along(model, number, described, described.range)
     felt = tuple(one for one in found if not one.stop)
-    if not felt:
+    besides = acting_besides(model, number)
+    if not felt and not besides:
         return None
     lo, hi = described.range
     reference = float(np.clip((model.qpos0[model.jnt_qposadr[number]] - lo) / (hi - lo), 0, 1))
-    return Surroundings(path, joint_name(model, number), felt, reference)
+    return Surroundings(path, joint_name(model, number), felt, besides, reference)
 
 
-def told(contacts: Sequence[Contact]) -> str:
+def touching(contacts: Sequence[Contact]) -> str:
     """The contacts with the largest forces in words."""
     hardest = sorted(contacts, key=lambda one: -one.force)[:TOLD]
     out = [

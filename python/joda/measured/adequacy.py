@@ -2,7 +2,8 @@
 
 An all-clear is a claim on every run and every segment. It takes three things: each whole run and
 each segment is missed by less than a stated multiple of the noise; the residual force of successive
-windows has no pattern; and there is enough motion for a fault to show.
+windows has no pattern; and there is enough motion for a fault to show. A run where the scene does
+not let the joint be is a fault whatever the replays say.
 """
 
 from dataclasses import dataclass
@@ -45,6 +46,8 @@ class Adequacy:
         pattern: probability that a true model leaves as clear a pattern of residual force (Wald and
             Wolfowitz's runs test and a sign test, Bonferroni-corrected); None with too few windows.
         whole: whether all that acts on the joint in its scene is replayed, and all of the runs.
+        barred: where the scene would not have let the joint, a sentence; empty if nowhere: else the
+            model is beyond the noise however well the rest is replayed.
     """
 
     verdict: Adequate
@@ -52,6 +55,7 @@ class Adequacy:
     segment: Missed | None
     pattern: float | None
     whole: bool
+    barred: str
 
 
 def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
@@ -69,7 +73,9 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     samples = sum(len(run.time) for run in measured.runs)
     complete = len(whole) == len(measured.runs) and bool(pieces)
     verdict: Adequate = "within_noise"
-    if samples < SAMPLES or not found.missed:
+    if measured.barred:
+        verdict = "beyond_noise"
+    elif samples < SAMPLES or not found.missed:
         verdict = "not_enough_data"
     elif any(map(_fault, found.missed)) or (pattern is not None and pattern < CHANCE):
         verdict = "beyond_noise"
@@ -80,7 +86,7 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
         or _moving(measured) < WINDOWS
     ):
         verdict = "not_enough_data"
-    return Adequacy(verdict, run, segment, pattern, measured.whole)
+    return Adequacy(verdict, run, segment, pattern, measured.whole, measured.barred)
 
 
 def _multiple(one: Missed) -> float:

@@ -96,6 +96,8 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
             f"{MULTIPLE:g} times the noise, and the residual force has no pattern; these runs show "
             "no fault of the model."
         )
+    if found.barred:
+        yield f"Beyond the noise: {found.barred[0].lower()}{found.barred[1:]}"
     worst = [one for one in (found.run, found.segment) if one and one.multiple >= MULTIPLE]
     if found.verdict == "not_enough_data" and worst:
         told = ", and ".join(map(_explained, worst))
@@ -114,13 +116,13 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
         )
     elif found.verdict == "beyond_noise" and worst:
         yield f"Beyond the noise: {', and '.join(map(_worst, worst))}."
-    elif found.verdict == "beyond_noise" and found.pattern is not None:
+    elif found.verdict == "beyond_noise" and not found.barred and found.pattern is not None:
         yield (
             f"Small, but not noise: every run and window is missed by less than {MULTIPLE:g} times "
             "the noise, yet the signs of the residual force have a pattern that noise makes in "
             f"{_rarely(found.pattern)}."
         )
-    if found.verdict == "beyond_noise" and not comparison.failing:
+    if found.verdict == "beyond_noise" and not (found.barred or comparison.failing):
         yield "The data do not show where in position, speed, direction, load or time it fails."
 
 
@@ -163,11 +165,12 @@ def _places(comparison: Comparison) -> Iterator[str]:
             "load": f"under a load of {a:.3g} to {b:.3g} {force}",
         }[place.by]
         if place.force is None:
-            how = "in either direction of force, by turns"
+            how = "without a force of one sign"
         else:
             much = "much" if place.force > 0 else "little"
             how = (
                 f"where the model pushes {abs(place.force):.2g} {force} too {much} towards +q in "
                 "the mean"
             )
-        yield f"By {place.by}: {100 * place.share:.0f} % of the error is {where}, {how}."
+        share = f"{100 * place.share:.0f}" if place.share >= 0.01 else "less than 1"
+        yield f"By {place.by}: {share} % of the error is {where}, {how}."

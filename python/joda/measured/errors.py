@@ -72,10 +72,6 @@ class Errors:
     window: float
     noise: float
 
-    def known(self, error: float) -> float | None:
-        """None for what is not a number: there was nothing to replay."""
-        return _known(error)
-
 
 def errors(
     measured: Measured,
@@ -108,7 +104,7 @@ def errors(
             missed.append(Missed(run.name, _multiple(whole, sigma), scatter / sigma))
         missed += [_missed(run, sigma, piece) for piece in pieces]
         reason = _reason(run, whole, pieces) if windows else None
-        rows.append(RunError(run.name, _known(whole), _known(rms(left[-1])), sigma, reason))
+        rows.append(RunError(run.name, known(whole), known(rms(left[-1])), sigma, reason))
     return Errors(
         paths=tuple(paths),
         runs=tuple(rows),
@@ -129,7 +125,8 @@ def _missed(run: Run, sigma: float, window: Window) -> Missed:
     return Missed(run.name, multiple, window.explained / sigma, (float(first), float(last)))
 
 
-def _known(error: float) -> float | None:
+def known(error: float) -> float | None:
+    """None for what is not a number: there was nothing to replay."""
     return error if np.isfinite(error) else None
 
 

@@ -29,6 +29,8 @@ BLIND = 3.0
 not enough to blame the model."""
 SLIGHT = 0.01
 """Mean residual force of a whole run, in units of what acts on it, that is none."""
+CLEAR = 3.0
+"""Standard deviations from which on a mean residual force is not 0."""
 AGREE = 0.8
 """Part of the evidence that must have the sign of the mean force for that force to be told."""
 FORCE = 8
@@ -46,7 +48,7 @@ class Failing:
             or N.
         error: RMS position error of windows there, rad or m.
         force: mean force that the model has too much there, N·m or N; None where it changes its
-            sign there, or is not known.
+            sign there, or cannot be told from 0.
         share: of the sum of squared errors beyond the noise, 0 to 1.
         significant: whether noise alone would hardly ever make such an error.
     """
@@ -179,15 +181,15 @@ def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
         _edges(by, values), values, found, apart=by in ("velocity", "load")
     ):
         rows = found[inside]
-        force, alike = _force(rows[:, 3], rows[:, 4])
-        if by == "direction" and not alike:
+        force = _force(rows[:, 3], rows[:, 4])
+        if by == "direction" and force is None:
             continue  # what changes its sign within a direction is not the direction's
         out.append(
             Failing(
                 by=by,
                 interval=interval,
                 error=float(np.sqrt(np.average(rows[:, 0] ** 2, weights=rows[:, 1]))),
-                force=force if alike else None,
+                force=force,
                 share=float(beyond[inside].sum() / beyond.sum()),
                 significant=True,
             )
@@ -195,16 +197,21 @@ def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
     return out
 
 
-def _force(force: Array, doubt: Array) -> tuple[float, bool]:
-    """Mean residual force, weighted by how well it is known, and whether most have its sign."""
+def _force(force: Array, doubt: Array) -> float | None:
+    """Mean residual force, weighted by how well it is known; None if it may be 0.
+
+    Most of the evidence has its sign, and it is several standard deviations of the mean.
+    """
     known = np.isfinite(force) & np.isfinite(doubt) & (doubt > 0)
     if not known.any():
-        return float("nan"), False
-    force, weight = force[known], (doubt[known] / doubt[known].min()) ** -2.0
+        return None
+    force, least = force[known], doubt[known].min()
+    weight = (doubt[known] / least) ** -2.0
     mean = float(np.average(force, weights=weight))
     evidence = weight * np.abs(force)
     alike = float(evidence[np.sign(force) == np.sign(mean)].sum())
-    return mean, alike >= AGREE * float(evidence.sum())
+    clear = abs(mean) >= CLEAR * least / np.sqrt(float(weight.sum()))
+    return mean if clear and alike >= AGREE * float(evidence.sum()) else None
 
 
 def _edges(by: By, values: Array) -> Array:

@@ -11,10 +11,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from joda._context import Context
 from joda.errors import JodaError
 from joda.measured import smoothing
+from joda.measured.barrier import Barrier
 from joda.measured.runs import LEAST, QuasiStatic, Run, known
-from joda.profile import Joint
+from joda.profile import Joint, Profile
 from joda.scenes.contacts import Contact, contacts_along
 
 Measurement = Run | QuasiStatic
@@ -34,27 +36,36 @@ class Clear:
             NaN there, and it begins and ends outside.
         contacts: found along what they visit.
         notes: what was found and left out, a sentence each.
+        barred: where and in what the joint was measured although the scene would not have let it
+            there, a sentence; empty if that is not so.
     """
 
     measured: list[Measurement]
     contacts: tuple[Contact, ...]
     notes: list[str]
+    barred: str = ""
 
 
 def clear_of_contacts(
-    model: mujoco.MjModel, joint: int, described: Joint, read: Sequence[Measurement]
+    model: mujoco.MjModel,
+    joint: int,
+    found: Context,
+    profile: Profile,
+    read: Sequence[Measurement],
 ) -> Clear:
     """Finds the contacts along the measured path, and leaves out what lies within them.
 
     Args:
         model: the compiled scene.
         joint: its id.
-        described: the joint, with its range.
+        found: the joint.
+        profile: what acts on it by itself, and its range.
         read: runs and curves, whose positions are of this joint.
 
     Raises:
         JodaError: nothing is left.
     """
+    described = profile.joint
     places = np.clip(np.concatenate([one.position for one in read]), *described.range)
     path = float(places.min()), float(places.max())
     contacts = contacts_along(model, joint, described, path)
@@ -74,13 +85,15 @@ def clear_of_contacts(
     if not lost:
         return Clear(list(read), contacts, notes)
     told = _touching(hindering, described)
+    barred = _barred(Barrier(model, joint, found, profile, hindering), read, hindering)
     if not left:
-        raise JodaError(
+        refusal = (
             f"{told}; that is where {_files(read)} lie, and a replay of the joint by itself would "
             f"be another motion; {MEND}."
         )
+        raise JodaError(" ".join(filter(None, [barred, refusal])))
     notes.append(f"{told}; left out there: {', '.join(lost)}. {MEND[0].upper()}{MEND[1:]}.")
-    return Clear(left, contacts, notes)
+    return Clear(left, contacts, [*notes, *filter(None, [barred])], barred)
 
 
 MEND = (
@@ -89,14 +102,43 @@ MEND = (
 )
 
 
+def _barred(barrier: Barrier, read: Sequence[Measurement], contacts: Sequence[Contact]) -> str:
+    """A sentence on where the joint was measured although contacts bar it, or nothing."""
+    counts, pairs = [], {}
+    for one in read:
+        deep = barrier.excludes(one, _room(one))
+        if deep.any():
+            counts.append(f"{deep.sum()} of {len(deep)} samples of {one.name}")
+        for contact in contacts:
+            a, b = contact.path
+            if np.any(deep & (a <= one.position) & (one.position <= b)):
+                pairs[_pair(contact)] = contact
+    if not counts:
+        return ""
+    where = "; ".join(
+        f"{pair} from s = {one.interval[0]:.3f} to {one.interval[1]:.3f}"
+        for pair, one in list(pairs.items())[:TOLD]
+    )
+    return (
+        f"The scene blocks joint '{barrier.joint.name}' where it was measured to move: {where}, "
+        f"and {', '.join(counts)} lie deeper in that than speed and forces can bring it; the scene "
+        "is wrong there, or the position's zero or sign."
+    )
+
+
 def _within(one: Measurement, contacts: Sequence[Contact]) -> NDArray[np.bool_]:
     """Which samples lie in a contact, or reach it before the next one; shape (n,)."""
     position = one.position
-    room = ROOM * smoothing.noise(one.time, position) if isinstance(one, Run) else 0.0
+    room = _room(one)
     steps = np.abs(np.diff(position, prepend=position[:1], append=position[-1:]))
     reach = np.maximum(steps[1:], steps[:-1]) if isinstance(one, Run) else np.zeros(len(position))
     away = [np.maximum(c.path[0] - position, position - c.path[1]) for c in contacts]
     return np.asarray(np.min(away, axis=0) <= np.maximum(room, reach))
+
+
+def _room(one: Measurement) -> float:
+    """How near a contact counts as within it, rad or m."""
+    return ROOM * smoothing.noise(one.time, one.position) if isinstance(one, Run) else 0.0
 
 
 def _without(one: Measurement, inside: NDArray[np.bool_]) -> Measurement | None:

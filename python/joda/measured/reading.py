@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +14,7 @@ from joda.joints.single import Single, single
 from joda.measured import smoothing
 from joda.measured.driven import read_logs
 from joda.measured.gauge import Gauged, gauged
-from joda.measured.obstructed import clear_of_contacts
+from joda.measured.obstructed import Clear, clear_of_contacts
 from joda.measured.replay import Replayer
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow import as_curve
@@ -52,6 +53,7 @@ class Measured:
         notes: what is suspicious about them.
         contacts: of the scene that resist the joint where it was measured.
         whole: whether all that acts on the joint there is replayed, and all of the runs.
+        barred: the note on where the scene would not have let the joint; empty if there is none.
     """
 
     context: Context
@@ -65,6 +67,7 @@ class Measured:
     notes: tuple[str, ...]
     contacts: tuple[Contact, ...]
     whole: bool
+    barred: str
 
     def changed(
         self, profile: Profile | None = None, runs: Sequence[int] | None = None
@@ -151,20 +154,46 @@ def read_measured(
     found = context(source, name)
     bare = Profile(joint=describe_joint(compiled, number))
     profile = whole_profile(compiled, number, profiles_of(spec, compiled).get(name, bare))
-    step = float(compiled.opt.timestep)
     read, unused = read_logs(compiled, number, runs, passive)
-    notes = [*checked(read, found, step), *unused]
-    clear = clear_of_contacts(compiled, number, profile.joint, read)
-    read = clear.measured
-    besides = acting_besides(compiled, number)
-    notes += [*clear.notes, *filter(None, [besides])]
-    timed = tuple(run for run in read if isinstance(run, Run))
+    notes = [*checked(read, found, float(compiled.opt.timestep)), *unused]
+    clear = clear_of_contacts(compiled, number, found, profile, read)
+    notes += clear.notes
+    if besides := acting_besides(compiled, number):
+        notes.append(
+            f"In the scene more acts on joint '{name}' than itself, gravity and contacts: "
+            f"{', '.join(besides)}; a replay of the joint by itself leaves that out."
+        )
+    return taken(compiled, number, found, profile, clear, notes, whole=not besides)
+
+
+def taken(
+    model: mujoco.MjModel,
+    joint: int,
+    found: Context,
+    profile: Profile,
+    clear: Clear,
+    notes: Sequence[str] = (),
+    whole: bool = True,
+) -> Measured:
+    """A joint with measurements that are read, checked, and clear of contacts; raises JodaError.
+
+    Args:
+        model: the compiled scene.
+        joint: its id.
+        found: the joint.
+        profile: all that acts on it (`joda.scenes.native`).
+        clear: the measurements.
+        notes: what is suspicious about them.
+        whole: whether all that acts on the joint, but for contacts, is replayed.
+    """
+    notes, step = list(notes), float(model.opt.timestep)
+    timed = tuple(run for run in clear.measured if isinstance(run, Run))
     usual = smoothing.pooled_noise([(run.time, run.position) for run in timed])
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     sigma = tuple(max(smoothing.noise(run.time, run.position), least) for run in timed)
-    own = single(found, profile, compiled, number)
+    own = single(found, profile, model, joint)
     replayer = Replayer(found, profile, own, step)
-    static = [curve for curve in read if isinstance(curve, QuasiStatic)]
+    static = [curve for curve in clear.measured if isinstance(curve, QuasiStatic)]
     if len(timed) == 1 and (
         slow := as_curve(timed[0], sigma[0], profile, own.inertia, replayer.whole)
     ):
@@ -190,5 +219,6 @@ def read_measured(
         curves=tuple(curves),
         notes=tuple(notes),
         contacts=clear.contacts,
-        whole=not besides and not any(contact.hinders for contact in clear.contacts),
+        whole=whole and not any(contact.hinders for contact in clear.contacts),
+        barred=clear.barred,
     )

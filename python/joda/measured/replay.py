@@ -37,6 +37,8 @@ DENSEST = 50_000
 """Samples of a run from which on only some are looked at for that, their noise averaged."""
 TRIES = 5
 """Replays, each from a better start than the best before, or nearer to it."""
+STUCK = 1e-9
+"""Part of the motion that a force makes of a free joint, squared, below which it makes none."""
 START = 3.0
 """How far a start may be from the measured one, in its standard deviations."""
 FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -62,8 +64,9 @@ class Window:
         samples: indices of the run's samples, shape (n,).
         misfit: predicted minus measured positions, rad or m, shape (n,), from the start that suits
             best within its measurement's error.
-        force: how much force the model has too much on the whole, N·m or N.
-        doubt: its standard deviation from the noise of position and force.
+        force: how much force the model has too much on the whole, N·m or N; 0 where it is unknown.
+        doubt: its standard deviation from the noise of position and force; infinite where a force
+            makes no motion, as the joint sticks.
         scatter: RMS by which errors of the start alone move the replay, rad or m.
         pushed: the same of errors of the recorded force.
     """
@@ -334,11 +337,12 @@ def _fitted(
     start = np.linalg.lstsq(rows[:, :2], -wanted, rcond=None)[0]
     inverse = np.linalg.pinv(rows.T @ rows)
     all_three = -inverse @ rows.T @ wanted
+    moves = float(np.mean(slopes[:, 2] ** 2)) > STUCK
     return start, Window(
         samples=samples,
         misfit=misfit,
-        force=float(-push * all_three[2]),
-        doubt=float(push * np.sqrt(inverse[2, 2])),
+        force=float(-push * all_three[2]) if moves else 0.0,
+        doubt=float(push * np.sqrt(inverse[2, 2])) if moves else np.inf,
         scatter=float(sigma * np.sqrt(np.mean(np.sum(slopes[:, :2] ** 2, axis=1)))),
     )
 

@@ -21,7 +21,7 @@ def timestep_note(measured: Measured, error: float) -> str | None:
         measured: the joint and its runs.
         error: RMS in windows at the scene's timestep, rad or m.
     """
-    if error < BEYOND * rms(np.array(measured.sigma)):
+    if not error >= BEYOND * rms(np.array(measured.sigma)):  # nor if no window was replayed
         return None
     step = measured.timestep / FINER
     finer = Replayer(measured.context, measured.profile, measured.single, step)

@@ -23,7 +23,7 @@ from joda._render import render
 from joda.errors import JodaError
 from joda.files import make_folder, read_text, write_bytes, write_text
 from joda.interaction.behaviour import behaviour
-from joda.interaction.surroundings import surroundings, told
+from joda.interaction.surroundings import surroundings
 from joda.pictures.draw import draw
 from joda.pictures.style import png
 from joda.plain import plain
@@ -74,8 +74,8 @@ class Session:
         self._around = surroundings(self.model, history.joint)
         if self._around:
             self.notes.append(
-                f"In the scene {told(self._around.contacts)}; behaviours are simulated in the "
-                "scene as it is."
+                f"In the scene {self._around.words}; behaviours are simulated in the scene as it "
+                "is."
             )
         self._templates = [self._path(path) for path in history.templates]
         library = read_templates(self._templates)

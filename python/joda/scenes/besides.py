@@ -1,12 +1,9 @@
-"""What acts on a joint in its scene besides its own elements, contacts and actuators.
-
-Replays move the joint by itself, so tendons, equality constraints and a medium are not in them.
-"""
+"""What acts on a joint in its scene besides its own elements, contacts and actuators."""
 
 import mujoco
 import numpy as np
 
-from joda.scenes.model import joint_name, moves_with
+from joda.scenes.model import moves_with
 from joda.scenes.scene import DAMPING_ROW
 
 PLACES = 5
@@ -15,21 +12,19 @@ TINY = 1e-6
 """Friction losses below this only make a row in the solver, as joda's own tendons do."""
 
 
-def acting_besides(model: mujoco.MjModel, joint: int) -> str:
-    """A sentence on what acts on a joint that a replay of the joint alone leaves out, or nothing.
+def acting_besides(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
+    """The tendons, equality constraints and media that act on a joint, by kind and name.
 
     Args:
         model: compiled.
         joint: id of a hinge or slide.
     """
-    what = [*_tendons(model, joint), *_equalities(model, joint)]
-    if model.opt.density > 0 or model.opt.viscosity > 0:
-        what.append("a medium (<option density viscosity wind>)")
-    if not what:
-        return ""
+    moved = _moved_tendons(model, joint)
+    medium = model.opt.density > 0 or model.opt.viscosity > 0
     return (
-        f"In the scene more acts on joint '{joint_name(model, joint)}' than itself, gravity and "
-        f"contacts: {', '.join(what)}; a replay of the joint by itself leaves that out."
+        *(_named("a tendon", model.tendon(k).name) for k in moved if _resists(model, k)),
+        *(_named("an equality", model.equality(k).name) for k in _equalities(model, joint, moved)),
+        *(["a medium (<option density viscosity wind>)"] if medium else []),
     )
 
 
@@ -46,19 +41,19 @@ def _moved_tendons(model: mujoco.MjModel, joint: int) -> list[int]:
     return [int(k) for k in np.flatnonzero(np.ptp(lengths, axis=0) > 1e-9)]
 
 
-def _tendons(model: mujoco.MjModel, joint: int) -> list[str]:
-    out = []
-    for k in _moved_tendons(model, joint):
-        strengths = (model.tendon_stiffness[k], model.tendon_damping[k], model.tendon_armature[k])
-        rubs = model.tendon_frictionloss[k] > TINY
-        if rubs or model.tendon_limited[k] or any(np.any(one != 0) for one in strengths):
-            out.append(_named("tendon", model.tendon(k).name))
-    return out
+def _resists(model: mujoco.MjModel, tendon: int) -> bool:
+    """Whether a tendon has a strength or a limit."""
+    strengths = (model.tendon_stiffness, model.tendon_damping, model.tendon_armature)
+    return bool(
+        model.tendon_frictionloss[tendon] > TINY
+        or model.tendon_limited[tendon]
+        or any(np.any(one[tendon] != 0) for one in strengths)
+    )
 
 
-def _equalities(model: mujoco.MjModel, joint: int) -> list[str]:
+def _equalities(model: mujoco.MjModel, joint: int, tendons: list[int]) -> list[int]:
+    """Active equality constraints on the joint, on what it moves, or on tendons that it moves."""
     moved = moves_with(model, int(model.jnt_bodyid[joint]))
-    tendons = _moved_tendons(model, joint)
     out = []
     for k in range(model.neq):
         ends = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
@@ -73,11 +68,11 @@ def _equalities(model: mujoco.MjModel, joint: int) -> list[str]:
             touches = bool(moved[bodies[0]]) != bool(moved[bodies[1]])
         else:
             touches = False
-        own = model.equality(k).name.startswith(DAMPING_ROW)
-        if touches and model.eq_active0[k] and not own:
-            out.append(_named("equality", model.equality(k).name))
+        if touches and model.eq_active0[k] and DAMPING_ROW not in model.equality(k).name:
+            out.append(k)
     return out
 
 
 def _named(kind: str, name: str) -> str:
-    return f"{kind} '{name}'" if name else f"an {kind}" if kind == "equality" else f"a {kind}"
+    """As "tendon 'band'", or "a tendon" where it has no name."""
+    return f"{kind.split()[1]} '{name}'" if name else kind

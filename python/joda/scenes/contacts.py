@@ -8,6 +8,7 @@ joint, not that two geoms touch: a door that rests in its frame touches it all a
 from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -27,6 +28,8 @@ PACE = 0.1
 """Speed at which it moves meanwhile, ranges per second."""
 FELT = 0.02
 """A contact resists if its force would move the joint by half this share of the range in 1 s."""
+FIRM = 1e-6
+"""Part of its force on the joint that a contact may exert on others without moving them."""
 ALL_ELSE = ("GRAVITY", "ACTUATION", "SPRING", "DAMPER", "FRICTIONLOSS", "LIMIT", "EQUALITY")
 """What acts on a joint besides contacts."""
 END = 0.01
@@ -91,7 +94,7 @@ def contacts_along(
             begin = sweep.edge(pair, positions, first, -1)
             end = sweep.edge(pair, positions, last, 1)
             a, b = (float(np.clip((x - sweep.lo) / sweep.span, 0, 1)) for x in (begin, end))
-            force = max(_largest(look[pair]) for look in looks[first : last + 1])
+            force = max(look[pair].largest for look in looks[first : last + 1])
             out.append(
                 Contact(
                     geom=pair[0],
@@ -107,8 +110,57 @@ def contacts_along(
     return tuple(sorted(out, key=lambda one: (one.interval, one.geom, one.other)))
 
 
-Ways = tuple[float, float]
-"""A contact's force on the joint, N·m or N, while it moves towards +q and towards -q."""
+def pressing(
+    model: mujoco.MjModel,
+    joint: int,
+    described: Joint,
+    contacts: Iterable[Contact],
+    positions: Array,
+) -> Array:
+    """The force with which contacts press on a joint, N·m or N, shape (n,); NaN where it is free.
+
+    Those that push another joint as well, which may give way, count as if they only rubbed: 0.
+
+    Args:
+        model: the compiled scene.
+        joint: its id.
+        described: the joint, with its range.
+        contacts: found along its path.
+        positions: rad or m, shape (n,).
+    """
+    sweep = _Sweep(model, joint, described)
+    pairs = {(one.geom, one.other) for one in contacts if one.presses}
+    out = np.full(len(positions), np.nan)
+    for k, position in enumerate(positions):
+        looked = sweep.look(float(position))
+        felt = [looked[pair] for pair in pairs & looked.keys() if sweep.resists(looked[pair])]
+        if felt:
+            firm = (one for one in felt if one.others < FIRM * one.largest and sweep.presses(one))
+            out[k] = sum(one.mean for one in firm)
+    return out
+
+
+class Felt(NamedTuple):
+    """A contact's generalised force, N·m or N.
+
+    Attributes:
+        up, down: on the joint while it moves towards +q, and towards -q.
+        others: the largest on any other joint.
+    """
+
+    up: float
+    down: float
+    others: float
+
+    @property
+    def largest(self) -> float:
+        """On the joint, in either direction."""
+        return max(abs(self.up), abs(self.down))
+
+    @property
+    def mean(self) -> float:
+        """On the joint at rest, without friction, which is the same in both directions."""
+        return (self.up + self.down) / 2
 
 
 class _Sweep:
@@ -124,7 +176,7 @@ class _Sweep:
         self.qpos, self.dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
         self.moved = moves_with(model, int(model.jnt_bodyid[joint]))[model.geom_bodyid]
         self.felt = FELT * self.span * self._inertia()
-        self._looks: dict[float, dict[Pair, Ways]] = {}
+        self._looks: dict[float, dict[Pair, Felt]] = {}
 
     def _inertia(self) -> float:
         mujoco.mj_fwdPosition(self.model, self.data)
@@ -132,13 +184,13 @@ class _Sweep:
         mujoco.mj_fullM(self.model, self.data, mass)
         return float(mass[self.dof, self.dof])
 
-    def look(self, position: float) -> dict[Pair, Ways]:
+    def look(self, position: float) -> dict[Pair, Felt]:
         """The forces of all contacts of what moves with what does not, at a position."""
         if position not in self._looks:
             self._looks[position] = self._look(position)
         return self._looks[position]
 
-    def _look(self, position: float) -> dict[Pair, Ways]:
+    def _look(self, position: float) -> dict[Pair, Felt]:
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         data.qpos[self.qpos] = position
@@ -151,7 +203,12 @@ class _Sweep:
             data.qvel[self.dof] = sign * PACE * self.span
             mujoco.mj_forwardSkip(model, data, int(mujoco.mjtStage.mjSTAGE_POS), 1)
             forces.append({pair: self._force(own) for pair, own in rows.items()})
-        return {pair: (forces[0][pair], forces[1][pair]) for pair in rows}
+        return {pair: self._felt(forces[0][pair], forces[1][pair]) for pair in rows}
+
+    def _felt(self, up: Array, down: Array) -> Felt:
+        both = np.maximum(np.abs(up), np.abs(down))
+        others = np.delete(both, self.dof).max(initial=0.0)
+        return Felt(float(up[self.dof]), float(down[self.dof]), float(others))
 
     def _rows(self) -> dict[Pair, list[int]]:
         """Solver rows of those contacts."""
@@ -180,23 +237,21 @@ class _Sweep:
             or ("the world" if body == 0 else f"body {body}")
         )
 
-    def _force(self, rows: Sequence[int]) -> float:
-        """The generalised force of solver rows on the joint, N·m or N."""
+    def _force(self, rows: Sequence[int]) -> Array:
+        """The generalised force of solver rows, N·m or N, shape (nv,)."""
         only = np.zeros(self.data.nefc)
         only[list(rows)] = self.data.efc_force[list(rows)]
         out = np.empty(self.model.nv)
         mujoco.mj_mulJacTVec(self.model, self.data, out, only)
-        return float(out[self.dof])
+        return out
 
-    def resists(self, ways: Ways | None) -> bool:
+    def resists(self, felt: Felt | None) -> bool:
         """Whether a joint in motion feels it."""
-        return ways is not None and _largest(ways) > self.felt
+        return felt is not None and felt.largest > self.felt
 
-    def presses(self, ways: Ways | None) -> bool:
-        """Whether the force is more than friction, which is the same in both directions."""
-        return ways is not None and abs(ways[0] + ways[1]) / 2 > max(
-            self.felt, abs(ways[0] - ways[1]) / 4
-        )
+    def presses(self, felt: Felt | None) -> bool:
+        """Whether the force is more than friction."""
+        return felt is not None and abs(felt.mean) > max(self.felt, abs(felt.up - felt.down) / 4)
 
     def edge(self, pair: Pair, positions: Array, sample: int, way: int) -> float:
         """Where a contact begins (way -1) or ends (1) beside a place at which it resists."""
@@ -211,10 +266,6 @@ class _Sweep:
             else:
                 outside = middle
         return inside
-
-
-def _largest(ways: Iterable[float]) -> float:
-    return max(map(abs, ways))
 
 
 def _runs(true: NDArray[np.bool_]) -> list[tuple[int, int]]:

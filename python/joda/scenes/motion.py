@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
+from joda.scenes.assembly import put
 
 Array = NDArray[np.float64]
 Act = Callable[[mujoco.MjData], bool]
@@ -61,6 +62,8 @@ def play(
 ) -> Motion:
     """Simulates the whole scene from rest, the joint at a position, all else at home.
 
+    What equality constraints couple to the joint begins where they hold (`joda.scenes.assembly`).
+
     Args:
         model: the compiled scene.
         joint: its id.
@@ -78,7 +81,7 @@ def play(
     """
     data = at_home(model)
     qpos, dof, step = model.jnt_qposadr[joint], model.jnt_dofadr[joint], model.opt.timestep
-    data.qpos[qpos] = position
+    put(model, data, joint, position)
     steps = None if duration is None else round(duration / (step * stride))
     out: list[tuple[float, float, float, float]] = []
     going = True
@@ -168,10 +171,10 @@ def settle(model: mujoco.MjModel, joint: int, position: float, patience: float) 
     At rest: within a quarter of a second it has moved less than 1e-4 of its range. Raises JodaError
     if the simulation is unstable.
     """
-    data = mujoco.MjData(model)
+    data = at_home(model)
     qpos, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
     span = float(np.ptp(model.jnt_range[joint]))
-    data.qpos[qpos] = position
+    put(model, data, joint, position)
     out = [(0.0, position, 0.0, 0.0)]
     pause = max(round(0.25 / model.opt.timestep), 1)
     stride = max(pause // 25, 1)

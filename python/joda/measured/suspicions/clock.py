@@ -27,10 +27,11 @@ def wrong_clock(run: Run) -> str:
     intervals = np.diff(run.time)
     usual = float(np.median(intervals))
     if usual > FARTHEST:
-        if np.all(intervals == 1):
+        if usual == 1 and np.all(intervals == np.round(intervals)):
+            mostly = "" if np.all(intervals == 1) else "mostly "
             return (
-                f"{_from_to(run)} in steps of 1, as if it counted samples; multiply it by the "
-                "seconds between two samples"
+                f"{_from_to(run)} {mostly}in steps of 1, as if it counted samples or frames; "
+                "divide it by the sampling rate in Hz"
             )
         return (
             f"{_from_to(run)} in steps of {usual:.4g}: too far apart for seconds, as nothing would "

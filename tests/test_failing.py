@@ -1,0 +1,77 @@
+"""Where a model fails: which force is blamed, and when none is."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scenes import write
+from test_scene_contacts import pushed
+
+from joda import compare
+from joda.measured.comparison import _places
+from joda.measured.failing import COLUMNS, Failing, failing
+from joda.measured.reading import read_measured
+from joda.measured.runs import read_run
+
+STICKS = """<mujoco><compiler angle="radian"/><option timestep=".002"/><worldbody><body>
+  <joint name="lid" axis="0 1 0" range="-1 1" stiffness="{spring}" springref="{rest}"
+    frictionloss="{friction}"/>
+  <geom type="box" size=".2 .1 .01" mass="{mass}"/>
+</body></worldbody></mujoco>"""
+
+
+def sentence(share):
+    place = Failing("load", (0.0, 1.0), 1e-3, 0.2, share, True)
+    return " ".join(_places(SimpleNamespace(failing=(place,), unit="rad")))
+
+
+def rows(force, doubt, ways=(1.0, -1.0), count=60):
+    """Windows missed by ten times a noise of 1 that may blame such a force."""
+    out = np.zeros((count, COLUMNS))
+    out[:, 0] = np.linspace(0.05, 0.95, count)
+    out[:, 1] = np.resize(ways, count)
+    out[:, 2] = out[:, 1] / 2
+    out[:, 3] = np.arange(count)
+    out[:, 5:8] = 10.0, 40, 4000.0
+    out[:, 8], out[:, 9] = force, doubt
+    return out
+
+
+@pytest.mark.parametrize(
+    ("force", "doubt", "blamed"),
+    [
+        (0.7, 0.02, 0.7),
+        (2e-16, 3e-3, None),
+        (-4e-13, 1e-6, None),
+        (0.004, 0.02, None),  # sixty of them: 1.5 standard deviations of the mean
+        (-0.05, 0.02, -0.05),
+        (0.0, np.inf, None),
+    ],
+)
+def test_a_force_that_may_be_none_is_not_blamed(force, doubt, blamed):
+    found = failing(rows(force, doubt))
+    assert found and all(place.force == pytest.approx(blamed) for place in found)
+    assert ("direction" in {place.by for place in found}) == (blamed is not None)
+
+
+@pytest.mark.parametrize(
+    ("friction", "spring", "rest", "mass"), [(0.3, 2, 0.1, 1.0), (1.2, 20, -0.3, 4.0)]
+)
+def test_noise_free_runs_that_stick_blame_no_tiny_force(friction, spring, rest, mass, tmp_path):
+    text = STICKS.format(friction=friction, spring=spring, rest=rest, mass=mass)
+    path = write(tmp_path, text, "model.xml")
+    runs = [
+        pushed(text, "lid", lambda t: 0.0, tmp_path, f"{k}.csv", 2.0, start, noise=0.0)
+        for k, start in enumerate((rest, -0.6, 0.8))
+    ]
+    found = compare(path, "lid", runs)
+    blamed = [abs(place.force) for place in found.failing if place.force is not None]
+    assert not blamed or min(blamed) > 1e-3 * friction
+    measured = read_measured(path, "lid", [runs[0]])
+    (window, *_) = measured.replayer.windows(read_run(runs[0]), measured.sigma[0])
+    assert window.force == 0.0 and np.isinf(window.doubt)  # friction holds it at rest
+
+
+def test_a_small_share_is_no_bare_zero():
+    assert "By load: less than 1 % of the error is under" in sentence(share=0.003)
+    assert "By load: 3 % of the error is under" in sentence(share=0.03)
