@@ -16,9 +16,9 @@ from joda.hidden.die import Die, Hidden
 from joda.hidden.families import FAMILIES
 from joda.hidden.family import Family
 from joda.hidden.joint import base_model
-from joda.hidden.laws import Array, Law
+from joda.hidden.laws import Array, Law, Tilt
 from joda.hidden.measuring import Encoder, measure, shows
-from joda.hidden.truth import Truth
+from joda.hidden.truth import Joint, Truth
 from joda.measured.runs import Run, write_run
 
 FAMILY = "laboratory"
@@ -40,6 +40,8 @@ PARTIAL = {
     "constant_damping_hinge": "position_dependent_damping",
 }
 """What it is called below."""
+CONSTANT = ("constant_negative_conservative_hinge", "constant_positive_conservative_hinge")
+"""Forces towards the low and the high end."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Case:
         train, held_out: measured runs, of the same kinds.
         held_out_clean: those held out, without noise.
         seal: what is hidden: effect (None for nothing), interval, direction, magnitude, unit,
-            visible, in_catalogue, and under `second` the same of a second effect.
+            visible, in_catalogue, also_right (names of laws that are the same here), and under
+            `second` the same of a second effect.
         noise: standard deviation of the encoder, rad or m.
         quantised: whether its error is that of steps, sqrt(12) times as large, and not Gaussian.
         visible: how far the effect moves the joint, in standard deviations of the encoder.
@@ -162,7 +165,7 @@ def _attempt(
         train,
         held_out,
         clean,
-        _seal(of, names, hidden, visible),
+        _seal(of, bare.joint, names, hidden, visible),
         encoder.sigma,
         encoder.quantised,
         min(visible, default=np.inf),
@@ -178,7 +181,7 @@ def _laws(hidden: list[Hidden]) -> tuple[Law, ...]:
 
 
 def _seal(
-    of: Family, names: list[str], hidden: list[Hidden], visible: list[float]
+    of: Family, joint: Joint, names: list[str], hidden: list[Hidden], visible: list[float]
 ) -> dict[str, Any]:
     seals: list[dict[str, Any]] = [
         {
@@ -189,6 +192,7 @@ def _seal(
             "unit": one.unit,
             "visible": round(float(seen), 2),
             "in_catalogue": name in of.known,
+            "also_right": _alike(joint, name, one),
         }
         for name, one, seen in zip(names, hidden, visible, strict=True)
     ]
@@ -201,3 +205,12 @@ def _called(name: str, hidden: Hidden) -> str:
     """The effect's name, which for a resistance depends on how far it reaches."""
     a, b = hidden.interval
     return PARTIAL.get(name, name) if b - a < WHOLE else name
+
+
+def _alike(joint: Joint, name: str, hidden: Hidden) -> list[str]:
+    """Names of the same law: a weight more on a slide is a constant force in all of the range."""
+    if joint.kind == "hinge" or hidden.interval != (0.0, 1.0):
+        return []
+    if name == "gravity_offset":
+        return [CONSTANT[law.constant > 0] for law in hidden.laws if isinstance(law, Tilt)]
+    return ["gravity_offset"] if name in CONSTANT else []
