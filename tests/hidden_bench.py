@@ -64,7 +64,7 @@ def examined(job: Job) -> dict:
         row |= said(train, job.exclude)
         if job.group == "families":
             row |= unseen(row, case, train, held_out)
-        if job.group == "none":
+        if job.group == "none" and job.family == FAMILY:
             row["floor"] = floor_of(case, held_out)
         if job.wrong:
             row |= added(job, row, case, train, held_out)
@@ -183,6 +183,8 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
+    if args.family != FAMILY and {"add", "two"} & set(NEEDS[args.line]):
+        parser.error(f"{args.line} needs the true joint as a profile, which only {FAMILY} has")
     path = args.out or Path(tempfile.gettempdir()) / f"hidden_bench_{args.seed}.jsonl"
     print(f"master seed {args.seed}, rows in {path}\n", flush=True)
     jobs = [

@@ -4,9 +4,12 @@ import hashlib
 
 import numpy as np
 import pytest
+from hidden_cases import read
+from hidden_model import true_profile
 
 import joda
 from joda import JodaError
+from joda.diagnosis.mending import error
 from joda.hidden import EFFECTS, FAMILIES, draw, memory, rubbing, shapes, write
 from joda.hidden.cases import PARTIAL, VISIBLE
 from joda.hidden.drag import Orifice
@@ -95,6 +98,15 @@ def test_the_true_joint_misses_a_quiet_run_by_the_noise():
     assert case.achievable.together >= 0.9 * case.noise
     assert len(case.achievable.runs) == len(case.held_out)
     assert case.achievable is case.achievable
+
+
+@pytest.mark.parametrize(("family", "seed"), [("household", 1), ("switches", 1), ("machinery", 2)])
+def test_in_mujoco_the_true_numbers_move_as_in_the_simulator(family, seed):
+    """Masses, return springs and stops of the base model against the simulator's."""
+    case = draw(seed, None, family=family)
+    _, held_out = read(case)
+    true = true_profile(case, held_out.profile)
+    assert error(held_out, true).whole < 1.5 * case.achievable.together
 
 
 def test_mistakes_are_named():

@@ -31,7 +31,7 @@ def _truth(rng: np.random.Generator, names: Sequence[str], forced: bool) -> Trut
     weighty = any(name in WEIGHTY for name in names)
     kind = rng.choice(["lid"] if weighty else ["door", "lid", "drawer"])
     joint = {"door": _door, "lid": _lid, "drawer": _drawer}[kind](rng)
-    return furnish(rng, joint, names, (25.0, 150.0))
+    return furnish(rng, joint, names, (50.0, 150.0))
 
 
 def _door(rng: np.random.Generator) -> Joint:

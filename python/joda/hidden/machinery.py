@@ -31,7 +31,7 @@ def _truth(rng: np.random.Generator, names: Sequence[str], forced: bool) -> Trut
     weighty = not forced and any(name in WEIGHTY for name in names)
     kind = rng.choice(["arm"] if weighty else ["stage", "arm", "table"])
     joint = _stage(rng) if kind == "stage" else _turning(rng, kind == "arm")
-    return furnish(rng, joint, names, (40.0, 200.0))
+    return furnish(rng, joint, names, (60.0, 200.0))
 
 
 def _stage(rng: np.random.Generator) -> Joint:

@@ -13,6 +13,11 @@ RUBBING = ("presliding_friction", "stribeck_friction", "backlash")
 BOUNCING = "end_stop_restitution"
 PULLING = ("spring", "constant_p", "constant_n", "gravity")
 """How effects begin that a return spring of the base may be taken for."""
+LIVELY = (50.0, 70.0)
+"""Least and greatest frequency on a stop that throws back as the base model knows, rad per natural
+time: a base model's steps are too long for harder ones."""
+HARDEST = 150.0
+"""Greatest frequency on a base model's stop, for the same reason."""
 SLOW = 0.4
 """Natural time of a joint from which on MuJoCo's default stop makes sense, s."""
 
@@ -46,12 +51,12 @@ def furnish(
     if absent == "damping":
         viscous = 0.0
     wrong = 1 + rng.choice([-1.0, 1.0], 2) * rng.uniform(0.1, 0.4, 2)
-    common = pick(rng, *stops) / joint.time
-    ratio = 1.0
-    if BOUNCING not in names and rng.random() < 0.2:
-        ratio = damping_ratio(rng.uniform(0.3, 0.6))
+    common, ratio = pick(rng, *stops) / joint.time, 1.0
+    if BOUNCING not in names and rng.random() < 0.1:
+        common, ratio = pick(rng, *LIVELY) / joint.time, damping_ratio(rng.uniform(0.25, 0.45))
     low, high = (buffer(joint.inertia, common * rng.uniform(0.7, 1.4), ratio) for _ in range(2))
-    believed: tuple[float, float] | None = (1 / (ratio * common * pick(rng, 0.4, 2.5)), ratio)
+    stiffer = min(common * pick(rng, 0.5, 2.0), HARDEST / joint.time)
+    believed: tuple[float, float] | None = (1 / (ratio * stiffer), ratio)
     if ratio == 1 and joint.time > SLOW and rng.random() < 0.4:
         believed = None
     spring = (0.0, 0.0)

@@ -31,7 +31,7 @@ def _truth(rng: np.random.Generator, names: Sequence[str], forced: bool) -> Trut
     weighty = not forced and any(name in WEIGHTY for name in names)
     kind = rng.choice(["button"] if weighty else ["button", "key", "knob"])
     joint = _button(rng, weighty) if kind == "button" else _turning(rng, kind == "knob")
-    return furnish(rng, joint, names, (50.0, 150.0), sprung=0.5)
+    return furnish(rng, joint, names, (90.0, 160.0), sprung=0.5)
 
 
 def _button(rng: np.random.Generator, weighty: bool) -> Joint:
