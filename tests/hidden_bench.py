@@ -4,11 +4,14 @@ simulator.
 python tests/hidden_bench.py                        every line, a table at the end; hours
 python tests/hidden_bench.py forced --cases 50      one line
 python tests/hidden_bench.py forced --seed 7 --out forced.jsonl    goes on where it was stopped
+python tests/hidden_bench.py families --family all --cases 2       every effect of every family
 
 Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
-all. `cover`: whether the true size and place lie within what is said, where only the true effect is
-asked for. `sure`: forced and free, the same and how sure the answers are. Every run draws a new
-master seed, from which all cases follow.
+families, all. `cover`: whether the true size and place lie within what is said, where only the true
+effect is asked for. `sure`: forced and free, the same and how sure the answers are. `families`:
+nothing, every effect with force and by positions only, and laws of no catalogue, so many cases of
+each; a table family by effect, and the error on unseen whole runs. Every run draws a new master
+seed, from which all cases follow.
 """
 
 import argparse
@@ -23,20 +26,22 @@ import time
 import traceback
 from pathlib import Path
 
-from hidden_cases import Job, case_of, job_of, read
+from hidden_cases import Job, case_of, job_of, read, spread
+from hidden_families import by_effect
 from hidden_figures import fine, table, told
 from hidden_floor import floor_of
 
 from joda.diagnosis.improving import improved
 from joda.diagnosis.mending import error, mend, parted
 from joda.diagnosis.verdict import diagnosed
-from joda.hidden import Case
+from joda.hidden import FAMILIES, Case
+from joda.hidden.cases import FAMILY
 from joda.measured.reading import Measured
 
 CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
-CASES |= {"two": 10, "cover": 96}
-"""Groups of cases, and how many there are unless told."""
-NEEDS = {"all": [group for group in CASES if group not in ("place", "cover")]}
+CASES |= {"two": 10, "cover": 96, "families": 1}
+"""Groups of cases, and how many there are unless told; of `families`, of each effect."""
+NEEDS = {"all": [group for group in CASES if group not in ("place", "cover", "families")]}
 NEEDS |= {"sure": ["forced", "free"]}
 NEEDS |= {"confident": ["none", "forced", "free", "hard", "outside"]}
 NEEDS |= {"rose": ["add"], "time": ["add"]} | {group: [group] for group in CASES}
@@ -51,11 +56,15 @@ def examined(job: Job) -> dict:
         case = case_of(job)
         row |= {"seed": case.seed, "visible": min(case.visible, 1e6), "noise": case.noise}
         row |= {"seal": case.seal, "samples": sum(len(run.time) for run in case.train)}
+        row["effect"] = case.seal["effect"]
         train, held_out = read(case)
         if job.second:
+            row["second"] = case.seal["second"]["effect"]
             return row | both(case, train, held_out)
         row |= said(train, job.exclude)
-        if job.group == "none":
+        if job.group == "families":
+            row |= unseen(row, case, train, held_out)
+        if job.group == "none" and job.family == FAMILY:
             row["floor"] = floor_of(case, held_out)
         if job.wrong:
             row |= added(job, row, case, train, held_out)
@@ -94,6 +103,17 @@ def added(job: Job, row: dict, case: Case, train: Measured, held_out: Measured) 
     return out
 
 
+def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
+    """Errors on unseen whole runs, of what the true joint misses; after adding what was named."""
+    before = after = error(held_out).whole
+    if row["verdict"] == "missing_effect":
+        first = row["named"][0]
+        mended = mend(*parted(train), first["effect"], first["direction"], first["interval"])
+        after = error(held_out, mended.profile).whole if mended.effect else before
+    least = case.achievable.together
+    return {"unseen_before": before / least, "unseen": after / least}
+
+
 def both(case: Case, train: Measured, held_out: Measured) -> dict:
     """What improve adds to a joint that hides two effects."""
     begun = time.perf_counter()
@@ -120,17 +140,22 @@ def begin(numbers) -> None:
 
 def rows_of(path: Path, jobs: list[Job]) -> list[dict]:
     """What is there of some jobs already."""
-    wanted = {(job.master, job.group, job.number) for job in jobs}
+    wanted = {(job.master, *place(vars(job))) for job in jobs}
     lines = path.read_text().splitlines() if path.exists() else []
     rows = [json.loads(line) for line in lines if line.endswith("}")]
-    return [row for row in rows if (row["master"], row["group"], row["number"]) in wanted]
+    return [row for row in rows if (row["master"], *place(row)) in wanted]
+
+
+def place(row: dict) -> tuple[str, str, int]:
+    """Which of a master seed's cases it is."""
+    return row.get("family", FAMILY), row["group"], row["number"]
 
 
 def bench(jobs: list[Job], workers: int, path: Path) -> list[dict]:
     """Rows of all jobs; each is written as soon as it is there."""
     rows = rows_of(path, jobs)
-    there = {(row["group"], row["number"]) for row in rows}
-    left = [job for job in jobs if (job.group, job.number) not in there]
+    there = {place(row) for row in rows}
+    left = [job for job in jobs if place(vars(job)) not in there]
     os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
     context = multiprocessing.get_context("spawn")
     numbers = context.Queue()
@@ -152,16 +177,32 @@ def bench(jobs: list[Job], workers: int, path: Path) -> list[dict]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("line", nargs="?", default="all", choices=NEEDS)
-    parser.add_argument("--cases", type=int, help="of each group")
+    parser.add_argument("--family", default=FAMILY, choices=[*FAMILIES, "all"])
+    parser.add_argument("--cases", type=int, help="of each group; of `families`, of each effect")
     parser.add_argument("--seed", type=int, default=secrets.randbits(32))
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
+    if args.family != FAMILY and {"add", "two"} & set(NEEDS[args.line]):
+        parser.error(f"{args.line} needs the true joint as a profile, which only {FAMILY} has")
     path = args.out or Path(tempfile.gettempdir()) / f"hidden_bench_{args.seed}.jsonl"
     print(f"master seed {args.seed}, rows in {path}\n", flush=True)
-    groups = NEEDS[args.line]
-    jobs = [job_of(args.seed, g, k) for g in groups for k in range(args.cases or CASES[g])]
-    table(bench(jobs, args.workers, path.resolve()))
+    jobs = [
+        job_of(args.seed, group, number, family)
+        for family in (FAMILIES if args.family == "all" else [args.family])
+        for group in NEEDS[args.line]
+        for number in range(count(group, family, args.cases))
+    ]
+    rows = bench(jobs, args.workers, path.resolve())
+    if args.line == "families":
+        by_effect(rows)
+    else:
+        table(rows)
+
+
+def count(group: str, family: str, cases: int | None) -> int:
+    """How many cases a group has."""
+    return (cases or CASES[group]) * (len(spread(family)) if group == "families" else 1)
 
 
 if __name__ == "__main__":

@@ -7,11 +7,10 @@ from zlib import crc32
 
 import numpy as np
 
-from joda.hidden import EFFECTS, OUTSIDE, Case, draw, write
-from joda.hidden.cases import PUSHED, VISIBLE
+from joda.hidden import EFFECTS, FAMILIES, Case, draw, write
+from joda.hidden.cases import FAMILY, PARTIAL, VISIBLE
 from joda.measured.reading import Measured, read_measured
 
-FREE = tuple(name for name in EFFECTS if name not in PUSHED)
 HARD = ("stribeck_friction", "presliding_friction", "backlash")
 BROAD = tuple(n for n in EFFECTS if n.startswith(("constant_p", "constant_n", "spring_return")))
 BOXES = ("detent_internal", "bistable_mechanism_internal")
@@ -20,14 +19,14 @@ RUBS = ("constant_friction_hinge", "position_dependent_friction", "load_dependen
 DRAGS = ("constant_damping_hinge", "position_dependent_damping", "direction_dependent_damping")
 LOCAL = (*BROAD, *BOXES, *ENDS, *RUBS[:2], *DRAGS[:2])
 """Effects that may act in a part of the range only."""
-FAMILIES = (
+KINDS = (
     (*BROAD, "bistable_mechanism", "gravity_offset"),
     (*BOXES, *ENDS),
     (*RUBS, "asymmetric_friction", "stribeck_friction"),
     (*DRAGS, "quadratic_damping"),
     ("added_inertia", "backlash"),
 )
-"""Two effects of one case are of two families: within one, some make up for each other."""
+"""Two effects of one case are of two kinds: within one, some make up for each other."""
 
 CONTAINED = (
     *("constant_friction_hinge", "constant_damping_hinge"),  # in those that differ along the way
@@ -55,38 +54,56 @@ class Job:
     forced: bool = True
     exclude: tuple[str, ...] = ()
     wrong: str | None = None
+    family: str = FAMILY
 
 
 def dice(master: int, *what) -> np.random.Generator:
     return np.random.default_rng([master, crc32(repr(what).encode())])
 
 
-def job_of(master: int, group: str, number: int) -> Job:
+def unforced(family: str) -> tuple[str, ...]:
+    """Effects that positions alone can show."""
+    return tuple(name for name in EFFECTS if name not in FAMILIES[family].pushed)
+
+
+def spread(family: str) -> list[tuple[str | None, bool]]:
+    """What the cases of group `families` hide, in turn, and whether force is recorded."""
+    named: list[tuple[str | None, bool]] = [(name, True) for name in EFFECTS]
+    named += [(name, False) for name in unforced(family)]
+    return [(None, True), (None, False), *named, *((one, True) for one in FAMILIES[family].beyond)]
+
+
+def job_of(master: int, group: str, number: int, family: str = FAMILY) -> Job:
     """The number-th case of a group; effects come in turn, in a new order every round."""
-    rng = dice(master, group, number, "case")
+    whose = () if family == FAMILY else (family,)
+    rng = dice(master, *whose, group, number, "case")
 
     def turn(names: tuple[str, ...], at: int = number) -> str:
         order = dice(master, group, names, at // len(names)).permutation(len(names))
         return names[order[at % len(names)]]
 
-    one = Job(master, group, number, int(rng.integers(2**31)), None)
+    one = Job(master, group, number, int(rng.integers(2**31)), None, family=family)
+    if group == "families":
+        effect, forced = spread(family)[number % len(spread(family))]
+        return replace(one, effect=effect, forced=forced)
     if group == "none":
         return replace(one, forced=number % 2 == 0)
     if group == "free":
-        return replace(one, effect=turn(FREE), forced=False)
+        return replace(one, effect=turn(unforced(family)), forced=False)
     if group == "outside" and number % 2 == 0:
-        return replace(one, effect=turn(OUTSIDE, number // 2))
+        return replace(one, effect=turn(tuple(FAMILIES[family].beyond), number // 2))
     if group == "outside":
         effect = turn(EFFECTS, number // 2)
         return replace(one, effect=effect, exclude=(effect,))
     if group == "cover":
         forced = number // len(EFFECTS) % 2 == 0
         effect = turn(EFFECTS)
-        others = tuple(name for name in EFFECTS if name != effect)
-        return replace(one, effect=effect, exclude=others, forced=forced or effect in PUSHED)
+        others = tuple(name for name in EFFECTS if name not in (effect, PARTIAL.get(effect)))
+        forced |= effect in FAMILIES[family].pushed
+        return replace(one, effect=effect, exclude=others, forced=forced)
     if group == "two":
-        families = rng.choice(len(FAMILIES), 2, replace=False)
-        effect, second = (str(rng.choice(FAMILIES[k])) for k in families)
+        kinds = rng.choice(len(KINDS), 2, replace=False)
+        effect, second = (str(rng.choice(KINDS[k])) for k in kinds)
         return replace(one, effect=effect, second=second)
     effect = turn({"hard": HARD, "place": LOCAL}.get(group, EFFECTS))
     if group == "add":
@@ -98,7 +115,7 @@ def job_of(master: int, group: str, number: int) -> Job:
 def case_of(job: Job) -> Case:
     """Draws again, with the next seed, where the effect hardly shows."""
     for seed in range(job.seed, job.seed + AGAIN):
-        case = draw(seed, job.effect, job.forced, job.second)
+        case = draw(seed, job.effect, job.forced, job.second, job.family)
         if case.visible >= VISIBLE:
             break
     return case

@@ -7,7 +7,7 @@ import numpy as np
 from hidden_cases import CONTAINED, HARD
 from hidden_coverage import coverage, reliability
 
-from joda.hidden.cases import overlap
+from joda.hidden.cases import FAMILY, overlap
 
 SURE = 0.9
 BINS = (0.0, 0.5, 0.7, SURE, 1.0 + 1e-9)
@@ -21,8 +21,16 @@ def first(row: dict) -> dict:
     return (row.get("named") or [none])[0]
 
 
+def hides(row: dict) -> str:
+    """What a diagnosis should say of it: nothing, an effect, or that it is outside."""
+    if row["group"] == "outside" or not row.get("seal", {}).get("in_catalogue", True):
+        return "outside"
+    return "nothing" if row["effect"] is None else "effect"
+
+
 def right(row: dict) -> bool:
-    return first(row)["effect"] == row["effect"]
+    named = {row["effect"], *row.get("seal", {}).get("also_right", ())}
+    return first(row)["effect"] in named
 
 
 def second(row: dict) -> bool:
@@ -47,16 +55,16 @@ def found(row: dict) -> bool:
 
 def misled(row: dict) -> bool:
     """Whether what is named first is wrong."""
-    if row["group"] in ("none", "outside"):
+    if hides(row) != "effect":
         return row["verdict"] == "missing_effect"
     return not right(row)
 
 
 def fine(row: dict) -> bool:
     """Whether a case came out as it should."""
-    if row["group"] == "none":
+    if hides(row) == "nothing":
         return row.get("verdict") == "adequate"
-    if row["group"] == "outside":
+    if hides(row) == "outside":
         return unexplained(row)
     return found(row) if row["second"] else right(row)
 
@@ -164,7 +172,8 @@ def told(row: dict) -> str:
     """One case as a line."""
     hidden = " + ".join(filter(None, (row["effect"], row["second"]))) or "nothing"
     hidden += " (its entry removed)" * bool(row["exclude"]) + ", free" * (not row["forced"])
-    begin = f"{row['group']} {row['number']}, seed {row['seed']}, {hidden}: "
+    case = f"{row.get('family', FAMILY)}, {row['group']} {row['number']}"
+    begin = f"{case}, seed {row['seed']}, {hidden}: "
     if "failed" in row:
         return begin + row["failed"].strip().splitlines()[-1]
     if row["second"]:

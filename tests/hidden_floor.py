@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from joda.diagnosis.mending import error
 from joda.hidden import Case, simulator
+from joda.hidden.handle import Handle
 from joda.hidden.laws import State
 from joda.hidden.truth import Play, Truth
 from joda.measured import smoothing
@@ -19,7 +20,6 @@ from joda.measured.replay import START, TRIES, WINDOW
 
 H = 2e-4
 """Step of the true model's replay, s."""
-HANDLE = simulator._Handle
 
 
 def true_error(case: Case) -> float:
@@ -106,11 +106,11 @@ def _kept(case: Case) -> Iterator[tuple[str | int, np.ndarray]]:
     push, s = np.array(pushes).T, (q - truth.joint.lo) / truth.joint.span
     for number, law in enumerate(truth.hidden):
         if isinstance(law, State):
-            z = [law.start(s[0])]
+            z = [law.start(s[0], v[0])]
             for k in range(len(t) - 1):
                 z.append(law.advance(z[-1], s[k], v[k], H))
             yield number, np.array(z)
-    handle = simulator._Handle(truth, q[0], v[0], H)
+    handle = Handle(truth, q[0], v[0], H)
     if handle.loose:
         out = []
         for k in range(len(t)):
@@ -125,11 +125,11 @@ def _replayed(truth: Truth, forces, q, v, memory) -> np.ndarray:
 
     def started(law, z):
         law = copy(law)
-        object.__setattr__(law, "start", lambda s: z)
+        object.__setattr__(law, "start", lambda s, v: z)
         return law
 
     def handle(*args):
-        one = HANDLE(*args)
+        one = Handle(*args)
         if "side" in memory:
             one.offset, one.side = memory["offset"], memory["side"]
             one.velocity = np.where(one.side != 0, v, memory["velocity"])
@@ -137,7 +137,7 @@ def _replayed(truth: Truth, forces, q, v, memory) -> np.ndarray:
 
     laws = [started(law, memory[k]) if k in memory else law for k, law in enumerate(truth.hidden)]
     own = replace(truth, hidden=tuple(laws))
-    with mock.patch.object(simulator, "_Handle", handle):
+    with mock.patch.object(simulator, "Handle", handle):
         steps = len(forces) - 1
         return simulator.simulate(own, simulator.Tape(forces), q, v, steps, H).position
 

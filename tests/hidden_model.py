@@ -17,7 +17,7 @@ from joda.effects import (
 )
 from joda.hidden import laws, rubbing, truth
 from joda.hidden.cases import Case
-from joda.profile import Channel, Channels, Profile, Resistance
+from joda.profile import Channels, Profile, Resistance
 
 POINTS = 401
 
@@ -36,7 +36,7 @@ def true_profile(case: Case, base: Profile) -> Profile:
     profile = Profile(
         joint=base.joint,
         channels=Channels(
-            conservative=Channel(),
+            conservative=base.channels.conservative,
             **{
                 name: Resistance(components=(_curve((0, 1), np.array([0.0, 1.0]), np.array(size)),))
                 for name, size in flat.items()

@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hidden_bench import said
-from hidden_cases import case_of, dice, job_of, read
+from hidden_cases import case_of, dice, job_of, read, spread
+from hidden_families import by_effect
 from hidden_figures import fine, told
 from hidden_floor import true_error
 from hidden_model import true_profile
 
 from joda.diagnosis.mending import error, mend, parted
-from joda.hidden import EFFECTS, draw
+from joda.hidden import EFFECTS, FAMILIES, draw
 from joda.measured.misfit import rms
 
 RELIABLE = (
@@ -71,6 +72,27 @@ def test_a_master_seed_gives_the_same_jobs_and_every_effect_in_turn():
     assert jobs == [job_of(5, "hard", k) for k in range(9)]
     assert len({job.effect for job in jobs[:3]}) == 3
     assert job_of(6, "hard", 0).seed != jobs[0].seed
+
+
+def test_the_families_line_has_every_effect_of_each_and_is_judged_by_the_seal(capsys):
+    jobs = [job_of(5, "families", k, "switches") for k in range(len(spread("switches")))]
+    hidden = {(job.effect, job.forced) for job in jobs}
+    assert {(name, True) for name in (None, *EFFECTS, *FAMILIES["switches"].beyond)} <= hidden
+    assert ("backlash", False) not in hidden and ("detent_internal", False) in hidden
+    said = {"probability": 0.95, "indistinguishable_from": []}
+    rows = []
+    for job in jobs:
+        known = job.effect in EFFECTS
+        row = vars(job) | {"verdict": "missing_effect" if known else "unexplained", "unseen": 1.2}
+        row |= {"named": [said | {"effect": job.effect}] if known else [], "unseen_before": 9.0}
+        seal = {"in_catalogue": known} if job.effect else {}
+        rows.append(row | {"seal": {"effect": job.effect, **seal}})
+    by_effect(rows)
+    out = capsys.readouterr().out
+    assert "| detent_internal | 1/1, 1/1 |" in out
+    assert "| backlash | 1/1, – |" in out
+    assert "| no catalogue: unexplained | 7/7 |" in out
+    assert "| nothing: adequate | 0/2 |" in out
 
 
 def test_a_curve_gets_as_many_control_points_as_the_data_support():

@@ -95,7 +95,7 @@ def hidden_effect(
         f"{model}: the model, a {case.truth.joint.kind}. {len(runs)} runs to learn from, "
         f"{len(unseen)} to judge by, {'positions only' if position_only else 'with the force'}."
     )
-    truth = f"{named(effect)}, {_where(case.seal)}, {_size(case.seal)}"
+    truth = f"{named(case.seal['effect'])}, {_where(case.seal)}, {_size(case.seal)}"
     say(f"Hidden is {truth}." if reveal else "What is hidden is sealed in sealed.json.")
 
     say("")

@@ -4,5 +4,6 @@ Its laws are analytic, and it shares nothing with MuJoCo, the plugin or the temp
 """
 
 from joda.hidden.cases import EFFECTS, OUTSIDE, Case, draw, write
+from joda.hidden.families import FAMILIES
 
-__all__ = ["EFFECTS", "OUTSIDE", "Case", "draw", "write"]
+__all__ = ["EFFECTS", "FAMILIES", "OUTSIDE", "Case", "draw", "write"]

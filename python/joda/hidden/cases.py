@@ -4,6 +4,7 @@ import json
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,32 +12,39 @@ import numpy as np
 
 from joda.errors import JodaError
 from joda.files import make_folder, write_text
+from joda.hidden.achievable import Achievable, achievable
 from joda.hidden.die import Die, Hidden
-from joda.hidden.joint import base_model, draw_truth
-from joda.hidden.known import KNOWN
-from joda.hidden.laws import Law
-from joda.hidden.measuring import draw_encoder, measure, move, shows
-from joda.hidden.outside import BEYOND
-from joda.hidden.truth import Truth
+from joda.hidden.families import FAMILIES
+from joda.hidden.family import Family
+from joda.hidden.joint import base_model
+from joda.hidden.laws import Array, Law, Tilt
+from joda.hidden.measuring import Encoder, measure, shows
+from joda.hidden.truth import Joint, Truth
 from joda.measured.runs import Run, write_run
 
-EFFECTS = tuple(KNOWN)
-"""Effects that a diagnosis knows by name."""
-OUTSIDE = tuple(BEYOND)
-"""Effects that it does not know."""
-BUILDERS = KNOWN | BEYOND
-
-HEAVY = ("actuation_delay",)
-WEIGHTY = ("load_dependent_friction",)
-RUBBING = ("presliding_friction", "stribeck_friction")
-PUSHED = ("backlash", "actuation_delay")
-"""Effects that need a slow joint; gravity; dry friction of the base; a recorded force."""
+FAMILY = "laboratory"
+EFFECTS = tuple(FAMILIES[FAMILY].known)
+"""Effects that a diagnosis knows by name; every family has all of them."""
+OUTSIDE = tuple(FAMILIES[FAMILY].beyond)
+"""Effects that it does not know, of the first family."""
+PUSHED = FAMILIES[FAMILY].pushed
+"""Effects of the first family that need a recorded force."""
 
 TRIES = 6
 VISIBLE = 5.0
 """How far an effect must move the joint in the upper quartile of windows, in standard deviations
 of the encoder."""
-JOINT = "joint"
+SOFT = 0.08
+"""How far a run may go beyond the range, of the range."""
+WHOLE = 0.8
+"""Part of the range from which on a resistance is called constant and not position-dependent."""
+PARTIAL = {
+    "constant_friction_hinge": "position_dependent_friction",
+    "constant_damping_hinge": "position_dependent_damping",
+}
+"""What it is called below."""
+CONSTANT = ("constant_negative_conservative_hinge", "constant_positive_conservative_hinge")
+"""Forces towards the low and the high end."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +59,15 @@ class Case:
         train, held_out: measured runs, of the same kinds.
         held_out_clean: those held out, without noise.
         seal: what is hidden: effect (None for nothing), interval, direction, magnitude, unit,
-            visible, and under `second` the same of a second effect.
+            visible, in_catalogue, also_right (names of laws that are the same here), and under
+            `second` the same of a second effect.
         noise: standard deviation of the encoder, rad or m.
         quantised: whether its error is that of steps, sqrt(12) times as large, and not Gaussian.
         visible: how far the effect moves the joint, in standard deviations of the encoder.
+        family: that it is of.
+        encoder: how it is measured.
+        step: of the simulation, s.
+        clock: time at which each held-out run begins, s.
     """
 
     seed: int
@@ -68,29 +81,60 @@ class Case:
     noise: float
     quantised: bool
     visible: float
+    family: str
+    encoder: Encoder
+    step: float
+    clock: Array
+
+    @property
+    def within(self) -> bool:
+        """Whether no run goes far beyond the range, as no sensible measurement would."""
+        joint, room = self.truth.joint, SOFT * self.truth.joint.span
+        runs = (*self.train, *self.held_out)
+        return all(
+            run.position.min() > joint.lo - room and run.position.max() < joint.hi + room
+            for run in runs
+        )
+
+    @cached_property
+    def achievable(self) -> Achievable:
+        """What the true joint misses of the held-out runs, replayed whole from a noisy start."""
+        return achievable(self.truth, self.held_out_clean, self.encoder, self.step, self.clock)
 
 
-def draw(seed: int, effect: str | None, forced: bool = True, second: str | None = None) -> Case:
+def draw(
+    seed: int,
+    effect: str | None,
+    forced: bool = True,
+    second: str | None = None,
+    family: str = FAMILY,
+) -> Case:
     """Draws a case; the same arguments give the same case.
 
     Args:
         seed: of all draws.
-        effect: one of EFFECTS or OUTSIDE; None hides nothing.
-        forced: hands move the joint, and the force is recorded; else it is let go or flicked.
+        effect: one of EFFECTS, or beyond them one of the family; None hides nothing.
+        forced: something moves the joint, and the force is recorded; else it is let go or flicked.
         second: another effect.
+        family: one of FAMILIES.
 
     Raises:
-        JodaError: for an effect that there is not, or that needs a recorded force.
+        JodaError: for a family or an effect that there is not, or that needs a recorded force.
     """
+    if family not in FAMILIES:
+        raise JodaError(f"no family '{family}'; there are {', '.join(FAMILIES)}.")
     names = [name for name in (effect, second) if name is not None]
-    _check(names, forced)
+    of = FAMILIES[family]
+    _check(of, names, forced)
     best: Case | None = None
+    what = (names, forced) if family == FAMILY else (family, names, forced)
     for attempt in range(TRIES):
-        key = zlib.crc32(repr((names, forced)).encode())
-        case = _attempt(np.random.default_rng([seed, key, attempt]), seed, names, forced, attempt)
-        if best is None or case.visible > best.visible:
+        key = zlib.crc32(repr(what).encode())
+        rng = np.random.default_rng([seed, key, attempt])
+        case = _attempt(rng, of, seed, names, forced, attempt)
+        if best is None or (case.within, case.visible) > (best.within, best.visible):
             best = case
-        if best.visible >= VISIBLE:
+        if best.within and best.visible >= VISIBLE:
             break
     assert best is not None
     return best
@@ -106,41 +150,42 @@ def write(case: Case, folder: Path) -> None:
     write_text(folder / "sealed.json", json.dumps(seal, indent=1, ensure_ascii=False) + "\n")
 
 
-def _check(names: list[str], forced: bool) -> None:
+def _check(of: Family, names: list[str], forced: bool) -> None:
     for name in names:
-        if name not in BUILDERS:
-            raise JodaError(f"no hidden effect '{name}'; there are {', '.join(BUILDERS)}.")
-        if name in PUSHED and not forced:
+        if name not in of.builders:
+            raise JodaError(f"no hidden effect '{name}'; there are {', '.join(of.builders)}.")
+        if name in of.pushed and not forced:
             raise JodaError(f"{name} does not show without a recorded force; draw it forced.")
 
 
 def _attempt(
-    rng: np.random.Generator, seed: int, names: list[str], forced: bool, attempt: int
+    rng: np.random.Generator, of: Family, seed: int, names: list[str], forced: bool, attempt: int
 ) -> Case:
-    wants = [any(name in group for name in names) for group in (HEAVY, WEIGHTY, RUBBING)]
-    bare = draw_truth(
-        rng, heavy=wants[0], gravity=wants[1] and not forced, friction=wants[2], damping=False
-    )
+    bare = of.draw_truth(rng, names, forced)
     die = Die(rng, bare, attempt / (TRIES - 1))
-    hidden = [BUILDERS[name](die) for name in names]
+    hidden = [of.builders[name](die) for name in names]
     truth = replace(bare, hidden=_laws(hidden))
-    encoder = draw_encoder(rng, bare.joint)
-    motions = move(rng, truth, names, forced)
+    encoder = of.draw_encoder(rng, bare.joint)
+    motions = of.move(rng, truth, names, forced)
     others = [replace(bare, hidden=_laws(hidden[:i] + hidden[i + 1 :])) for i in range(len(names))]
     visible = [shows(other, motions) / encoder.sigma for other in others]
     train, held_out, clean = measure(rng, motions, encoder)
     return Case(
         seed,
-        base_model(bare, JOINT),
-        JOINT,
+        base_model(bare, of.joint),
+        of.joint,
         truth,
         train,
         held_out,
         clean,
-        _seal(names, hidden, visible),
+        _seal(of, bare.joint, names, hidden, visible),
         encoder.sigma,
         encoder.quantised,
         min(visible, default=np.inf),
+        of.name,
+        encoder,
+        motions.h,
+        motions.clock[motions.train :],
     )
 
 
@@ -148,15 +193,19 @@ def _laws(hidden: list[Hidden]) -> tuple[Law, ...]:
     return tuple(law for one in hidden for law in one.laws)
 
 
-def _seal(names: list[str], hidden: list[Hidden], visible: list[float]) -> dict[str, Any]:
+def _seal(
+    of: Family, joint: Joint, names: list[str], hidden: list[Hidden], visible: list[float]
+) -> dict[str, Any]:
     seals: list[dict[str, Any]] = [
         {
-            "effect": name,
+            "effect": _called(name, one),
             "interval": [float(x) for x in one.interval],
             "direction": one.direction,
             "magnitude": float(one.magnitude),
             "unit": one.unit,
             "visible": round(float(seen), 2),
+            "in_catalogue": name in of.known,
+            "also_right": _alike(joint, name, one),
         }
         for name, one, seen in zip(names, hidden, visible, strict=True)
     ]
@@ -169,3 +218,18 @@ def overlap(one: Sequence[float], other: Sequence[float]) -> float:
     """Intersection over union of two intervals, 0 to 1."""
     (a, b), (c, d) = one, other
     return float(max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c)))
+
+
+def _called(name: str, hidden: Hidden) -> str:
+    """The effect's name, which for a resistance depends on how far it reaches."""
+    a, b = hidden.interval
+    return PARTIAL.get(name, name) if b - a < WHOLE else name
+
+
+def _alike(joint: Joint, name: str, hidden: Hidden) -> list[str]:
+    """Names of the same law: a weight more on a slide is a constant force in all of the range."""
+    if joint.kind == "hinge" or hidden.interval != (0.0, 1.0):
+        return []
+    if name == "gravity_offset":
+        return [CONSTANT[law.constant > 0] for law in hidden.laws if isinstance(law, Tilt)]
+    return ["gravity_offset"] if name in CONSTANT else []

@@ -9,6 +9,8 @@ WOOD = 600.0
 """Density of the cube that stands for the part in pictures, kg/m³."""
 TIMESTEP = 0.002
 """Of a base model, s, unless its joint is fast."""
+TIGHT = ' solreffriction="0.002 1" solimpfriction="0.99 0.9999 0.001 0.5 2"'
+"""Of a base model whose dry friction does not creep."""
 STEPS = 700
 """Steps of a base model in its joint's natural time, at least."""
 
@@ -81,14 +83,21 @@ def base_model(truth: Truth, name: str) -> str:
     else:
         axis, inertial, mass = _slide(joint)
     half = 0.5 * (mass / WOOD) ** (1 / 3)
+    stiffness, rest = truth.spring
     native = "".join(
         f' {key}="{value!r}"'
         for key, value in (
             ("damping", truth.damping_model),
             ("frictionloss", truth.friction_model),
+            ("stiffness", stiffness),
+            ("springref", rest),
         )
         if value
     )
+    if truth.limit_model:
+        native += ' solreflimit="{!r} {!r}"'.format(*truth.limit_model)
+    if truth.tight:
+        native += TIGHT
     return f"""<mujoco model="{name}">
   <compiler angle="radian"/>
   <option timestep="{_timestep(joint)!r}" gravity="0 0 -{GRAVITY!r}"/>

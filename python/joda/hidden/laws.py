@@ -4,12 +4,15 @@ Positions are normalised, s = (q - lo) / (hi - lo); speeds, forces and times are
 have shape (lanes,), one lane per motion that is simulated.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Shape = Callable[[Array], Array]
+"""A course over normalised position."""
 
 
 def window(s: Array, a: float, b: float, edge: float) -> Array:
@@ -55,7 +58,7 @@ class Friction(Law):
 class State(Law):
     """A law with a state of its own, z."""
 
-    def start(self, s: Array) -> Array:
+    def start(self, s: Array, v: Array) -> Array:
         """Its state before the motion."""
         return np.zeros_like(s)
 
@@ -186,6 +189,18 @@ class Shaking(Force):
 
 
 @dataclass(frozen=True)
+class Switching(Force):
+    """A force that changes its sign in time; frequency in Hz."""
+
+    size: float
+    frequency: float
+
+    def force(self, s: Array, q: Array, v: Array, t: Array) -> Array:
+        """See Force."""
+        return np.where(np.mod(t * self.frequency, 1.0) < 0.5, self.size, -self.size)
+
+
+@dataclass(frozen=True)
 class Viscous(Force):
     """Damping of a constant size on [a, b]; direction 1 or -1: only while moving that way."""
 
@@ -238,11 +253,25 @@ class Along:
 
 @dataclass(frozen=True)
 class ViscousAlong(Force):
-    """Damping that depends on position."""
+    """Damping that depends on position; direction as in Viscous."""
 
     size: float
-    course: Along
+    course: Shape
+    direction: int = 0
 
     def force(self, s: Array, q: Array, v: Array, t: Array) -> Array:
         """See Force."""
-        return -self.size * v * self.course(s)
+        drag = -self.size * v * self.course(s)
+        return drag * (v * self.direction > 0) if self.direction else drag
+
+
+@dataclass(frozen=True)
+class ForceAlong(Force):
+    """A conservative force."""
+
+    size: float
+    course: Shape
+
+    def force(self, s: Array, q: Array, v: Array, t: Array) -> Array:
+        """See Force."""
+        return self.size * self.course(s)

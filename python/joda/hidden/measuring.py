@@ -1,5 +1,6 @@
 """Motions of a joint in a case, and what an encoder and a force sensor make of them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +36,8 @@ class Motions:
         clock: time at the beginning of each, s.
         train: how many of them are to learn from; the others are held out.
         forced: whether the force is recorded.
+        window: length over which a motion with and without an effect are compared, s.
+        still: velocity up to which it counts as at rest, rad/s or m/s.
     """
 
     trace: Trace
@@ -43,6 +46,8 @@ class Motions:
     clock: Array
     train: int
     forced: bool
+    window: float = WINDOW
+    still: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -54,12 +59,16 @@ class Encoder:
         quantised: whether the error is that of steps of sqrt(12) sigma.
         uneven: whether time stamps are.
         force: noise of the force, of its root mean square.
+        step: of a position that has Gaussian noise before it is rounded, rad or m.
+        rate: samples per second; None for as many as suit the runs' length.
     """
 
     sigma: float
     quantised: bool
     uneven: bool
     force: float
+    step: float = 0.0
+    rate: float | None = None
 
 
 def draw_encoder(rng: np.random.Generator, joint: Joint) -> Encoder:
@@ -72,7 +81,7 @@ def draw_encoder(rng: np.random.Generator, joint: Joint) -> Encoder:
     )
 
 
-def move(rng: np.random.Generator, truth: Truth, names: list[str], forced: bool) -> Motions:
+def move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: bool) -> Motions:
     """Moves the joint as suits the effects of these names."""
     joint = truth.joint
     h = 1e-4 if joint.time < 0.6 else 2e-4
@@ -96,13 +105,13 @@ def move(rng: np.random.Generator, truth: Truth, names: list[str], forced: bool)
     return Motions(trace, h, ends, clock, len(train), forced)
 
 
-def _draws(names: list[str], forced: bool) -> tuple[tuple[Draw, ...], tuple[Draw, ...]]:
+def _draws(names: Sequence[str], forced: bool) -> tuple[tuple[Draw, ...], tuple[Draw, ...]]:
     if forced:
         return KNOCKS if KNOCKING in names else FORCED
     return FLICKS if KNOCKING in names else FREE
 
 
-def _ground(names: list[str], one: Draw) -> Ground:
+def _ground(names: Sequence[str], one: Draw) -> Ground:
     if KNOCKING in names:
         return Ground((0.03, 0.97), (0.0, 0.0))
     if LATE in names:
@@ -119,7 +128,9 @@ def _lanes(trace: Trace) -> list[tuple[Array, Array]]:
     return list(zip(trace.position.T, trace.velocity.T, strict=True))
 
 
-def _end(joint: Joint, lane: tuple[Array, Array], h: float, names: list[str], forced: bool) -> int:
+def _end(
+    joint: Joint, lane: tuple[Array, Array], h: float, names: Sequence[str], forced: bool
+) -> int:
     """Step at which recording ends.
 
     That is where the joint meets an end, unless that is what the effect is about; and, if it is
@@ -144,7 +155,7 @@ def shows(other: Truth, motions: Motions) -> float:
         or m.
     """
     trace, h = motions.trace, motions.h
-    width = min(round(WINDOW / h), round(float(np.median(motions.ends))) - 1)
+    width = min(round(motions.window / h), round(float(np.median(motions.ends))) - 1)
     starts = [
         (lane, k)
         for lane, end in enumerate(motions.ends)
@@ -165,7 +176,8 @@ def shows(other: Truth, motions: Motions) -> float:
     )
     difference = replayed.position - trace.position[steps, lanes]
     rms = np.sqrt(np.mean(difference**2, axis=0))
-    moves = trace.velocity[steps, lanes].any(axis=0) | (rms > 0)
+    moves = (np.abs(trace.velocity[steps, lanes]) > motions.still).any(axis=0)
+    moves |= rms > motions.still * motions.window
     return float(np.quantile(rms[moves], 0.75)) if moves.any() else 0.0
 
 
@@ -175,7 +187,8 @@ def measure(
     """Runs to learn from, those held out, and these without noise."""
     trace, h = motions.trace, motions.h
     steps = len(trace.position)
-    stride = round(float(np.clip(steps * h / 1000, 0.001, 0.005)) / h)
+    period = 1 / encoder.rate if encoder.rate else float(np.clip(steps * h / 1000, 0.001, 0.005))
+    stride = round(period / h)
     clean: list[Run] = []
     for lane, end in enumerate(motions.ends):
         name = f"run{lane + 1}" if lane < motions.train else f"held_out{lane - motions.train + 1}"
@@ -194,16 +207,20 @@ def measure(
                 motions.forced,
             )
         )
-    noisy = [_noisy(rng, run, encoder) for run in clean]
+    noisy = [spoil(rng, run, encoder) for run in clean]
     return noisy[: motions.train], noisy[motions.train :], clean[motions.train :]
 
 
-def _noisy(rng: np.random.Generator, run: Run, encoder: Encoder) -> Run:
+def spoil(rng: np.random.Generator, run: Run, encoder: Encoder) -> Run:
+    """The run as the encoder and a force sensor see it."""
     if encoder.quantised:
         quantum = encoder.sigma * np.sqrt(12)
         position = np.round(run.position / quantum) * quantum
     else:
-        position = run.position + encoder.sigma * rng.standard_normal(len(run.time))
+        noise = np.sqrt(encoder.sigma**2 - encoder.step**2 / 12)
+        position = run.position + noise * rng.standard_normal(len(run.time))
+        if encoder.step:
+            position = np.round(position / encoder.step) * encoder.step
     rms = float(np.sqrt(np.mean(run.force**2)))
     force = run.force + encoder.force * rms * rng.standard_normal(len(run.time))
     return replace(run, position=np.asarray(position), force=force)

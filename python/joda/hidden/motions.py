@@ -59,24 +59,24 @@ class Ground:
 Draw = Callable[[np.random.Generator, Ground, Array], Plan]
 
 
-def hand(pace: float) -> Draw:
+def hand(pace: float, stiffness: tuple[float, float] = (10.0, 20.0)) -> Draw:
     """Goes to and fro between random places; pace in natural times per range."""
 
     def plan(rng: np.random.Generator, ground: Ground, t: Array) -> Plan:
-        places = _places(rng, ground, 40)
+        places = visits(rng, ground, 40)
         lasts = pace * rng.uniform(0.7, 1.4, 39) * np.sqrt(np.abs(np.diff(places)))
-        target = _glide(t, places, lasts, rng.uniform(0, 0.3, 39))
-        return _held(ground, places[0], target, np.zeros_like(t), rng.uniform(10, 20))
+        target = glide(t, places, lasts, rng.uniform(0, 0.3, 39))
+        return held(ground, places[0], target, np.zeros_like(t), rng.uniform(*stiffness))
 
     return plan
 
 
 def ramp(rng: np.random.Generator, ground: Ground, t: Array) -> Plan:
     """A stiff hand goes slowly back and forth, at constant speeds, and dwells."""
-    places = _places(rng, ground, 20)
+    places = visits(rng, ground, 20)
     lasts = np.abs(np.diff(places)) / rng.uniform(0.2, 0.5, 19)
-    target = _straight(t, places, lasts, rng.uniform(0.1, 0.4, 19))
-    return _held(ground, places[0], target, np.zeros_like(t), rng.uniform(30, 50))
+    target = straight(t, places, lasts, rng.uniform(0.1, 0.4, 19))
+    return held(ground, places[0], target, np.zeros_like(t), rng.uniform(30, 50))
 
 
 def reversals(rng: np.random.Generator, ground: Ground, t: Array) -> Plan:
@@ -84,15 +84,15 @@ def reversals(rng: np.random.Generator, ground: Ground, t: Array) -> Plan:
     start = float(rng.uniform(*ground.reach))
     most = np.exp(rng.uniform(np.log(0.25), np.log(0.9)))
     push = most * (t / t[-1]) * np.sin(2 * np.pi * rng.uniform(0.8, 2.0) * t)
-    return _held(ground, start, np.full_like(t, start), push, rng.uniform(4, 8))
+    return held(ground, start, np.full_like(t, start), push, rng.uniform(4, 8))
 
 
 def release(rng: np.random.Generator, ground: Ground, t: Array) -> Plan:
     """Pushes off, lets go on the way, coasts, takes hold again."""
-    places = _places(rng, ground, 40)
+    places = visits(rng, ground, 40)
     lasts = rng.uniform(0.4, 0.8, 39)
     rests = rng.uniform(0.4, 1.0, 39)
-    target = _glide(t, places, lasts, rests)
+    target = glide(t, places, lasts, rests)
     grip = np.ones_like(t)
     moment = 0.0
     for move, rest in zip(lasts, rests, strict=True):
@@ -100,7 +100,7 @@ def release(rng: np.random.Generator, ground: Ground, t: Array) -> Plan:
         gap = np.minimum((t - off) / 0.05, (on - t) / 0.2)
         grip -= np.clip(gap, 0, 1)
         moment += move + rest
-    plan = _held(ground, places[0], target, np.zeros_like(t), rng.uniform(10, 20))
+    plan = held(ground, places[0], target, np.zeros_like(t), rng.uniform(10, 20))
     return replace(plan, grip=grip)
 
 
@@ -172,7 +172,7 @@ class Hands:
         return np.asarray(pull + (self.low * low - self.high * high) * yielding)
 
 
-def _held(ground: Ground, start: float, target: Array, push: Array, stiffness: float) -> Plan:
+def held(ground: Ground, start: float, target: Array, push: Array, stiffness: float) -> Plan:
     """A plan with a hand that never lets go."""
     return Plan(
         (float(start), 0.0),
@@ -184,7 +184,7 @@ def _held(ground: Ground, start: float, target: Array, push: Array, stiffness: f
     )
 
 
-def _places(rng: np.random.Generator, ground: Ground, n: int) -> Array:
+def visits(rng: np.random.Generator, ground: Ground, n: int) -> Array:
     """Random targets, each at least a third of the reach from the one before."""
     low, high = ground.reach
     places = [rng.uniform(low, high)]
@@ -201,13 +201,14 @@ def _knots(places: Array, lasts: Array, dwells: Array) -> tuple[Array, Array]:
     return np.concatenate([[0.0], times]), np.repeat(places, 2)[1:]
 
 
-def _straight(t: Array, places: Array, lasts: Array, dwells: Array) -> Array:
+def straight(t: Array, places: Array, lasts: Array, dwells: Array) -> Array:
+    """Goes from place to place at constant speeds, in given times, and dwells at each."""
     times, knots = _knots(places, lasts, dwells)
     return np.interp(t, times, knots)
 
 
-def _glide(t: Array, places: Array, lasts: Array, dwells: Array) -> Array:
-    """As _straight, with the least jerk (Flash and Hogan, J. Neurosci. 5 (1985) 1688)."""
+def glide(t: Array, places: Array, lasts: Array, dwells: Array) -> Array:
+    """As straight, with the least jerk (Flash and Hogan, J. Neurosci. 5 (1985) 1688)."""
     times, knots = _knots(places, lasts, dwells)
     i = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2)
     u = np.clip((t - times[i]) / (times[i + 1] - times[i]), 0, 1)

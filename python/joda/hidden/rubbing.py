@@ -4,19 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joda.hidden.laws import Along, Array, Friction, window
+from joda.hidden.laws import Array, Friction, Shape, window
 
 
 @dataclass(frozen=True)
 class FrictionAlong(Friction):
-    """Dry friction that depends on position."""
+    """Dry friction that depends on position; direction as in Viscous."""
 
     size: float
-    course: Along
+    course: Shape
+    direction: int = 0
 
     def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
         """See Friction."""
-        return self.size * self.course(s)
+        rub = self.size * self.course(s)
+        return rub * (sign == self.direction) if self.direction else rub
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,32 @@ class Stribeck(Friction):
 
 
 @dataclass(frozen=True)
+class PowerStribeck(Friction):
+    """size exp(-|v / velocity|^exponent) (Bo and Pavelescu, Wear 82 (1982) 277)."""
+
+    size: float
+    velocity: float
+    exponent: float
+
+    def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
+        """See Friction."""
+        return self.size * np.exp(-(np.abs(v / self.velocity) ** self.exponent))
+
+
+@dataclass(frozen=True)
+class RationalStribeck(Friction):
+    """size / (1 + (v / velocity)²) (Hess and Soom, J. Tribol. 112 (1990) 147)."""
+
+    size: float
+    velocity: float
+
+    def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
+        """See Friction."""
+        u = v / self.velocity
+        return self.size / (1 + u * u)
+
+
+@dataclass(frozen=True)
 class Loaded(Friction):
     """coefficient |load|."""
 
@@ -57,6 +85,42 @@ class Loaded(Friction):
     def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
         """See Friction."""
         return self.coefficient * np.abs(load)
+
+
+@dataclass(frozen=True)
+class LoadedContact(Friction):
+    """coefficient reference (|load| / reference)^(2/3), of a round contact under load."""
+
+    coefficient: float
+    reference: float
+
+    def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
+        """See Friction."""
+        return self.coefficient * self.reference * (np.abs(load) / self.reference) ** (2 / 3)
+
+
+@dataclass(frozen=True)
+class LoadedBearing(Friction):
+    """coefficient (sqrt(load² + side²) - side), of a bearing with a force from the side."""
+
+    coefficient: float
+    side: float
+
+    def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
+        """See Friction."""
+        return self.coefficient * (np.hypot(load, self.side) - self.side)
+
+
+@dataclass(frozen=True)
+class Governor(Friction):
+    """Brake shoes that fly out above a velocity, size min((v / velocity)² - 1, 3)."""
+
+    size: float
+    velocity: float
+
+    def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
+        """See Friction."""
+        return self.size * np.clip((v / self.velocity) ** 2 - 1, 0.0, 3.0)
 
 
 @dataclass(frozen=True)

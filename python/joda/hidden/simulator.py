@@ -2,7 +2,8 @@
 
 Explicit midpoint steps of second order. Where the velocity would change its sign within a step the
 joint stops there: it then stays while the net force is within friction, and breaks away in the
-direction of the net force. Ends are rigid, with a coefficient of restitution.
+direction of the net force. Ends are rigid, with a coefficient of restitution, or have stops that
+give way.
 """
 
 from dataclasses import dataclass
@@ -11,8 +12,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.hidden.handle import Handle
 from joda.hidden.laws import Array, Force, Friction, Law, State
-from joda.hidden.truth import RESTITUTION, Bounce, Bristle, Delay, Inertia, Play, Truth
+from joda.hidden.masses import Behind, Linkage
+from joda.hidden.truth import RESTITUTION, Bounce, Delay, Presliding, Truth
 
 Flags = NDArray[np.bool_]
 
@@ -68,8 +71,8 @@ def simulate(
     """
     q, v = np.array(q, dtype=np.float64), np.array(v, dtype=np.float64)
     trace = Trace(*(np.empty((steps + 1, len(q))) for _ in range(3)))
-    stepper = _Stepper(truth, q, h)
-    handle = _Handle(truth, q, v, h)
+    stepper = _Stepper(truth, q, v, h)
+    handle = Handle(truth, q, v, h)
     late = round(sum(law.time for law in truth.hidden if isinstance(law, Delay)) / h)
     time = np.zeros_like(q) if clock is None else clock
     before: Array | None = None
@@ -91,12 +94,6 @@ def simulate(
     return trace
 
 
-def inertia(truth: Truth) -> float:
-    """True inertia, kg·m² or kg, without a handle."""
-    more = sum(law.size for law in truth.hidden if isinstance(law, Inertia))
-    return truth.joint.inertia + more
-
-
 class _Stepper:
     """Steps of the joint itself.
 
@@ -104,18 +101,24 @@ class _Stepper:
         mobility: 1 / inertia.
     """
 
-    def __init__(self, truth: Truth, q: Array, h: float) -> None:
+    def __init__(self, truth: Truth, q: Array, v: Array, h: float) -> None:
         joint, hidden = truth.joint, truth.hidden
         self.joint, self.damping, self.h = joint, truth.damping, h
         self.scale = 1 / joint.span
-        self.mobility: Array | float = 1 / inertia(truth)
+        self.mobility: Array | float = 1 / truth.inertia
         self.forces = [law for law in hidden if isinstance(law, Force)]
         self.frictions = [law for law in hidden if isinstance(law, Friction)]
         self.states = [law for law in hidden if isinstance(law, State)]
-        self.z = [law.start((q - joint.lo) * self.scale) for law in self.states]
-        bristles = any(isinstance(law, Bristle) for law in hidden)
-        self.friction = np.full_like(q, 0.0 if bristles else truth.friction)
+        self.linkages = [law for law in hidden if isinstance(law, Linkage)]
+        self.z = [law.start((q - joint.lo) * self.scale, v) for law in self.states]
+        bristles = any(isinstance(law, Presliding) for law in hidden)
+        behind = [law for law in hidden if isinstance(law, Behind)]
+        dry = truth.friction - sum(law.friction for law in behind)
+        self.damping -= sum(law.damping for law in behind)
+        self.friction = np.full_like(q, 0.0 if bristles else dry)
         self.restitution = _restitution(hidden)
+        self.stops = truth.ends
+        self.stiffness, self.rest = truth.spring
 
     def step(
         self, q: Array, v: Array, now: Array, half: Array, t: Array, mobility: Array | float
@@ -124,6 +127,8 @@ class _Stepper:
         h = self.h
         sign = np.sign(v)
         net, load, s = self._net(q, v, self.z, now, t)
+        joint_mobility = mobility
+        mobility = self._linked(s, joint_mobility)
         still = sign == 0
         resting = bool(np.count_nonzero(still))
         if resting:
@@ -137,6 +142,7 @@ class _Stepper:
         z = [law.advance(x, s, v, 0.5 * h) for law, x in zip(self.states, self.z, strict=True)]
         q_half = q + (0.5 * h) * v
         net, load, s = self._net(q_half, v_half, z, half, t + 0.5 * h)
+        mobility = self._linked(s, joint_mobility)
         limit = self._limit(s, v_half, sign, load, t + 0.5 * h, z)
         a = (net - sign * limit) * mobility
         v_end, q_end = v + h * a, q + h * v_half
@@ -151,7 +157,13 @@ class _Stepper:
             left = h - part
             q_end = np.where(back, q + 0.5 * (v * part + again * left * left), q_end)
             v_end = np.where(back, again * left, v_end)
-        return self._ends(q_end, v_end, a)
+        return (q_end, v_end) if self.stops else self._ends(q_end, v_end, a)
+
+    def _linked(self, s: Array, mobility: Array | float) -> Array | float:
+        """1 / inertia, where the joint's is this, with what moves along by a linkage."""
+        if not self.linkages:
+            return mobility
+        return np.asarray(1 / (1 / mobility + sum(law.inertia(s) for law in self.linkages)))
 
     def _net(
         self, q: Array, v: Array, z: list[Array], push: Array, t: Array
@@ -164,11 +176,25 @@ class _Stepper:
         elif self.joint.gravity_cos or self.joint.gravity_sin:
             load = push + self.joint.gravity_cos * np.cos(q) + self.joint.gravity_sin * np.sin(q)
         net = load - self.damping * v
+        if self.stiffness:
+            net = net - self.stiffness * (q - self.rest)
+        if self.stops:
+            net = net + self._stopping(q, v)
         for force in self.forces:
             net = net + force.force(s, q, v, t)
         for law, x in zip(self.states, z, strict=True):
             net = net + law.force(x, s, v)
         return net, load, s
+
+    def _stopping(self, q: Array, v: Array) -> Array:
+        """Force of the stops."""
+        (low, high), under, over = self.stops, self.joint.lo - q, q - self.joint.hi
+        force = np.zeros_like(q)
+        if np.count_nonzero(pressed := under > 0):
+            force = np.where(pressed, low.push(np.maximum(under, 0.0), -v), force)
+        if np.count_nonzero(pressed := over > 0):
+            force = np.where(pressed, -high.push(np.maximum(over, 0.0), v), force)
+        return force
 
     def _limit(
         self, s: Array, v: Array, sign: Array, load: Array, t: Array, z: list[Array]
@@ -181,7 +207,9 @@ class _Stepper:
         return limit
 
     def _leans(self, q: Array, net: Array) -> Flags:
-        """Whether an end holds the joint."""
+        """Whether a rigid end holds the joint."""
+        if self.stops:
+            return np.zeros(q.shape, dtype=np.bool_)
         low, high = (q <= self.joint.lo) & (net <= 0), (q >= self.joint.hi) & (net >= 0)
         return np.asarray(low | high)
 
@@ -195,59 +223,6 @@ class _Stepper:
         rattle = e * np.abs(v) < 4 * self.h * np.abs(a)
         thrown = np.where(rattle, inside, inside + e * (inside - q))
         return np.where(out, thrown, q), np.where(out, np.where(rattle, 0.0, -e * v), v)
-
-
-class _Handle:
-    """A handle with play.
-
-    Attributes:
-        loose: whether there is one.
-        offset: of the handle from the joint, rad or m.
-        velocity: of the handle.
-        side: at which it touches the part: 1 pushes it up, -1 down, 0 is free.
-    """
-
-    def __init__(self, truth: Truth, q: Array, v: Array, h: float) -> None:
-        plays = [law for law in truth.hidden if isinstance(law, Play)]
-        self.loose = bool(plays)
-        self.h = h
-        self.reach = 0.5 * plays[0].width if plays else 0.0
-        self.inertia = plays[0].inertia if plays else 0.0
-        self.part = inertia(truth)
-        self.offset, self.velocity, self.side = np.zeros_like(q), v.copy(), np.zeros_like(q)
-
-    @property
-    def mobility(self) -> Array:
-        """1 / inertia of the part, with the handle where it touches."""
-        return np.asarray(1 / (self.part + self.inertia * (self.side != 0)))
-
-    def passes(self, push: Array) -> Array:
-        """The push that acts on the part."""
-        return np.asarray(push * (self.side != 0))
-
-    def step(self, old: tuple[Array, Array], new: tuple[Array, Array], push: Array) -> Array:
-        """Moves the handle by a step, and returns the part's velocity after knocks.
-
-        Args:
-            old, new: position and velocity of the part before and after the step.
-            push: on the handle.
-        """
-        h, touches = self.h, self.side != 0
-        v = new[1]
-        contact = push - self.inertia * (v - old[1]) / h
-        speed = np.where(touches, v, self.velocity + h * push / self.inertia)
-        self.side = np.where(contact * self.side < 0, 0.0, self.side)
-        offset = self.offset + 0.5 * h * (self.velocity + speed) - (new[0] - old[0])
-        offset = np.where(touches, self.offset, offset)
-        self.offset = np.minimum(np.maximum(offset, -self.reach), self.reach)
-        side = np.sign(offset)
-        knocks = ~touches & (self.offset != offset) & ((speed - v) * side > 0)
-        if np.count_nonzero(knocks):
-            common = (self.part * v + self.inertia * speed) / (self.part + self.inertia)
-            self.side = np.where(knocks, side, self.side)
-            v, speed = np.where(knocks, common, v), np.where(knocks, common, speed)
-        self.velocity = speed
-        return v
 
 
 def _restitution(hidden: tuple[Law, ...]) -> float:

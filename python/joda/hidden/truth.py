@@ -6,14 +6,20 @@ from typing import Literal, Self
 import numpy as np
 
 from joda.hidden.laws import Array, Law, State
+from joda.hidden.masses import Attached, Behind
+from joda.hidden.stops import Stop
 
 RESTITUTION = 0.135
 """Of the base's ends: exp(-2), as of MuJoCo's limit, critically damped and never pulling."""
 
 
+class Presliding(State):
+    """Friction with a state, in place of the base's dry friction."""
+
+
 @dataclass(frozen=True)
-class Bristle(State):
-    """Dahl's bristle, or LuGre's where damping is not 0; in place of the base's dry friction.
+class Bristle(Presliding):
+    """Dahl's bristle, or LuGre's where damping is not 0.
 
     dz/dt = v - stiffness |v| z / friction; force -stiffness z - damping dz/dt (Canudas de Wit et
     al., IEEE TAC 40 (1995) 419, without its Stribeck term).
@@ -117,6 +123,14 @@ class Bounce(Law):
 
 
 @dataclass(frozen=True)
+class Rebound(Law):
+    """Another stop at the high or the low end."""
+
+    high: bool
+    stop: Stop
+
+
+@dataclass(frozen=True)
 class Play(Law):
     """The force acts on a handle of its own inertia that has play (rad or m, whole width)."""
 
@@ -170,6 +184,11 @@ class Truth:
         damping: true damping of the base, N·m·s/rad or N·s/m.
         hidden: laws that the base model lacks.
         friction_model, damping_model: what the base model believes.
+        stops: at the low and the high end; None for rigid ends.
+        spring: stiffness (N·m/rad or N/m) and position of rest of a return spring, which the base
+            model has.
+        limit_model: the base model's solreflimit; None for MuJoCo's default.
+        tight: whether the base model holds its dry friction tightly.
     """
 
     joint: Joint
@@ -178,7 +197,34 @@ class Truth:
     hidden: tuple[Law, ...] = ()
     friction_model: float = 0.0
     damping_model: float = 0.0
+    stops: tuple[Stop, Stop] | None = None
+    spring: tuple[float, float] = (0.0, 0.0)
+    limit_model: tuple[float, float] | None = None
+    tight: bool = False
 
     def bare(self) -> Self:
         """The same without what is hidden."""
         return replace(self, hidden=())
+
+    @property
+    def inertia(self) -> float:
+        """True inertia, kg·m² or kg, without a handle, and without what is behind a play."""
+        more = sum(law.size for law in self.hidden if isinstance(law, Inertia))
+        less = sum(law.inertia for law in self.hidden if isinstance(law, Behind))
+        return self.joint.inertia + more - less
+
+    @property
+    def ends(self) -> tuple[Stop, ...]:
+        """The stops at the low and the high end, as they truly are; none if these are rigid."""
+        if self.stops is None:
+            return ()
+        found = {law.high: law.stop for law in self.hidden if isinstance(law, Rebound)}
+        return found.get(False, self.stops[0]), found.get(True, self.stops[1])
+
+    @property
+    def fastest(self) -> float:
+        """Frequency on the stiffest of its springs, rad/s, or more."""
+        springs = (*self.ends, *self.hidden)
+        stiffness = max((getattr(spring, "stiffness", 0.0) for spring in springs), default=0.0)
+        masses = [law.inertia for law in self.hidden if isinstance(law, Behind | Attached)]
+        return float(np.sqrt(stiffness / min([self.inertia, *masses])))
