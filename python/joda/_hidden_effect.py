@@ -14,6 +14,7 @@ from joda._diagnose import diagnose
 from joda._diagnose import sentences as of_diagnosis
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import named
+from joda.diagnosis.share import overlap
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied
 from joda.hidden import EFFECTS, draw, write
@@ -192,10 +193,8 @@ def _off(
     out = []
     if one.direction != seal["direction"]:
         out.append(f"the direction is {seal['direction']}, not {one.direction}")
-    (a, b), (c, d) = one.interval, seal["interval"]
-    overlap = max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c))
-    if overlap < PLACED:
-        out.append(f"the places overlap by {100 * overlap:.0f} % only")
+    if (shared := overlap(one.interval, seal["interval"])) < PLACED:
+        out.append(f"the places overlap by {100 * shared:.0f} % only")
     off = abs(one.magnitude - seal["magnitude"])
     if off > one.magnitude_error:
         out.append(

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from joda.diagnosis.ahead import pairs
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.mending import Error, error, mend, parted
+from joda.diagnosis.share import divided
 from joda.diagnosis.verdict import Diagnosed, diagnosed
 from joda.measured.reading import Measured
-from joda.profile import CHANNELS, Channels, Profile
+from joda.profile import Profile
 
 MOST = 5
 """Effects that are added at most."""
@@ -121,7 +122,7 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
     for k, step in enumerate(added if len(added) > 1 else ()):
         told(f"asking again what {step.effect} is")
         others = [one.added for one in added if one is not step]
-        without = _without(added[-1].profile, step.effect or "", begin.profile)
+        without = divided(added[-1].profile, step.effect or "", begin.profile)[1]
         found = diagnosed(_with(parts, without)[0]).diagnosis
         if found.verdict != "missing_effect" or found.effects[0].effect in [
             one.effect for one in added
@@ -150,16 +151,3 @@ def _stairs(
 def _with(parts: Parts, profile: Profile) -> Parts:
     train, held = parts
     return train.changed(profile), held.changed(profile)
-
-
-def _without(profile: Profile, effect: str, begin: Profile) -> Profile:
-    """The profile without an effect, but for what of it was there at the beginning."""
-    channels = {}
-    for name in CHANNELS:
-        channel, before = (getattr(one.channels, name) for one in (profile, begin))
-        there = len(before.components)
-        kept = [c for k, c in enumerate(channel.components) if k < there or c.label != effect]
-        channels[name] = channel.model_copy(update={"components": tuple(kept)})
-    keys = {one.key for one in begin.effects}
-    effects = tuple(one for one in profile.effects if one.effect != effect or one.key in keys)
-    return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})
