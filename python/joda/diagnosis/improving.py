@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 from joda.diagnosis.ahead import pairs
 from joda.diagnosis.findings import Diagnosis, Finding
-from joda.diagnosis.mending import Error, error, mend, parted
+from joda.diagnosis.mending import Error, error, mend
 from joda.diagnosis.share import divided
+from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
 from joda.measured.reading import Measured
 from joda.profile import Profile

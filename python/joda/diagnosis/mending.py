@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.asking import asked
@@ -18,20 +17,18 @@ from joda.diagnosis.judge import BLAS
 from joda.diagnosis.plausible import implausible, unseen_place
 from joda.diagnosis.reshaping import Likelihood, checked, reshaped
 from joda.measured.errors import Errors, errors
-from joda.measured.gauge import Gauged
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.profile import Profile
 
 NEARLY = 0.95
 """Part of the error before, and of the loss, to which an effect must bring runs held out."""
+LIKELIER = 2 * float(np.log(20))
+"""How much less that loss, twice a negative log-likelihood, must be at least: a model that was not
+fitted to data makes them 20 times likelier than the true one does in one of 20 cases at most."""
 NO_LESS = "it does not lower the error on what was held out of the fit"
 STRENGTHS = (1.0, 3.0, 10.0)
 """Of an effect whose place is known: the trials, in units of the usual one."""
-FEWEST = 4
-"""Runs or curves from which every fourth is held out; of fewer, parts of each."""
-STRETCHES, SAMPLES = 40, 4
-"""In how many stretches a curve is cut at most for that, of how many samples at the least."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,8 @@ class Error:
     """How far a model is off.
 
     Attributes:
-        whole: RMS of open-loop replays of whole runs, rad or m; None where there are only curves.
+        whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where there are only
+            curves.
         window: RMS of windows of 0.4 s, rad or m; of curves the force's, N·m or N.
     """
 
@@ -63,41 +61,6 @@ class Mended:
     before: Error
     after: Error
     reason: str | None = None
-
-
-def parted(measured: Measured) -> tuple[Measured, Measured]:
-    """What to fit, and what is held out: every fourth run, or of few runs each one's last quarter.
-
-    Where there are only curves: every fourth, or of few curves every fourth stretch of each, as
-    what acts on a part of the range is at one place of a curve.
-    """
-    if not measured.runs:
-        return _parted_curves(measured)
-    count = len(measured.runs)
-    if count >= FEWEST:
-        held = list(range(3, count, 4))
-        kept = [k for k in range(count) if k not in held]
-        return measured.changed(runs=kept), measured.changed(runs=held)
-    cuts = [3 * len(run.time) // 4 for run in measured.runs]
-    first = tuple(run.part(slice(0, at)) for run, at in zip(measured.runs, cuts, strict=True))
-    last = tuple(run.part(slice(at, None)) for run, at in zip(measured.runs, cuts, strict=True))
-    return measured.with_runs(first), measured.with_runs(last)
-
-
-def _parted_curves(measured: Measured) -> tuple[Measured, Measured]:
-    curves, ways = measured.curves, (False, True)
-    if len(curves) >= FEWEST:
-        parts = [[one for k, one in enumerate(curves) if (k % 4 == 3) == way] for way in ways]
-    else:
-        parts = [[one.part(_held(one) == way) for one in curves] for way in ways]
-    return measured.with_curves(parts[0]), measured.with_curves(parts[1])
-
-
-def _held(curve: Gauged) -> NDArray[np.bool_]:
-    """Which samples of a curve are held out, shape (n,)."""
-    n = len(curve.direction)
-    stretch = np.arange(n) * min(STRETCHES, max(n // SAMPLES, FEWEST)) // n
-    return np.asarray(stretch % 4 == 2)
 
 
 def error(measured: Measured, profile: Profile | None = None) -> Error:
@@ -142,7 +105,8 @@ def mend(
     with threadpool_limits(1, BLAS):
         profile = _guessed(train, effect, direction, near)
         tried = list(reshaped(train, held, profile, effect, told)) if profile else []
-        most = NEARLY * Likelihood(held).loss(train.profile)
+        loss = Likelihood(held).loss(train.profile)
+        most = min(NEARLY * loss, loss - LIKELIER)
     reasons = []
     for one in sorted(tried, key=lambda one: one.score):
         reason = implausible(train, one.profile, effect)
