@@ -40,6 +40,8 @@ class Added:
         unit: of the errors and the noise: rad or m; N·m or N where there are only curves.
         held_out: what was held out, in words.
         blocks: whether that are blocks of runs, not whole runs.
+        departures: where what was added is not what the model gave or where it was diagnosed, in
+            sentences.
         changes: a line per changed component.
         notes: what the user should be told, a sentence each.
     """
@@ -56,6 +58,7 @@ class Added:
     unit: str
     held_out: str
     blocks: bool
+    departures: tuple[str, ...]
     changes: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -136,6 +139,7 @@ def add(
         unit=held.unit,
         held_out=held_out(measured, held),
         blocks=in_blocks(measured, held),
+        departures=mended.departs.sentences,
         changes=tuple(changes(measured.profile, mended.profile)),
         notes=(*measured.notes, *notes),
     )
@@ -155,7 +159,7 @@ def sentences(added: Added) -> list[str]:
             "Nothing was written."
         ]
     told = parting(added.after, added.noise_floor, added.blocks) if added.added else []
-    return [*out, *told, *added.changes, *added.notes]
+    return [*out, *told, *added.departures, *added.changes, *added.notes]
 
 
 def _chosen(

@@ -38,6 +38,8 @@ class Improved:
         unit: of the errors and the noise: rad or m; N·m or N where there are only curves.
         held_out: what was held out of all fits, in words.
         blocks: whether that are blocks of runs, not whole runs.
+        departures: where the last profile is not what the model gave, and effects act elsewhere
+            than where they were diagnosed, in sentences.
         changes: a line per changed component, of the last profile against the first.
         notes: what the user should be told, a sentence each.
     """
@@ -52,6 +54,7 @@ class Improved:
     unit: str
     held_out: str
     blocks: bool
+    departures: tuple[str, ...]
     changes: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -111,6 +114,7 @@ def improve(
         unit=held.unit,
         held_out=held_out(measured, held),
         blocks=in_blocks(measured, held),
+        departures=_departures(steps),
         changes=tuple(changes(measured.profile, last)),
         notes=(*measured.notes, *notes),
     )
@@ -122,6 +126,12 @@ def improve(
             files[Path(report)] = _page(result, drawn)
     write_together(files)
     return result
+
+
+def _departures(steps: Sequence[Step]) -> tuple[str, ...]:
+    """What the last step changes of the model as given, and where each one's effect acts."""
+    found = [steps[-1].departs.changed, *(step.departs.elsewhere for step in steps)]
+    return tuple(one for one in found if one)
 
 
 def sentences(result: Improved) -> list[str]:
@@ -150,6 +160,7 @@ def _ending(result: Improved) -> list[str]:
         *["No effect was added, and no scene was written."] * unchanged,
         result.why,
         *[f"Next experiment: {told}"] * bool(told),
+        *result.departures,
         *result.changes,
         *result.notes,
     ]

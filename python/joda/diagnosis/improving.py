@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from joda.diagnosis.ahead import pairs
 from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.given import FAITHFUL, Departures
 from joda.diagnosis.mending import Error, error, mend
 from joda.diagnosis.share import divided
 from joda.diagnosis.split import parted
@@ -39,12 +40,14 @@ class Step:
         profile: with all effects so far.
         error: on runs held out of every fit.
         diagnosis: of the model with this profile; None if it was not made.
+        departs: by what the profile is not what was given and diagnosed.
     """
 
     added: Finding | None
     profile: Profile
     error: Error
     diagnosis: Diagnosis | None = None
+    departs: Departures = FAITHFUL
 
     @property
     def effect(self) -> str | None:
@@ -107,9 +110,10 @@ def _added(
     """The profile with what was found, if that brings the error held out to a part of it."""
     told(f"add {finding.effect}")
     train, held = _with(parts, profile)
-    mended = mend(train, held, finding.effect, finding.direction, finding.interval, told)
+    given = parts[0].profile
+    mended = mend(train, held, finding.effect, finding.direction, finding.interval, told, given)
     if mended.effect and mended.after.window < most * mended.before.window:
-        return Step(finding, mended.profile, mended.after)
+        return Step(finding, mended.profile, mended.after, departs=mended.departs)
     return None
 
 

@@ -1,10 +1,12 @@
 """What a profile has of an effect, where that acts, and the rest of the profile."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from joda.field import merge
 from joda.profile import CHANNELS, Channels, Profile
 
+Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 FELT = 0.2
@@ -51,19 +53,20 @@ def place(profile: Profile, effect: str, given: Profile | None = None) -> Interv
         given: see `divided`.
     """
     own = divided(profile, effect, given)[0]
-    grid = np.linspace(0, 1, GRID)
-    low, high = 1.0, 0.0
-    for name in CHANNELS:
+    for name in CHANNELS:  # a catch has friction beside its force: the force comes first
         channel = getattr(own.channels, name)
-        if not channel.components:
-            continue
-        value = np.abs(merge(channel)(grid)[0])
-        rise = value - value.min()
-        if rise.max() <= LEVEL * value.max():
-            return 0.0, 1.0
-        there = grid[rise >= FELT * rise.max()]
-        low, high = min(low, float(there[0])), max(high, float(there[-1]))
-    return (low, high) if low < high else (0.0, 1.0)
+        if channel.components:
+            return _felt(np.abs(merge(channel)(np.linspace(0, 1, GRID))[0]))
+    return 0.0, 1.0
+
+
+def _felt(value: Array) -> Interval:
+    """Where values over the range rise above the least of them."""
+    rise = value - value.min()
+    if rise.max() <= LEVEL * value.max():
+        return 0.0, 1.0
+    there = np.flatnonzero(rise >= FELT * rise.max())
+    return float(there[0]) / (GRID - 1), float(there[-1]) / (GRID - 1)
 
 
 def overlap(first: Interval, second: Interval) -> float:
