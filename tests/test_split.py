@@ -82,6 +82,13 @@ def test_an_effect_of_a_joint_that_comes_to_rest_is_added(tmp_path, rng, count):
     assert error(unseen, mended.profile).window < 2 * SIGMA < 0.5 * error(unseen).window
 
 
+def test_where_nothing_is_missed_nothing_can_be_told(tmp_path, rng):
+    measured = thrown(tmp_path, rng, 2, drag=1e-7)
+    mended = mend(*parted(measured), "quadratic_damping")
+    assert mended.effect is None
+    assert "by no more than the noise even without it" in mended.reason
+
+
 @pytest.mark.parametrize("count", [1, 3, 4])
 def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, count):
     measured = thrown(tmp_path, rng, count, drag=0.02)

@@ -113,7 +113,8 @@ def hidden_effect(
     if diagnosis.effects:
         say(f"\n3. Add it. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
         added = add(model, joint, written, runs, folder / "new.xml", force=True)
-        say(of_added(added)[0])
+        for sentence in (of_added(added)[0], *added.departures):
+            say(sentence)
         if added.scene:
             say(f"\n4. Runs that no step has seen. (compare, {folder / 'unseen.html'})")
             page = folder / "unseen.html"

@@ -19,7 +19,7 @@ TRIED = 3
 """How many effects of a diagnosis are tried, the most likely first."""
 LIKELY = 0.1
 """Least probability of an effect, besides the first, that is tried."""
-NOTHING_HELPS = "No likely effect lowers the error on the runs that were held out."
+NOTHING_HELPS = "No likely effect clearly lowers the error on what was held out of the fit."
 WORTH, MUCH = 0.95, 0.8
 """Part of the error before, on runs held out, to which an effect must bring it: a likely one; one
 that is tried because nothing is likely and the first did not."""

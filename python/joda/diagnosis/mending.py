@@ -29,6 +29,12 @@ LIKELIER = 2 * float(np.log(20))
 """How much less that loss, twice a negative log-likelihood, must be at least: a model that was not
 fitted to data makes them 20 times likelier than the true one does in one of 20 cases at most."""
 NO_LESS = "it does not lower the error on what was held out of the fit"
+NO_MORE = 1.1
+"""Error before, in units of the noise, up to which what was held out tells nothing."""
+NOTHING_LEFT = (
+    "what was held out of the fit is missed by no more than the noise even without it, so that it "
+    "cannot tell"
+)
 STRENGTHS = (1.0, 3.0, 10.0)
 """Of an effect whose place is known: the trials, in units of the usual one."""
 
@@ -136,7 +142,8 @@ def mend(
 
     first, after, reason = best(tried)
     if not first:
-        return Mended(train.profile, None, before, before, reason)
+        silent = reason == NO_LESS and before.window < NO_MORE * held.floor
+        return Mended(train.profile, None, before, before, NOTHING_LEFT if silent else reason)
     departs = departures(given, first.profile, effect, near)
     if departs.sentences:
         told("the same, nearer to what was given")
