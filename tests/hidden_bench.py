@@ -32,7 +32,8 @@ from hidden_figures import fine, table, told
 from hidden_floor import floor_of
 
 from joda.diagnosis.improving import improved
-from joda.diagnosis.mending import error, mend, parted
+from joda.diagnosis.mending import error, mend
+from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
 from joda.hidden import FAMILIES, Case
 from joda.hidden.cases import FAMILY

@@ -7,7 +7,8 @@ import numpy as np
 from hidden_cases import CONTAINED, HARD
 from hidden_coverage import coverage, reliability
 
-from joda.hidden.cases import FAMILY, overlap
+from joda.diagnosis.share import overlap
+from joda.hidden.cases import FAMILY
 
 SURE = 0.9
 BINS = (0.0, 0.5, 0.7, SURE, 1.0 + 1e-9)

@@ -38,8 +38,9 @@ from hidden_floor import true_error
 from mujoco import sysid
 from mujoco.sysid.report.sections.insights import AutomatedInsights
 
-from joda.diagnosis.mending import error, mend, parted
+from joda.diagnosis.mending import error, mend
 from joda.diagnosis.phrases import named
+from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
 from joda.hidden import Case, draw, write
 from joda.hidden.cases import VISIBLE

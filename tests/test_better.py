@@ -22,6 +22,8 @@ from joda.measured.visited import unvisited, unvisited_part, visited_share
         ([9.0] * 4 + [1.0], [1.0] * 4 + [9.0], False),  # as good in 2 of 32 and more
         ([9.0] * 3, [1.0] * 3, True),  # few, but none is worse
         ([9.0] * 3, [1.0] * 2 + [20.0], False),
+        ([1.4, 1.2], [1.0, 0.9], True),  # few and short, but each is better
+        ([1.4, 1.2], [1.0, 2.0], False),
         ([1.0] * 50, [1.1] * 50, False),  # within the noise nothing counts
         ([50.0] + [1.0] * 9, [1.0] + [3.0] * 9, False),  # one window decides nothing
         ([np.inf] * 6, [1.0] * 6, True),
@@ -69,7 +71,7 @@ def test_where_no_run_was_is_told_in_closed_form(measured):
     ends = [(run.position.min(), run.position.max()) for run in measured.runs]
     first = (min(a for a, _ in ends) - lo) / (hi - lo)
     last = (max(b for _, b in ends) - lo) / (hi - lo)
-    cut = measured.with_runs(tuple(measured.runs[:1]))
+    cut = measured.with_runs(measured.runs[:1], [0])
     away = unvisited(measured)
     assert all(b <= first + 1e-9 or a >= last - 1e-9 for a, b in away)
     assert sum(b - a for a, b in unvisited(cut)) >= sum(b - a for a, b in away)
@@ -79,7 +81,7 @@ def test_an_effect_is_not_placed_where_nobody_was(measured):
     lo, hi = measured.profile.joint.range
     own = measured.runs[0]
     high = lo + (hi - lo) * np.linspace(0.6, 0.9, len(own.time))
-    near = measured.with_runs((replace(own, position=high),))
+    near = measured.with_runs([replace(own, position=high)], [0])
     a, b = unvisited_part(near, (0.0, 0.3))[0]
     assert (a, b) == (0.0, 0.3)
     assert visited_share(near, (0.0, 0.3)) == 0.0

@@ -12,7 +12,8 @@ from hidden_figures import fine, told
 from hidden_floor import true_error
 from hidden_model import true_profile
 
-from joda.diagnosis.mending import error, mend, parted
+from joda.diagnosis.mending import error, mend
+from joda.diagnosis.split import parted
 from joda.hidden import EFFECTS, FAMILIES, draw
 from joda.measured.misfit import rms
 

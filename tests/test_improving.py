@@ -46,7 +46,7 @@ class Joint:
         monkeypatch.setattr(improving, "diagnosed", self.diagnosed)
         monkeypatch.setattr(improving, "_added", self.added)
         monkeypatch.setattr(improving, "pairs", lambda *_: [tuple(map(finding, self.hidden))])
-        monkeypatch.setattr(improving, "_without", lambda profile, effect, begin: effect)
+        monkeypatch.setattr(improving, "divided", lambda profile, effect, begin: ("", effect))
         monkeypatch.setattr(improving, "_with", lambda parts, profile: (profile, None))
         monkeypatch.setattr(improving, "error", lambda held: Error(1.0, 1.0))
 

@@ -11,8 +11,9 @@ import pytest
 from assets import SHARED
 from scipy import signal
 
-from joda.diagnosis.mending import mend, parted
+from joda.diagnosis.mending import mend
 from joda.diagnosis.rivals import DRIVING, RESISTING
+from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
 from joda.joints.resistance import damping, friction_bounds
 from joda.measured.gauge import static_force
@@ -105,7 +106,10 @@ def test_the_drives_offset_is_named_but_less_likely(drive):
 
 
 def test_the_mended_drive_predicts_the_force(drive):
-    train, held = parted(drive.measured)
+    run = drive.measured.runs[0]
+    cut = 3 * len(run.time) // 4
+    pieces = run.part(slice(0, cut)), run.part(slice(cut, None))
+    train, held = (drive.measured.with_runs([piece], [0]) for piece in pieces)
     mended = mend(train, held, drive.first.effect, drive.first.direction)
     assert mended.effect == drive.first.effect
     assert mended.after.window < 0.3 * mended.before.window

@@ -8,10 +8,12 @@ from joda import diagnose
 from joda._hidden_effect import _judged
 from joda.diagnosis import verdict
 from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.phrases import explained
 from joda.diagnosis.summary import summarised
 from joda.diagnosis.weighing import Weighed
 from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
+from joda.profile import Joint
 
 DETENT = Finding(
     effect="detent_internal",
@@ -130,3 +132,20 @@ def test_where_no_effect_is_named_it_was_missed():
         "Missed: no effect was named (verdict: missing_effect).",
         False,
     )
+
+
+@pytest.mark.parametrize(
+    ("away", "said"),
+    [
+        ((), None),
+        (((0.391, 0.394),), None),  # both read 0.39
+        (((0.391, 0.394), (0.6, 0.7)), "No run visited s = 0.60 to 0.70: there"),
+        (((0.1, 0.2), (0.6, 0.7)), "No run visited s = 0.10 to 0.20 and s = 0.60 to 0.70: there"),
+    ],
+)
+def test_what_no_run_visited_is_said_where_it_can_be_read(away, said):
+    joint = Joint(name="lid", type="hinge", range=(0.0, 2.0), unit="rad")
+    size, errors = (1.0, 0.1, "N·m"), (0.1, 0.01, 0.01)
+    told = explained("detent_internal", "both", (0.1, 0.8), away, size, errors, "rad", joint)
+    assert ("No run visited" in told) == bool(said)
+    assert not said or said in told

@@ -7,10 +7,9 @@ from typing import Any
 
 from joda._diagnose import check_effect
 from joda.diagnosis.findings import read_diagnosis
-from joda.diagnosis.mending import Error, Mended, error, mend, parted
+from joda.diagnosis.mending import Error, Mended, error, mend
 from joda.diagnosis.outcome import (
     beside,
-    held_out,
     mended_picture,
     nearby,
     parting,
@@ -19,6 +18,7 @@ from joda.diagnosis.outcome import (
     told_errors,
 )
 from joda.diagnosis.phrases import named
+from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together
 from joda.pictures.changes import changes
@@ -39,6 +39,9 @@ class Added:
         noise_floor: of what was measured there.
         unit: of the errors and the noise: rad or m; N·m or N where there are only curves.
         held_out: what was held out, in words.
+        blocks: whether that are blocks of runs, not whole runs.
+        departures: where what was added is not what the model gave or where it was diagnosed, in
+            sentences.
         changes: a line per changed component.
         notes: what the user should be told, a sentence each.
     """
@@ -54,6 +57,8 @@ class Added:
     noise_floor: float
     unit: str
     held_out: str
+    blocks: bool
+    departures: tuple[str, ...]
     changes: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -78,8 +83,8 @@ def add(
 ) -> Added:
     """Adds an effect to a joint's profile and fits everything together.
 
-    Of four or more runs every fourth is held out of the fit, of fewer the last quarter of each; of
-    fewer quasi-static curves, where there are no runs, every fourth stretch of each.
+    Of four or more runs every fourth is held out of the fit, of fewer every fourth block in which
+    the joint moves; of fewer quasi-static curves, where there are no runs, every fourth stretch.
     The effect is added only if it is plausible and clearly lowers the error there; else nothing is
     written.
 
@@ -133,6 +138,8 @@ def add(
         noise_floor=held.floor,
         unit=held.unit,
         held_out=held_out(measured, held),
+        blocks=in_blocks(measured, held),
+        departures=mended.departs.sentences,
         changes=tuple(changes(measured.profile, mended.profile)),
         notes=(*measured.notes, *notes),
     )
@@ -141,17 +148,18 @@ def add(
 def sentences(added: Added) -> list[str]:
     """What came of it, for a person."""
     what = named(added.effect)
-    errors = told_errors(added.before, added.after, added.noise_floor, added.unit)
+    errors = told_errors(added.before, added.after, added.noise_floor, added.unit, added.blocks)
     if added.added:
         out = [f"Added {what}. On what was held out of the fit ({added.held_out}): {errors}."]
     else:
+        near = nearby(added.before, added.blocks)
         out = [
-            f"Not added: {what}, as {added.reason} ({added.held_out}; {nearby(added.before)} "
+            f"Not added: {what}, as {added.reason} ({added.held_out}; {near} "
             f"{added.before.window:.3g} {added.unit}, noise {added.noise_floor:.2g} {added.unit}). "
             "Nothing was written."
         ]
-    told = parting(added.after, added.noise_floor) if added.added else []
-    return [*out, *told, *added.changes, *added.notes]
+    told = parting(added.after, added.noise_floor, added.blocks) if added.added else []
+    return [*out, *told, *added.departures, *added.changes, *added.notes]
 
 
 def _chosen(

@@ -14,10 +14,11 @@ from joda._diagnose import diagnose
 from joda._diagnose import sentences as of_diagnosis
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import named
+from joda.diagnosis.share import overlap
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied
 from joda.hidden import EFFECTS, draw, write
-from joda.hidden.cases import PUSHED, VISIBLE, overlap
+from joda.hidden.cases import PUSHED, VISIBLE
 from joda.measured.comparison import Comparison
 from joda.measured.comparison import sentences as of_comparison
 
@@ -115,7 +116,8 @@ def hidden_effect(
         say("")
         say(f"3. Add it. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
         added = add(model, joint, written, runs, folder / "new.xml", force=True)
-        say(of_added(added)[0])
+        for sentence in (of_added(added)[0], *added.departures):
+            say(sentence)
         if added.scene:
             say("")
             say(f"4. Runs that no step has seen. (compare, {folder / 'unseen.html'})")
@@ -197,9 +199,8 @@ def _off(
     out = []
     if one.direction != seal["direction"]:
         out.append(f"the direction is {seal['direction']}, not {one.direction}")
-    common = overlap(one.interval, seal["interval"])
-    if common < PLACED:
-        out.append(f"the places overlap by {100 * common:.0f} % only")
+    if (shared := overlap(one.interval, seal["interval"])) < PLACED:
+        out.append(f"the places overlap by {100 * shared:.0f} % only")
     off = abs(one.magnitude - seal["magnitude"])
     if off > one.magnitude_error:
         out.append(

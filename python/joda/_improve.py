@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from joda.diagnosis.improving import Step, improved
-from joda.diagnosis.mending import parted
-from joda.diagnosis.outcome import beside, draw_mended, held_out, nearby, read_runs, scene_files
+from joda.diagnosis.outcome import beside, draw_mended, nearby, read_runs, scene_files, wholes
 from joda.diagnosis.phrases import named
+from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.files import check_target, write_together
 from joda.measured.maps import draw_maps, draw_models, replayed
 from joda.measured.reading import Measured
@@ -37,6 +37,9 @@ class Improved:
         noise_floor: of what was held out.
         unit: of the errors and the noise: rad or m; N·m or N where there are only curves.
         held_out: what was held out of all fits, in words.
+        blocks: whether that are blocks of runs, not whole runs.
+        departures: where the last profile is not what the model gave, and effects act elsewhere
+            than where they were diagnosed, in sentences.
         changes: a line per changed component, of the last profile against the first.
         notes: what the user should be told, a sentence each.
     """
@@ -50,6 +53,8 @@ class Improved:
     noise_floor: float
     unit: str
     held_out: str
+    blocks: bool
+    departures: tuple[str, ...]
     changes: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -71,8 +76,8 @@ def improve(
         model: MJCF or URDF, with or without a profile on the joint.
         joint: its name or address, see `joda.scenes.model.find_joint`.
         runs: CSV files with time, position and perhaps force. Of four or more every fourth is
-            held out of all fits, of fewer the last quarter of each. Or quasi-static curves: of
-            fewer than four every fourth stretch of each is held out.
+            held out of all fits, of fewer every fourth block in which the joint moves. Or
+            quasi-static curves: of fewer than four every fourth stretch of each is held out.
         output: scene to write; beside it, with its name, go .composed.json and .png.
         report: an HTML page to write that needs nothing else.
         passive: whether the actuators on the joint, if there are any, were off.
@@ -108,6 +113,8 @@ def improve(
         noise_floor=held.floor,
         unit=held.unit,
         held_out=held_out(measured, held),
+        blocks=in_blocks(measured, held),
+        departures=_departures(steps),
         changes=tuple(changes(measured.profile, last)),
         notes=(*measured.notes, *notes),
     )
@@ -119,6 +126,12 @@ def improve(
             files[Path(report)] = _page(result, drawn)
     write_together(files)
     return result
+
+
+def _departures(steps: Sequence[Step]) -> tuple[str, ...]:
+    """What the last step changes of the model as given, and where each one's effect acts."""
+    found = [steps[-1].departs.changed, *(step.departs.elsewhere for step in steps)]
+    return tuple(one for one in found if one)
 
 
 def sentences(result: Improved) -> list[str]:
@@ -147,6 +160,7 @@ def _ending(result: Improved) -> list[str]:
         *["No effect was added, and no scene was written."] * unchanged,
         result.why,
         *[f"Next experiment: {told}"] * bool(told),
+        *result.departures,
         *result.changes,
         *result.notes,
     ]
@@ -166,9 +180,9 @@ def _rows(result: Improved) -> list[tuple[str, ...]]:
 def _errors(result: Improved) -> dict[str, list[float]]:
     """The errors of all steps by what they are of."""
     errors = [step.error for step in result.steps]
-    out = {nearby(errors[0]): [error.window for error in errors]}
+    out = {nearby(errors[0], result.blocks): [error.window for error in errors]}
     whole = [error.whole for error in errors if error.whole is not None]
-    return out | ({"whole runs": whole} if whole else {})
+    return out | ({wholes(result.blocks): whole} if whole else {})
 
 
 def _step(step: Step) -> str:
@@ -185,7 +199,7 @@ def _page(result: Improved, drawn: bytes) -> str:
     count = len(rows) - 1
     first, last = result.steps[0].error.window, result.steps[-1].error.window
     added = ", ".join(named(step.effect) for step in result.steps if step.effect)
-    what = nearby(result.steps[0].error)
+    what = nearby(result.steps[0].error, result.blocks)
     noise = f"the measurement's noise is {result.noise_floor:.2g} {result.unit}."
     story = (
         f"{count} effect{'s' * (count > 1)} added: {added}. On what was held out of all fits "

@@ -39,6 +39,6 @@ def pairs(
 
 def _found(measured: Measured, ranking: Ranking, most: int) -> list[Finding]:
     """The likeliest guesses of a ranking, told."""
-    weighed, held = weigh(ranking), Holdout(ranking.asked)
+    weighed, held = weigh(ranking), Holdout(ranking.asked, measured)
     likeliest = range(len(ranking.guesses[:most]))
     return [finding(measured, ranking, held, k, weighed) for k in likeliest]

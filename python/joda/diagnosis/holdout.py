@@ -9,8 +9,10 @@ from joda.diagnosis.asking import RESTITUTION, Asked
 from joda.diagnosis.baseline import joined
 from joda.diagnosis.guessing import Guess
 from joda.diagnosis.judge import Judge, Make, Unknowns
+from joda.diagnosis.split import held_windows
 from joda.diagnosis.windows import Windows
 from joda.measured.misfit import rms
+from joda.measured.reading import Measured
 
 Array = NDArray[np.float64]
 
@@ -18,17 +20,14 @@ Array = NDArray[np.float64]
 class Holdout:
     """Fits on a part of the runs, judged on the rest."""
 
-    def __init__(self, asked: Asked) -> None:
-        """Holds out a quarter of the runs; of fewer than four, a quarter of the windows."""
+    def __init__(self, asked: Asked, measured: Measured) -> None:
+        """Holds windows out as `joda.diagnosis.split` does; of what these do not show, others."""
         self.asked = asked
-        windows = asked.judge.windows
-        runs = np.unique(windows.run)
-        if len(runs) >= 4:
-            self.held = windows.of_runs(list(runs[3::4]))
-        else:
-            self.held = np.arange(len(windows.at)) % 4 == 3
         counts = asked.judge.counts
+        self.held = held_windows(measured, asked.judge.windows)
         if not (counts & self.held).any():
+            self.held = np.isin(np.arange(len(counts)), np.flatnonzero(counts)[1::4])
+        if not self.held.any():
             self.held = counts
         self.train = replace(asked.judge, counts=counts & ~self.held)
         self.before = self._error(asked.base.solo, asked.base.unknowns, asked.fit.x)

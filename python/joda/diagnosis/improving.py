@@ -5,10 +5,13 @@ from dataclasses import dataclass, replace
 
 from joda.diagnosis.ahead import pairs
 from joda.diagnosis.findings import Diagnosis, Finding
-from joda.diagnosis.mending import Error, error, mend, parted
+from joda.diagnosis.given import FAITHFUL, Departures
+from joda.diagnosis.mending import Error, error, mend
+from joda.diagnosis.share import divided
+from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
 from joda.measured.reading import Measured
-from joda.profile import CHANNELS, Channels, Profile
+from joda.profile import Profile
 
 MOST = 5
 """Effects that are added at most."""
@@ -16,7 +19,7 @@ TRIED = 3
 """How many effects of a diagnosis are tried, the most likely first."""
 LIKELY = 0.1
 """Least probability of an effect, besides the first, that is tried."""
-NOTHING_HELPS = "No likely effect lowers the error on the runs that were held out."
+NOTHING_HELPS = "No likely effect clearly lowers the error on what was held out of the fit."
 WORTH, MUCH = 0.95, 0.8
 """Part of the error before, on runs held out, to which an effect must bring it: a likely one; one
 that is tried because nothing is likely and the first did not."""
@@ -37,12 +40,14 @@ class Step:
         profile: with all effects so far.
         error: on runs held out of every fit.
         diagnosis: of the model with this profile; None if it was not made.
+        departs: by what the profile is not what was given and diagnosed.
     """
 
     added: Finding | None
     profile: Profile
     error: Error
     diagnosis: Diagnosis | None = None
+    departs: Departures = FAITHFUL
 
     @property
     def effect(self) -> str | None:
@@ -105,9 +110,10 @@ def _added(
     """The profile with what was found, if that brings the error held out to a part of it."""
     told(f"add {finding.effect}")
     train, held = _with(parts, profile)
-    mended = mend(train, held, finding.effect, finding.direction, finding.interval, told)
+    given = parts[0].profile
+    mended = mend(train, held, finding.effect, finding.direction, finding.interval, told, given)
     if mended.effect and mended.after.window < most * mended.before.window:
-        return Step(finding, mended.profile, mended.after)
+        return Step(finding, mended.profile, mended.after, departs=mended.departs)
     return None
 
 
@@ -121,7 +127,7 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
     for k, step in enumerate(added if len(added) > 1 else ()):
         told(f"asking again what {step.effect} is")
         others = [one.added for one in added if one is not step]
-        without = _without(added[-1].profile, step.effect or "", begin.profile)
+        without = divided(added[-1].profile, step.effect or "", begin.profile)[1]
         found = diagnosed(_with(parts, without)[0]).diagnosis
         if found.verdict != "missing_effect" or found.effects[0].effect in [
             one.effect for one in added
@@ -150,16 +156,3 @@ def _stairs(
 def _with(parts: Parts, profile: Profile) -> Parts:
     train, held = parts
     return train.changed(profile), held.changed(profile)
-
-
-def _without(profile: Profile, effect: str, begin: Profile) -> Profile:
-    """The profile without an effect, but for what of it was there at the beginning."""
-    channels = {}
-    for name in CHANNELS:
-        channel, before = (getattr(one.channels, name) for one in (profile, begin))
-        there = len(before.components)
-        kept = [c for k, c in enumerate(channel.components) if k < there or c.label != effect]
-        channels[name] = channel.model_copy(update={"components": tuple(kept)})
-    keys = {one.key for one in begin.effects}
-    effects = tuple(one for one in profile.effects if one.effect != effect or one.key in keys)
-    return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})

@@ -4,34 +4,39 @@ First the effect's few numbers with the model's strengths; then every control po
 number (`joda.diagnosis.reshaping`). What is written makes runs that no fit has seen likelier.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.asking import asked
-from joda.diagnosis.better import worse
+from joda.diagnosis.better import FALLEN, worse
+from joda.diagnosis.given import FAITHFUL, SHARED, Departures, departures, restored
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS
 from joda.diagnosis.plausible import Needs, implausible, unseen_place
-from joda.diagnosis.reshaping import Likelihood, checked, reshaped
+from joda.diagnosis.reshaping import Trials, Tried, checked
+from joda.diagnosis.share import overlap
 from joda.measured.errors import Errors, errors
-from joda.measured.gauge import Gauged
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.profile import Profile
 
 NEARLY = 0.95
 """Part of the error before, and of the loss, to which an effect must bring runs held out."""
+LIKELIER = 2 * float(np.log(20))
+"""How much less that loss, twice a negative log-likelihood, must be at least: a model that was not
+fitted to data makes them 20 times likelier than the true one does in one of 20 cases at most."""
 NO_LESS = "it does not lower the error on what was held out of the fit"
+NO_MORE = 1.1
+"""Error before, in units of the noise, up to which what was held out tells nothing."""
+NOTHING_LEFT = (
+    "what was held out of the fit is missed by no more than the noise even without it, so that it "
+    "cannot tell"
+)
 STRENGTHS = (1.0, 3.0, 10.0)
 """Of an effect whose place is known: the trials, in units of the usual one."""
-FEWEST = 4
-"""Runs or curves from which every fourth is held out; of fewer, parts of each."""
-STRETCHES, SAMPLES = 40, 4
-"""In how many stretches a curve is cut at most for that, of how many samples at the least."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,8 @@ class Error:
     """How far a model is off.
 
     Attributes:
-        whole: RMS of open-loop replays of whole runs, rad or m; None where there are only curves.
+        whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where there are only
+            curves.
         window: RMS of windows of 0.4 s, rad or m; of curves the force's, N·m or N.
     """
 
@@ -56,6 +62,7 @@ class Mended:
         effect: that was added; None if nothing did better than the model as it was.
         before, after: errors on runs held out of the fit.
         reason: why nothing was added, a clause; None if something was.
+        departs: by what the profile is not what was given and diagnosed.
     """
 
     profile: Profile
@@ -63,41 +70,7 @@ class Mended:
     before: Error
     after: Error
     reason: str | None = None
-
-
-def parted(measured: Measured) -> tuple[Measured, Measured]:
-    """What to fit, and what is held out: every fourth run, or of few runs each one's last quarter.
-
-    Where there are only curves: every fourth, or of few curves every fourth stretch of each, as
-    what acts on a part of the range is at one place of a curve.
-    """
-    if not measured.runs:
-        return _parted_curves(measured)
-    count = len(measured.runs)
-    if count >= FEWEST:
-        held = list(range(3, count, 4))
-        kept = [k for k in range(count) if k not in held]
-        return measured.changed(runs=kept), measured.changed(runs=held)
-    cuts = [3 * len(run.time) // 4 for run in measured.runs]
-    first = tuple(run.part(slice(0, at)) for run, at in zip(measured.runs, cuts, strict=True))
-    last = tuple(run.part(slice(at, None)) for run, at in zip(measured.runs, cuts, strict=True))
-    return measured.with_runs(first), measured.with_runs(last)
-
-
-def _parted_curves(measured: Measured) -> tuple[Measured, Measured]:
-    curves, ways = measured.curves, (False, True)
-    if len(curves) >= FEWEST:
-        parts = [[one for k, one in enumerate(curves) if (k % 4 == 3) == way] for way in ways]
-    else:
-        parts = [[one.part(_held(one) == way) for one in curves] for way in ways]
-    return measured.with_curves(parts[0]), measured.with_curves(parts[1])
-
-
-def _held(curve: Gauged) -> NDArray[np.bool_]:
-    """Which samples of a curve are held out, shape (n,)."""
-    n = len(curve.direction)
-    stretch = np.arange(n) * min(STRETCHES, max(n // SAMPLES, FEWEST)) // n
-    return np.asarray(stretch % 4 == 2)
+    departs: Departures = FAITHFUL
 
 
 def error(measured: Measured, profile: Profile | None = None) -> Error:
@@ -121,11 +94,13 @@ def mend(
     direction: str | None = None,
     near: tuple[float, float] | None = None,
     told: Callable[[str], None] = lambda what: None,
+    given: Profile | None = None,
 ) -> Mended:
     """Adds an effect, if that is plausible and runs held out are clearly better with it.
 
     Of what is tried, the likeliest is taken that makes those runs likelier, their error less in
-    windows (a paired test) and not more in whole runs, and exerts no force that nothing needs.
+    windows (a paired test) and not more as a whole, and exerts no force that nothing needs. It may
+    change what the model gave, or act elsewhere than near, only if no other is nearly as good.
 
     Args:
         train: the joint, its profile as it is, and runs to fit.
@@ -134,46 +109,85 @@ def mend(
         direction: of the effect, if it is known.
         near: where it is, in normalised position, if that is known.
         told: what is being done.
+        given: the profile of the model as it was given; None: the joint's as it is.
     """
     before, replays = _replayed(held)
     if reason := unseen_place(train, near):
         return Mended(train.profile, None, before, before, reason)
     told("the effect's own numbers")
+    given = given or train.profile
+    trials = Trials(train, held)
     with threadpool_limits(1, BLAS):
-        profile = _guessed(train, effect, direction, near)
-        tried = list(reshaped(train, held, profile, effect, told)) if profile else []
-        most = NEARLY * Likelihood(held).loss(train.profile)
+        starts = _starts(train, effect, direction, near)
+        tried = [one for start in starts for one in trials.reshaped(start, effect, told)]
+        loss = trials.unseen.loss(train.profile)
+
     needs = Needs(train) if train.runs else None
-    reasons = []
-    for one in sorted(tried, key=lambda one: one.score):
-        reason = implausible(needs, one.profile, effect)
-        if not reason and one.unseen >= most:
-            reason = NO_LESS
-        if not reason:  # replays take longest
-            after, anew = _replayed(held, one.profile)
-            if after.window >= NEARLY * before.window:
+
+    def best(some: Iterable[Tried]) -> tuple[Tried | None, Error, str]:
+        """The likeliest that may be added, and its error; else why the first may not."""
+        reasons = []
+        for one in sorted(some, key=lambda one: one.score):
+            reason = implausible(needs, one.profile, effect)
+            if not reason and not _clearly(one.unseen, loss):
                 reason = NO_LESS
-            elif replays and anew:
-                reason = worse(replays, anew)
-            if not reason:
-                return Mended(one.profile, effect, before, after)
-        reasons.append(reason)
-    reason = reasons[0] if reasons else "these data can tell nothing of it"
-    return Mended(train.profile, None, before, before, reason)
+            if not reason:  # replays take longest
+                after, anew = _replayed(held, one.profile)
+                if not _less(before, after):
+                    reason = NO_LESS
+                elif replays and anew:
+                    reason = worse(replays, anew)
+                if not reason:
+                    return one, after, ""
+            reasons.append(reason)
+        return None, before, reasons[0] if reasons else "these data can tell nothing of it"
+
+    first, after, reason = best(tried)
+    if not first:
+        silent = reason == NO_LESS and before.window < NO_MORE * held.floor
+        return Mended(train.profile, None, before, before, NOTHING_LEFT if silent else reason)
+    departs = departures(given, first.profile, effect, near)
+    if departs.sentences:
+        told("the same, nearer to what was given")
+        parts = departs.parts
+        with threadpool_limits(1, BLAS):
+            back = restored(first.profile, given, parts)
+            tried += trials.holding(back, effect, parts) if parts else ()
+        count = len(departs.sentences)
+        found = [(one, departures(given, one.profile, effect, near)) for one in tried]
+        other, error_then, _ = best(one for one, own in found if len(own.sentences) < count)
+        if other and not _clearly(first.unseen, other.unseen):
+            first, after = other, error_then
+            departs = departures(given, first.profile, effect, near)
+    return Mended(first.profile, effect, before, after, departs=departs)
 
 
-def _guessed(
+def _less(before: Error, after: Error) -> bool:
+    """Whether windows are missed by less, or whole runs where windows are too short to show it."""
+    windows = after.window < NEARLY * before.window
+    if before.whole is None or after.whole is None:
+        return windows
+    return windows or (after.whole < FALLEN * before.whole and after.window < before.window)
+
+
+def _clearly(loss: float, than: float) -> bool:
+    """Whether a loss is less by enough not to be by chance."""
+    return loss < min(NEARLY * than, than - LIKELIER)
+
+
+def _starts(
     train: Measured, effect: str, direction: str | None, near: tuple[float, float] | None
-) -> Profile | None:
-    """The profile with the effect at its most likely place; None if it can be nowhere."""
+) -> list[Profile]:
+    """The profile with the effect at its most likely place, and if that is elsewhere, near one."""
     begun = asked(train)
     every = [h for h in begun.hypotheses if h.effect == effect]
     tried = [h for h in every if direction in (None, h.direction)] or every
     guesses = [found for h in tried if (found := begun.tell(h))]
     guesses += [begun.finished(begun.rough(there)) for h in tried if (there := _placed(h, near))]
-    if not guesses:
-        return None
-    return checked(begun.moved(min(guesses, key=lambda found: found.score)).written(begun.base))
+    guesses.sort(key=lambda found: found.score)
+    close = [g for g in guesses if near and overlap(g.hypothesis.interval(g.x), near) >= SHARED]
+    firsts = guesses[:1] if not close or close[0] is guesses[0] else [guesses[0], close[0]]
+    return [checked(begun.moved(one).written(begun.base)) for one in firsts]
 
 
 def _placed(hypothesis: Hypothesis, near: tuple[float, float] | None) -> Hypothesis | None:

@@ -42,12 +42,7 @@ def read_runs(
         if measured.runs
     )
     parts, of, cut = excerpts(measured.runs)
-    return replace(
-        measured,
-        runs=parts,
-        sigma=tuple(measured.sigma[k] for k in of),
-        notes=(*measured.notes, *ignored, *cut),
-    )
+    return replace(measured.with_runs(parts, of), notes=(*measured.notes, *ignored, *cut))
 
 
 def beside(scene: Path, force: bool) -> tuple[Path, Path]:
@@ -70,40 +65,35 @@ def scene_files(
     return {scene: content, composed: profile.to_json()}, notes
 
 
-def parting(after: Error, noise: float) -> list[str]:
-    """A sentence where whole runs part although windows do not."""
+def parting(after: Error, noise: float, blocks: bool) -> list[str]:
+    """A sentence where what was held out parts as a whole although windows of it do not."""
     if after.whole is None or after.whole < PARTED * max(after.window, noise):
         return []
     return [
-        "Whole runs still part from the measured ones although windows of 0.4 s hardly do: near a "
-        "barrier or at rest a small difference decides where a joint goes."
+        f"{wholes(blocks).capitalize()} still part from the measured ones although windows of "
+        "0.4 s hardly do: near a barrier or at rest a small difference decides where a joint goes."
     ]
 
 
-def held_out(measured: Measured, held: Measured) -> str:
-    """What was held out, in words."""
-    if len(held.curves) < len(measured.curves):
-        return ", ".join(one.curve.name for one in held.curves)
-    if not measured.runs:
-        return f"every fourth stretch of {'each' if len(held.curves) > 1 else 'the'} curve"
-    if len(held.runs) < len(measured.runs):
-        return ", ".join(run.name for run in held.runs)
-    return "the last quarter of each run" if len(held.runs) > 1 else "the run's last quarter"
+def wholes(blocks: bool) -> str:
+    """What is replayed as a whole: runs that were held out, or blocks of them."""
+    return "whole blocks" if blocks else "whole runs"
 
 
-def nearby(error: Error) -> str:
-    """What the error that every effect must lower is of."""
-    return "force" if error.whole is None else "windows of 0.4 s"
+def nearby(error: Error, blocks: bool) -> str:
+    """What the error that every effect must lower is of; blocks may be shorter than a window."""
+    return "force" if error.whole is None else f"windows of {'up to ' if blocks else ''}0.4 s"
 
 
-def told_errors(before: Error, after: Error, noise: float, unit: str) -> str:
+def told_errors(before: Error, after: Error, noise: float, unit: str, blocks: bool) -> str:
     """Errors before and after for a person."""
     if before.whole is None:
         return (
             f"force {before.window:.3g} → {after.window:.3g} {unit} RMS (noise {noise:.2g} {unit})"
         )
     return (
-        f"whole runs {before.whole:.3g} → {after.whole:.3g} {unit} RMS, windows of 0.4 s "
+        f"{wholes(blocks)} {before.whole:.3g} → {after.whole:.3g} {unit} RMS, "
+        f"{nearby(before, blocks)} "
         f"{before.window:.3g} → {after.window:.3g} {unit} (noise {noise:.2g} {unit})"
     )
 
@@ -138,7 +128,7 @@ def draw_mended(part: "Figure | SubFigure", held: Measured, after: Profile) -> N
         return
     paths = {"before": held.paths(), "after": held.changed(after).paths()}
     draw_runs(right, held.runs, paths, joint.unit)
-    right.suptitle("runs held out of the fit", x=0.02, ha="left", fontsize=10)
+    right.suptitle("held out of the fit", x=0.02, ha="left", fontsize=10)
 
 
 def mended_picture(held: Measured, after: Profile) -> "Figure":

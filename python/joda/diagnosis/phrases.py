@@ -106,11 +106,11 @@ def explained(
 
 
 def _extrapolated(unvisited: tuple[tuple[float, float], ...]) -> str:
-    """That it is not known where no run has been, as a sentence; nothing if all was visited."""
-    if not unvisited:
-        return ""
-    where = " and ".join(f"s = {a:.2f} to {b:.2f}" for a, b in unvisited)
-    return f"No run visited {where}: there it is extrapolated. "
+    """That it is not known where no run has been, as a sentence; nothing if all was visited, but
+    for what is too narrow to be told."""
+    ends = [(f"{a:.2f}", f"{b:.2f}") for a, b in unvisited]
+    where = " and ".join(f"s = {a} to {b}" for a, b in ends if a != b)
+    return f"No run visited {where}: there it is extrapolated. " if where else ""
 
 
 def _lower(sentence: str) -> str:

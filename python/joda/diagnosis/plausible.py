@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import windows_for
+from joda.diagnosis.share import divided
 from joda.effects import (
     AddedInertia,
     AnyEffect,
@@ -19,7 +20,7 @@ from joda.field import merge
 from joda.measured import smoothing
 from joda.measured.reading import Measured
 from joda.measured.visited import visited_share
-from joda.profile import CHANNELS, Channels, Profile
+from joda.profile import CHANNELS, Profile
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -42,7 +43,7 @@ def implausible(needs: "Needs | None", profile: Profile, effect: str | None = No
     """
     if needs is None:
         return None
-    force = needs.exerted(of_effect(profile, effect) if effect else profile)
+    force = needs.exerted(divided(profile, effect)[0] if effect else profile)
     if force <= EXCESS * needs.force:
         return None
     unit = profile.joint.force_unit
@@ -113,17 +114,6 @@ class Needs:
             elif isinstance(one, LoadDependentFriction):
                 total += one.coefficient * getattr(self, "force", 0.0)
         return total
-
-
-def of_effect(profile: Profile, effect: str) -> Profile:
-    """What a profile has of an effect."""
-    channels = {}
-    for name in CHANNELS:
-        channel = getattr(profile.channels, name)
-        own = tuple(part for part in channel.components if part.label == effect)
-        channels[name] = channel.model_copy(update={"components": own})
-    effects = tuple(one for one in profile.effects if one.effect == effect)
-    return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})
 
 
 def _speed(time: Array, position: Array) -> float:

@@ -5,7 +5,7 @@ free. Windows of the runs grow longer, as what is right in short ones is a good 
 ones.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from joda._core import Solo
 from joda.component import Component
 from joda.diagnosis.baseline import LEAST, as_it_is, usable, windows_for
+from joda.diagnosis.given import DOUBT, EFFECTS, Moved
 from joda.diagnosis.guessing import usual
 from joda.diagnosis.hypotheses.effects import HEAVIEST
 from joda.diagnosis.judge import BEND, Judge, Unknowns
@@ -33,8 +34,8 @@ ROUNDS = 6
 """Iterations with each length, while windows that are far off count, and after."""
 NUDGE = 0.004
 """Step of a number for differences, in its own unit."""
-GIVEN_DOUBT = 0.3
-"""How far off (one standard deviation, relative) a control point of the model as given may be."""
+HELD = 1e-3
+"""Part of a number's usual doubt that is left to one that is held."""
 PRICE = 2.0
 """What a control point must gain, of twice the log-likelihood (Akaike 1974)."""
 
@@ -68,42 +69,56 @@ class Tried:
     score: float
 
 
-def reshaped(
-    train: Measured,
-    held: Measured,
-    profile: Profile,
-    effect: str,
-    told: Callable[[str], None],
-) -> Iterator[Tried]:
-    """A profile, and what fits of all its numbers make of it.
+class Trials:
+    """Scores profiles of a joint."""
 
-    Args:
-        train: the joint and runs to fit.
-        held: the same with runs held out.
-        profile: to be fitted.
-        effect: label of the components that may get more control points.
-        told: what is being done.
-    """
-    seen, unseen = Likelihood(train), Likelihood(held)
-    usual_length = windows_for(train).length
-    longer = LONGER if train.runs else (1.0,)  # curves' windows are all alike
+    def __init__(self, train: Measured, held: Measured) -> None:
+        """Args: the joint and runs to fit; the same with runs held out."""
+        self.train = train
+        self.seen, self.unseen = Likelihood(train), Likelihood(held)
+        longer = LONGER if train.runs else (1.0,)  # curves' windows are all alike
+        usual_length = windows_for(train).length
+        self.lengths = [factor * usual_length for factor in longer]
 
-    def tried(profile: Profile) -> Tried:
-        loss = unseen.loss(profile)
+    def tried(self, profile: Profile) -> Tried:
+        """A profile, scored."""
+        loss = self.unseen.loss(profile)
         price = PRICE * sum(len(part.x) for part in _parts(profile))
-        return Tried(profile, loss, seen.loss(profile) + loss + price)
+        return Tried(profile, loss, self.seen.loss(profile) + loss + price)
 
-    yield tried(profile)
-    for finer in range(FINER + 1):
-        profile = resolved(profile, effect) if finer else profile
-        points = sum(len(part.x) for part in _parts(profile) if part.label == effect)
-        if finer and not points:
-            return
-        for length in (factor * usual_length for factor in longer):
-            pace = f", windows of {length:.2g} s" if train.runs else ""
-            told(f"all numbers, {points} control points of the effect{pace}")
-            profile = refitted(train, profile, length, effect if finer else None)
-            yield tried(profile)
+    def reshaped(
+        self, profile: Profile, effect: str, told: Callable[[str], None]
+    ) -> Iterator[Tried]:
+        """A profile, and what fits of all its numbers make of it.
+
+        Args:
+            profile: to be fitted.
+            effect: label of the components that may get more control points.
+            told: what is being done.
+        """
+        yield self.tried(profile)
+        for finer in range(FINER + 1):
+            profile = resolved(profile, effect) if finer else profile
+            points = sum(len(part.x) for part in _parts(profile) if part.label == effect)
+            if finer and not points:
+                return
+            for length in self.lengths:
+                pace = f", windows of {length:.2g} s" if self.train.runs else ""
+                told(f"all numbers, {points} control points of the effect{pace}")
+                profile = refitted(self.train, profile, length, effect if finer else None)
+                yield self.tried(profile)
+
+    def holding(self, profile: Profile, effect: str, parts: Collection[Moved]) -> Iterator[Tried]:
+        """What fits of all other numbers make of a profile, while some parts stay as they are.
+
+        Args:
+            profile: to be fitted.
+            effect: whose shape need not be kept.
+            parts: that stay.
+        """
+        for length in self.lengths:
+            profile = refitted(self.train, profile, length, effect, parts)
+            yield self.tried(profile)
 
 
 def _parts(profile: Profile) -> list[Component]:
@@ -138,7 +153,13 @@ def checked(profile: Profile) -> Profile:
     return Profile.model_validate(profile.model_dump(exclude={"schema_version"}))
 
 
-def refitted(train: Measured, profile: Profile, length: float, free: str | None = None) -> Profile:
+def refitted(
+    train: Measured,
+    profile: Profile,
+    length: float,
+    free: str | None = None,
+    parts: Collection[Moved] = (),
+) -> Profile:
     """All numbers of a profile fitted, near where they were.
 
     Args:
@@ -146,6 +167,7 @@ def refitted(train: Measured, profile: Profile, length: float, free: str | None 
         profile: its shapes are kept.
         length: of windows, s.
         free: effect whose shape need not be.
+        parts: whose numbers stay as they are.
     """
     windows = windows_for(train, length, fine=False)  # at the scene's own step
     judge = Judge(windows, usable(windows))
@@ -159,6 +181,8 @@ def refitted(train: Measured, profile: Profile, length: float, free: str | None 
         return profile
     unbounded = np.full(n, np.inf)
     mean, doubt = _known(parameters, train.profile)
+    held = _held(parameters, parts)
+    mean, doubt = np.where(held, parameters.start, mean), np.where(held, HELD, 1.0) * doubt
     unknowns = Unknowns(
         -unbounded, unbounded, np.full(n, NUDGE), mean, doubt, parameters.constraints
     )
@@ -192,5 +216,18 @@ def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:
         y = np.array(there[slot.component].y)
         if y.any() and len(y) == len(own[slot.component].y):
             mean[k] = y[slot.index] / scale
-            doubt[k] = GIVEN_DOUBT * np.abs(y).max() / scale
+            doubt[k] = DOUBT * np.abs(y).max() / scale
     return mean, doubt
+
+
+def _held(parameters: Parameters, parts: Collection[Moved]) -> NDArray[np.bool_]:
+    """Which numbers are of some parts of the profile, shape (n,)."""
+    there = {(part.where, part.what) for part in parts}
+    keys = [one.key for one in parameters.profile.effects]
+    own = [
+        (EFFECTS, keys[slot.component])
+        if slot.kind == "effects"
+        else (slot.channel, slot.component)
+        for slot in parameters.slots
+    ]
+    return np.array([one in there for one in own], bool)

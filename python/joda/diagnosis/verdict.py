@@ -104,7 +104,7 @@ def diagnosed(
             f"{_astray(measured)}"
         )
         return Diagnosed(_said(measured, "adequate", summary, (), None))
-    held = Holdout(ranking.asked)
+    held = Holdout(ranking.asked, measured)
     named = range(min(NAMED, len(ranking.guesses)))
     every = {
         k: finding(

@@ -6,7 +6,6 @@ from window to window. Noise of the recorded force moves the joint too; residual
 the covariance of both noises.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,10 +87,6 @@ class Windows:
         padded = np.where((self.rows >= 0)[:, :, None], each[self.rows], 0.0)
         out = np.nan_to_num(np.clip(np.matmul(self.whitener, padded), -HUGE, HUGE), nan=HUGE)
         return np.asarray(out.reshape(*self.rows.shape, *misfit.shape[1:]))
-
-    def of_runs(self, runs: Sequence[int]) -> NDArray[np.bool_]:
-        """Which windows are of these runs."""
-        return np.isin(self.run, runs)
 
 
 HUGE = 1e4

@@ -2,7 +2,6 @@
 
 import json
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -212,12 +211,6 @@ def _seal(
     if not seals:
         return {"effect": None}
     return seals[0] | ({"second": seals[1]} if len(seals) > 1 else {})
-
-
-def overlap(one: Sequence[float], other: Sequence[float]) -> float:
-    """Intersection over union of two intervals, 0 to 1."""
-    (a, b), (c, d) = one, other
-    return float(max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c)))
 
 
 def _called(name: str, hidden: Hidden) -> str:

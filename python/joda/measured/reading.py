@@ -105,9 +105,9 @@ class Measured:
         pairs = zip(self.runs, self.sigma, strict=True)
         return [self.replayer.whole(run, sigma) for run, sigma in pairs]
 
-    def with_runs(self, runs: tuple[Run, ...]) -> "Measured":
-        """The same joint with parts of its runs, one of each."""
-        return replace(self, runs=runs)
+    def with_runs(self, parts: Sequence[Run], of: Sequence[int]) -> "Measured":
+        """The same joint with parts of its runs, and of each the number of its run."""
+        return replace(self, runs=tuple(parts), sigma=tuple(self.sigma[k] for k in of))
 
     def with_curves(self, curves: Sequence[Gauged]) -> "Measured":
         """The same joint with some of its curves, or with parts of them."""

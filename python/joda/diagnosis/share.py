@@ -1,0 +1,75 @@
+"""What a profile has of an effect, where that acts, and the rest of the profile."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.field import merge
+from joda.profile import CHANNELS, Channels, Profile
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+FELT = 0.2
+"""Part of its rise above its least value from which an effect acts."""
+LEVEL = 1e-9
+"""What part of its size a curve rises at least that is not the same all over the range."""
+GRID = 401
+"""Positions at which that is looked for."""
+
+
+def divided(profile: Profile, effect: str, given: Profile | None = None) -> tuple[Profile, Profile]:
+    """What a profile has of an effect, and the rest.
+
+    Args:
+        profile: divided by the labels of its components and the names of its effects.
+        effect: a name.
+        given: what this had of the effect already counts among the rest; its components are the
+            first of the profile's.
+    """
+    return _some(profile, effect, given, own=True), _some(profile, effect, given, own=False)
+
+
+def _some(profile: Profile, effect: str, given: Profile | None, *, own: bool) -> Profile:
+    keys = {one.key for one in given.effects} if given else set()
+    channels = {}
+    for name in CHANNELS:
+        channel = getattr(profile.channels, name)
+        there = len(getattr(given.channels, name).components) if given else 0
+        parts = enumerate(channel.components)
+        kept = tuple(c for k, c in parts if (k >= there and c.label == effect) is own)
+        channels[name] = channel.model_copy(update={"components": kept})
+    effects = tuple(
+        one for one in profile.effects if (one.effect == effect and one.key not in keys) is own
+    )
+    return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})
+
+
+def place(profile: Profile, effect: str, given: Profile | None = None) -> Interval:
+    """Where a profile's effect acts, in normalised position: all over the range if it is a law.
+
+    Args:
+        profile: that has it.
+        effect: its name.
+        given: see `divided`.
+    """
+    own = divided(profile, effect, given)[0]
+    for name in CHANNELS:  # a catch has friction beside its force: the force comes first
+        channel = getattr(own.channels, name)
+        if channel.components:
+            return _felt(np.abs(merge(channel)(np.linspace(0, 1, GRID))[0]))
+    return 0.0, 1.0
+
+
+def _felt(value: Array) -> Interval:
+    """Where values over the range rise above the least of them."""
+    rise = value - value.min()
+    if rise.max() <= LEVEL * value.max():
+        return 0.0, 1.0
+    there = np.flatnonzero(rise >= FELT * rise.max())
+    return float(there[0]) / (GRID - 1), float(there[-1]) / (GRID - 1)
+
+
+def overlap(first: Interval, second: Interval) -> float:
+    """Intersection over union of two intervals."""
+    (a, b), (c, d) = first, second
+    return max(min(b, d) - max(a, c), 0.0) / (max(b, d) - min(a, c))

@@ -1,0 +1,121 @@
+"""What is held out of fits: where the joint moves, each sample fitted or held out, never both."""
+
+import numpy as np
+import pytest
+from lids import RATE, SIGMA, thrown
+
+from joda.diagnosis.asking import asked
+from joda.diagnosis.baseline import windows_for
+from joda.diagnosis.holdout import Holdout
+from joda.diagnosis.mending import error, mend
+from joda.diagnosis.split import held_blocks, held_out, held_windows, in_blocks, parted
+from joda.measured.reading import read_measured
+from joda.measured.runs import Run, write_run
+
+
+def moving(run):
+    return np.abs(run.position - run.position[-100:].mean()) > 5 * SIGMA
+
+
+@pytest.fixture
+def rng():
+    seed = int(np.random.default_rng().integers(2**31))
+    print(seed)  # shown where a test fails
+    return np.random.default_rng(seed)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_of_few_runs_some_of_the_motion_is_held_out(tmp_path, rng, count):
+    measured = thrown(tmp_path, rng, count, drag=0.02)
+    train, held = parted(measured)
+    assert all(np.ptp(run.position) > 10 * SIGMA for run in held.runs)
+    moved = sum(np.count_nonzero(moving(run)) for run in measured.runs)
+    assert 0.1 < sum(len(run.time) for run in held.runs) / moved < 0.5
+    together = np.concatenate([run.position for run in (*train.runs, *held.runs)])
+    whole = np.concatenate([run.position for run in measured.runs])
+    assert sorted(together) == sorted(whole)
+    assert len(held.sigma) == len(held.runs) and len(train.sigma) == len(train.runs)
+    assert in_blocks(measured, held)
+    assert held_out(measured, held).endswith("s in which the joint moves")
+
+
+def test_of_four_runs_in_which_the_joint_moves_one_is_held_out(tmp_path, rng):
+    measured = thrown(tmp_path, rng, 5, drag=0.02)
+    train, held = parted(measured)
+    assert [run.name for run in held.runs] == ["run3.csv"]
+    assert [run.name for run in train.runs] == ["run0.csv", "run1.csv", "run2.csv", "run4.csv"]
+    assert (held_out(measured, held), in_blocks(measured, held)) == ("run3.csv", False)
+
+
+def test_a_run_at_rest_is_none_of_the_four(tmp_path, rng):
+    thrown(tmp_path, rng, 5, drag=0.02)
+    time = np.arange(0, 2, 1 / RATE)
+    rest = 2.0 + SIGMA * rng.standard_normal(len(time))
+    write_run(tmp_path / "run3.csv", Run("run3.csv", time, rest, None, 0 * time, False))
+    files = [tmp_path / f"run{k}.csv" for k in range(5)]
+    model = tmp_path / "model.xml"
+    held = parted(read_measured(model, "lid", files))[1]
+    assert [run.name for run in held.runs] == ["run4.csv"]
+    few = parted(read_measured(model, "lid", files[1:]))[1]  # three move
+    assert all(np.ptp(run.position) > 10 * SIGMA for run in few.runs)
+
+
+def test_a_joint_that_never_moves_is_held_out_all_the_same(tmp_path, rng):
+    measured = thrown(tmp_path, rng, 1, drag=0.02)
+    still = measured.runs[0].part(slice(-400, None))
+    measured = measured.with_runs([still], [0])
+    train, held = parted(measured)
+    assert len(train.runs) and len(held.runs)
+    assert "moves" not in held_out(measured, held)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_an_effect_of_a_joint_that_comes_to_rest_is_added(tmp_path, rng, count):
+    drag = rng.uniform(0.01, 0.03)
+    measured = thrown(tmp_path, rng, count, drag)
+    mended = mend(*parted(measured), "quadratic_damping")
+    assert mended.effect == "quadratic_damping", mended.reason
+    assert max(mended.profile.effects[0].y) == pytest.approx(drag, rel=0.1)
+    other = tmp_path / "other"
+    other.mkdir()
+    unseen = thrown(other, rng, 4, drag)
+    assert error(unseen, mended.profile).window < 2 * SIGMA < 0.5 * error(unseen).window
+
+
+def test_where_nothing_is_missed_nothing_can_be_told(tmp_path, rng):
+    measured = thrown(tmp_path, rng, 2, drag=1e-7)
+    mended = mend(*parted(measured), "quadratic_damping")
+    assert mended.effect is None
+    assert "by no more than the noise even without it" in mended.reason
+
+
+@pytest.mark.parametrize("count", [1, 3, 4])
+def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, count):
+    measured = thrown(tmp_path, rng, count, drag=0.02)
+    begun = asked(measured)
+    held = Holdout(begun, measured)
+    windows = begun.judge.windows
+    assert held.held.any() and (held.train.counts & ~held.held).any()
+    assert not (held.train.counts & held.held).any()
+    travel = [np.ptp(windows.position[row[row >= 0]]) for row in windows.rows[held.held]]
+    if count < 4:
+        assert np.median(travel) > 50 * SIGMA  # one may reach beyond its block
+    else:
+        assert set(windows.run[held.held]) == {3}
+
+
+def test_windows_follow_the_blocks(tmp_path, rng):
+    """The middle of each window that is held out is in a block that is, of nearly its length."""
+    measured = thrown(tmp_path, rng, 3, drag=0.02)
+    for length in (0.1, 0.3):
+        windows = windows_for(measured, length)
+        held = held_windows(measured, windows)
+        spans = [
+            (block.run, *measured.runs[block.run].time[block.samples][[0, -1]])
+            for block in held_blocks(measured, windows.length)
+        ]
+        for k, row in enumerate(windows.rows):
+            own = windows.time[row[row >= 0]]
+            middle = own[len(own) // 2]
+            inside = any(r == windows.run[k] and a <= middle <= b for r, a, b in spans)
+            assert inside == held[k]
