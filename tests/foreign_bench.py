@@ -111,7 +111,8 @@ def told(row: dict) -> str:
     refused = f"; {added}" if added and added != row["named"][0][0] else ""
     return (
         f"{row['case']} {'  ' if row['right'] else '! '}{row['answer']:32} {row['verdict']:16} "
-        f"{named or '-'}; unseen {row['before']:.1f} -> {row['after']:.2f}; {row['seconds']:.0f} s{refused}"
+        f"{named or '-'}; unseen {row['before']:.1f} -> {row['after']:.2f}; "
+        f"{row['seconds']:.0f} s{refused}"
     )
 
 

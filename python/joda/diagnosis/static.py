@@ -72,5 +72,6 @@ def curve_windows(measured: Measured) -> CurveWindows:
         rows=rows,
         whitener=np.einsum("mi,ij->mij", 1 / spread, np.eye(most)),
         knocks=np.zeros(count, bool),
+        rests=np.zeros(count, bool),
         model=lambda profile: static_force(profile, measured.context, at, direction),
     )

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 WINDOWS = (0.02, 0.03, 0.045, 0.07)
 """Half widths (s) that are tried, from the narrowest on, of a motion of usual pace."""
 USUAL_PACE = 0.15
-"""Pace (s) from which a motion counts as usual; a faster one has proportionally narrower windows."""
+"""Pace (s) from which a motion counts as usual; a faster one has narrower windows in proportion."""
 FASTEST = 0.9
 """Quantile of a motion's speeds that tells its pace."""
 CLEAR_MOTION, SEEN_MOTION = 10.0, 0.1
@@ -90,7 +90,8 @@ def pooled_noise(signals: Sequence[tuple[Array, Array]]) -> float:
 
 def _changes(position: Array) -> NDArray[np.bool_]:
     """Whether any two of five successive samples differ, shape (n - 4,)."""
-    return np.ptp(np.lib.stride_tricks.sliding_window_view(position, 5), axis=1) > 0
+    five = np.lib.stride_tricks.sliding_window_view(position, 5)
+    return np.asarray(np.ptp(five, axis=1) > 0)
 
 
 def trimmed_deviation(values: Array) -> float:
