@@ -188,18 +188,28 @@ class Judge:
         return float(np.sum((room * np.log1p(squares / level / room))[self.counts]))
 
     def linear(
-        self, make: Make, unknowns: Unknowns, x: Array, start: Array, bend: float = BEND
+        self,
+        make: Make,
+        unknowns: Unknowns,
+        x: Array,
+        start: Array,
+        bend: float = BEND,
+        central: bool = True,
     ) -> Linear:
-        """The model about a point."""
+        """The model about a point, by central differences or by one-sided ones."""
         windows, k = self.windows, len(x)
         solo, off = make(x), np.diag(unknowns.step)
         up, down = np.minimum(x + off, unknowns.high), np.maximum(x - off, unknowns.low)
-        misfits = [windows.misfit(make(y), start) for y in (*up, *down)]
+        if not central:
+            up = np.where((np.diag(up) > x)[:, None], up, down)
+        tried = (*up, *down) if central else tuple(up)
+        misfits = [windows.misfit(make(y), start) for y in tried]
         misfits += [windows.misfit(solo, start + NUDGE * windows.doubt * way) for way in np.eye(2)]
         found = windows.residuals(np.stack(misfits, axis=1))
         r, squares = self.squares(solo, start)
-        J = (found[:, :, :k] - found[:, :, k : 2 * k]) / np.diag(up - down)
-        S = (found[:, :, 2 * k :] - r[:, :, None]) / NUDGE
+        base = found[:, :, k : 2 * k] if central else r[:, :, None]
+        J = (found[:, :, :k] - base) / (np.diag(up - down) if central else np.diag(up) - x)
+        S = (found[:, :, len(tried) :] - r[:, :, None]) / NUDGE
         room = bend * np.maximum(windows.count, 1)
         weight = np.where(self.counts, 1 / (1 + squares / room), 0.0)
         z = (start - windows.start) / windows.doubt
@@ -260,9 +270,9 @@ class Judge:
         x = np.clip(x, unknowns.low, unknowns.high)
         squares = self.squares(make(x), start)[1]
         loss = self.loss(squares, bend) + unknowns.penalty(x)
-        damping = 1e-3
+        damping, central = 1e-3, False
         for _ in range(iterations):
-            about = self.linear(make, unknowns, x, start, bend)
+            about = self.linear(make, unknowns, x, start, bend, central)
             H, gradient = about.normal()
             H = H + np.diag(unknowns.doubt**-2.0)
             gradient = gradient + (x - unknowns.mean) / unknowns.doubt**2
@@ -283,7 +293,9 @@ class Judge:
                 damping *= 10
             told(Fit(x, start, squares, loss))
             if before - loss < SETTLED:
-                break
+                if central:
+                    break
+                damping, central = 1e-3, True  # one-sided differences are cheap, but biased
         return Fit(x, start, squares, loss)
 
 
