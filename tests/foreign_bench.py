@@ -33,8 +33,9 @@ def examined(job: tuple[Path, bool]) -> dict:
 
 
 def _examined(folder: Path, adds: bool) -> dict:
-    from joda.diagnosis.mending import error, mend, parted
+    from joda.diagnosis.mending import error, mend
     from joda.diagnosis.outcome import read_runs
+    from joda.diagnosis.split import parted
     from joda.diagnosis.verdict import diagnosed
     from joda.measured.reading import read_measured
 

@@ -53,10 +53,12 @@ def windows_of(
         inertia: kg·m² or kg: how far the force's noise moves the joint.
         timestep: the scene's, s.
         length: of the windows, s; None: by the joint's pace.
-        fine: whether steps are shortened, so that the laws act and not their steps.
+        fine: whether steps are as short as the windows ask for, so that the laws act and not their
+            steps; else they are the scene's.
     """
-    length = length or _length(runs, sigmas, span)
-    h = float(timestep / np.ceil(timestep * STEPS / length)) if fine else timestep
+    usual = _length(runs, sigmas, span)
+    length = length or usual
+    h = _step(timestep, length, usual) if fine else timestep
     parts: list[tuple[NDArray[Any], ...]] = []
     samples: list[tuple[NDArray[Any], ...]] = []
     step, count = 0, 0
@@ -110,6 +112,20 @@ def windows_of(
         knocks=_knocks(rows, (position - lo) / span, spread / span),
         rests=_rests(rows, (position - lo) / span, spread / span),
     )
+
+
+def _step(timestep: float, length: float, usual: float) -> float:
+    """A part or a multiple of the scene's timestep (s) that is short for windows of some length.
+
+    Args:
+        timestep: the scene's, s.
+        length: of the windows, s.
+        usual: length of windows by the joint's pace, s; only for its sake are steps longer.
+    """
+    wanted = min(length / STEPS, max(timestep, usual / STEPS))
+    if wanted < timestep:
+        return float(timestep / np.ceil(timestep / wanted))
+    return float(timestep * np.floor(wanted / timestep + 1e-9))
 
 
 def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
@@ -180,11 +196,13 @@ def _whitener(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
 def _before_knocks(begins: Integers, index: Integers, s: Array, noise: Array) -> Integers:
     """Where windows begin, also just before a knock: what is before it tells of the joint."""
     rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
-    more = [
-        index[row[knock - APPROACH]]
-        for row, knock in zip(rows, _each_knock(rows, s, noise), strict=True)
-        if knock is not None and knock - APPROACH >= FEWEST
-    ]
+    more = []
+    for row, knock in zip(rows, _each_knock(rows, s, noise), strict=True):
+        before = 0 if knock is None else knock - APPROACH
+        if knock is not None and before < FEWEST:  # a short stroke: up to the knock itself
+            before = knock - 1
+        if before >= smoothing.LEAST:
+            more.append(index[row[before]])
     return np.unique(np.append(begins, np.array(more, int)))
 
 

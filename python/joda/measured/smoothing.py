@@ -21,8 +21,8 @@ USUAL_PACE = 0.15
 """Pace (s) from which a motion counts as usual; a faster one has narrower windows in proportion."""
 FASTEST = 0.9
 """Quantile of a motion's speeds that tells its pace."""
-CLEAR_MOTION, SEEN_MOTION = 10.0, 0.1
-"""Displacement, in noises, that tells a speed; part of the samples that must do so."""
+CLEAR_MOTION = 10.0
+"""Displacement, in noises, that tells a speed."""
 LEAST = 7
 """Fewest samples in a window."""
 REST = 2.0
@@ -202,7 +202,7 @@ def pace(time: Array, position: Array, sigma: float) -> float:
     while lag < len(time) // 2:
         moved = np.abs(position[lag:] - position[:-lag])
         clear = moved > CLEAR_MOTION * sigma
-        if clear.sum() > max(SEEN_MOTION * len(moved), 3):
+        if clear.sum() >= LEAST:
             speed = moved[clear] / (time[lag:] - time[:-lag])[clear]
             return float(np.ptp(position) / np.quantile(speed, FASTEST))
         lag *= 2
