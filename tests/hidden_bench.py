@@ -6,9 +6,10 @@ python tests/hidden_bench.py forced --cases 50      one line
 python tests/hidden_bench.py forced --seed 7 --out forced.jsonl    goes on where it was stopped
 
 Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
-all. `cover`: whether the true size and place lie within what is said, where only the true effect is
-asked for. `sure`: forced and free, the same and how sure the answers are. Every run draws a new
-master seed, from which all cases follow.
+few, all. `few`: one to three of the runs only, and adding what is named first. `cover`: whether the
+true size and place lie within what is said, where only the true effect is asked for. `sure`: forced
+and free, the same and how sure the answers are. Every run draws a new master seed, from which all
+cases follow.
 """
 
 import argparse
@@ -35,9 +36,9 @@ from joda.hidden import Case
 from joda.measured.reading import Measured
 
 CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
-CASES |= {"two": 10, "cover": 96}
+CASES |= {"two": 10, "cover": 96, "few": 50}
 """Groups of cases, and how many there are unless told."""
-NEEDS = {"all": [group for group in CASES if group not in ("place", "cover")]}
+NEEDS = {"all": [group for group in CASES if group not in ("place", "cover", "few")]}
 NEEDS |= {"sure": ["forced", "free"]}
 NEEDS |= {"confident": ["none", "forced", "free", "hard", "outside"]}
 NEEDS |= {"rose": ["add"], "time": ["add"]} | {group: [group] for group in CASES}
@@ -55,6 +56,8 @@ def examined(job: Job) -> dict:
         train, held_out = read(case)
         if job.second:
             return row | both(case, train, held_out)
+        if job.runs:
+            return row | few(case, train.changed(runs=job.runs), held_out)
         row |= said(train, job.exclude)
         if job.group == "none":
             row["floor"] = floor_of(case, held_out)
@@ -93,6 +96,22 @@ def added(job: Job, row: dict, case: Case, train: Measured, held_out: Measured) 
         new = error(held_out, mended.profile).window if mended.effect else before
         out[f"{key}_error"] = new
     return out
+
+
+def few(case: Case, train: Measured, held_out: Measured) -> dict:
+    """What is named of few runs, and the error on others before and after it is added."""
+    row = said(train)
+    before = error(held_out).window
+    out = row | {"before": before, "after_error": before, "added": [], "reason": None}
+    if not row["named"]:
+        return out
+    first = tuple(row["named"][0][key] for key in ("effect", "direction", "interval"))
+    mended = mend(*parted(train), *first)
+    if not mended.effect:
+        return out | {"reason": mended.reason}
+    after = error(held_out, mended.profile).window
+    departs = list(mended.departs.sentences)
+    return out | {"after_error": after, "added": [mended.effect], "departs": departs}
 
 
 def both(case: Case, train: Measured, held_out: Measured) -> dict:

@@ -44,7 +44,8 @@ AGAIN = 5
 
 @dataclass(frozen=True)
 class Job:
-    """A case to be drawn and examined; `wrong` is an effect to be added on purpose."""
+    """A case to be drawn and examined; `wrong` is an effect to be added on purpose, `runs` are the
+    only ones that there are."""
 
     master: int
     group: str
@@ -55,6 +56,7 @@ class Job:
     forced: bool = True
     exclude: tuple[str, ...] = ()
     wrong: str | None = None
+    runs: tuple[int, ...] = ()
 
 
 def dice(master: int, *what) -> np.random.Generator:
@@ -84,6 +86,11 @@ def job_of(master: int, group: str, number: int) -> Job:
         effect = turn(EFFECTS)
         others = tuple(name for name in EFFECTS if name != effect)
         return replace(one, effect=effect, exclude=others, forced=forced or effect in PUSHED)
+    if group == "few":
+        effect, count = turn(EFFECTS), 1 + number // 2 % 3
+        runs = sorted(int(k) for k in rng.choice(8, count, replace=False))
+        forced = number % 2 == 0 or effect in PUSHED
+        return replace(one, effect=effect, forced=forced, runs=tuple(runs))
     if group == "two":
         families = rng.choice(len(FAMILIES), 2, replace=False)
         effect, second = (str(rng.choice(FAMILIES[k])) for k in families)
