@@ -7,11 +7,12 @@ python tests/hidden_bench.py forced --seed 7 --out forced.jsonl    goes on where
 python tests/hidden_bench.py families --family all --cases 2       every effect of every family
 
 Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
-families, all. `cover`: whether the true size and place lie within what is said, where only the true
-effect is asked for. `sure`: forced and free, the same and how sure the answers are. `families`:
-nothing, every effect with force and by positions only, and laws of no catalogue, so many cases of
-each; a table family by effect, and the error on unseen whole runs. Every run draws a new master
-seed, from which all cases follow.
+few, families, all. `few`: one to three of the runs only, and adding what is named first. `cover`:
+whether the true size and place lie within what is said, where only the true effect is asked for.
+`sure`: forced and free, the same and how sure the answers are. `families`: nothing, every effect
+with force and by positions only, and laws of no catalogue, so many cases of each; a table family by
+effect, and the error on unseen whole runs. Every run draws a new master seed, from which all cases
+follow.
 """
 
 import argparse
@@ -40,9 +41,10 @@ from joda.hidden.cases import FAMILY
 from joda.measured.reading import Measured
 
 CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
-CASES |= {"two": 10, "cover": 96, "families": 1}
+CASES |= {"two": 10, "cover": 96, "few": 50, "families": 1}
 """Groups of cases, and how many there are unless told; of `families`, of each effect."""
-NEEDS = {"all": [group for group in CASES if group not in ("place", "cover", "families")]}
+APART = ("place", "cover", "few", "families")
+NEEDS = {"all": [group for group in CASES if group not in APART]}
 NEEDS |= {"sure": ["forced", "free"]}
 NEEDS |= {"confident": ["none", "forced", "free", "hard", "outside"]}
 NEEDS |= {"rose": ["add"], "time": ["add"]} | {group: [group] for group in CASES}
@@ -62,6 +64,8 @@ def examined(job: Job) -> dict:
         if job.second:
             row["second"] = case.seal["second"]["effect"]
             return row | both(case, train, held_out)
+        if job.runs:
+            return row | few(case, train.changed(runs=job.runs), held_out)
         row |= said(train, job.exclude)
         if job.group == "families":
             row |= unseen(row, case, train, held_out)
@@ -113,6 +117,22 @@ def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
         after = error(held_out, mended.profile).whole if mended.effect else before
     least = case.achievable.together
     return {"unseen_before": before / least, "unseen": after / least}
+
+
+def few(case: Case, train: Measured, held_out: Measured) -> dict:
+    """What is named of few runs, and the error on others before and after it is added."""
+    row = said(train)
+    before = error(held_out).window
+    out = row | {"before": before, "after_error": before, "added": [], "reason": None}
+    if not row["named"]:
+        return out
+    first = tuple(row["named"][0][key] for key in ("effect", "direction", "interval"))
+    mended = mend(*parted(train), *first)
+    if not mended.effect:
+        return out | {"reason": mended.reason}
+    after = error(held_out, mended.profile).window
+    departs = list(mended.departs.sentences)
+    return out | {"after_error": after, "added": [mended.effect], "departs": departs}
 
 
 def both(case: Case, train: Measured, held_out: Measured) -> dict:

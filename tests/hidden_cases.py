@@ -43,7 +43,8 @@ AGAIN = 5
 
 @dataclass(frozen=True)
 class Job:
-    """A case to be drawn and examined; `wrong` is an effect to be added on purpose."""
+    """A case to be drawn and examined; `wrong` is an effect to be added on purpose, `runs` are the
+    only ones that there are."""
 
     master: int
     group: str
@@ -55,6 +56,7 @@ class Job:
     exclude: tuple[str, ...] = ()
     wrong: str | None = None
     family: str = FAMILY
+    runs: tuple[int, ...] = ()
 
 
 def dice(master: int, *what) -> np.random.Generator:
@@ -101,6 +103,11 @@ def job_of(master: int, group: str, number: int, family: str = FAMILY) -> Job:
         others = tuple(name for name in EFFECTS if name not in (effect, PARTIAL.get(effect)))
         forced |= effect in FAMILIES[family].pushed
         return replace(one, effect=effect, exclude=others, forced=forced)
+    if group == "few":
+        effect, count = turn(EFFECTS), 1 + number // 2 % 3
+        runs = sorted(int(k) for k in rng.choice(8, count, replace=False))
+        forced = number % 2 == 0 or effect in FAMILIES[family].pushed
+        return replace(one, effect=effect, forced=forced, runs=tuple(runs))
     if group == "two":
         kinds = rng.choice(len(KINDS), 2, replace=False)
         effect, second = (str(rng.choice(KINDS[k])) for k in kinds)

@@ -54,6 +54,16 @@ def found(row: dict) -> bool:
     return {row["effect"], row["second"]} <= set(row.get("added", []))
 
 
+def refused(row: dict) -> bool:
+    """Whether a right answer was not added."""
+    return right(row) and not row.get("added")
+
+
+def rose(row: dict) -> bool:
+    """Whether the error on runs that nothing has seen rose by more than 5 %."""
+    return "failed" in row or row["after_error"] > 1.05 * row["before"]
+
+
 def misled(row: dict) -> bool:
     """Whether what is named first is wrong."""
     if hides(row) != "effect":
@@ -67,6 +77,8 @@ def fine(row: dict) -> bool:
         return row.get("verdict") == "adequate"
     if hides(row) == "outside":
         return unexplained(row)
+    if row["group"] == "few":
+        return not (refused(row) or rose(row))
     return found(row) if row["second"] else right(row)
 
 
@@ -157,6 +169,13 @@ def figures(rows: list[dict]) -> Iterator[Figure]:
         if changes:
             count = sum(x > 1 for x in changes)
             yield what, "0", f"{count}; at most {max(changes):.3g} times", len(changes)
+    fews = of("few")
+    yield from share("few: unseen error rose by more than 5 %", "0", fews, rose)
+    for way, push in (("forced", True), ("free", False)):
+        some = [row for row in fews if row["forced"] == push and row.get("named")]
+        yield from share(f"few: right effect first, {way}", "", some, right)
+        known = [row for row in some if right(row)]
+        yield from share(f"few: right effect refused, {way}", "≤ 15 %", known, refused)
     told_of = [row for row in of("cover", "forced", "add", "free") if right(row)]
     yield from coverage(told_of)
     yield from reliability([row for row in of("forced", "add", "free") if row.get("named")])
@@ -177,6 +196,11 @@ def told(row: dict) -> str:
     begin = f"{case}, seed {row['seed']}, {hidden}: "
     if "failed" in row:
         return begin + row["failed"].strip().splitlines()[-1]
+    if row["group"] == "few":
+        what = ", ".join(row["added"]) or row["reason"] or "nothing"
+        ratio = row["after_error"] / row["before"]
+        named = first(row)["effect"] or row["verdict"]
+        return begin + f"{len(row['runs'])} runs, {named}; {what}; error × {ratio:.3g}"
     if row["second"]:
         return begin + (", ".join(row["added"]) or "nothing") + f" added; {row['why']}"
     names = ", ".join(f"{one['effect']} {one['probability']:.2f}" for one in row["named"][:3])

@@ -5,7 +5,7 @@ import numpy as np
 from joda.measured.reading import read_measured
 from joda.measured.runs import Run, write_run
 
-INERTIA, FRICTION, SPAN, SIGMA, RATE = 0.03, 0.05, 4.0, 4e-4, 400
+INERTIA, FRICTION, SPAN, SIGMA, RATE = 0.03, 0.05, 4.5, 4e-4, 400
 SCENE = f"""<mujoco>
   <compiler angle="radian"/>
   <option timestep="0.002" gravity="0 0 0"/>
@@ -26,7 +26,7 @@ def flicked(rng, drag, friction):
     b = sqrt(m k), and q = q0 + log(cos(a - b t) / cos a) / k.
     """
     k, m = drag / INERTIA, friction / INERTIA
-    start, speed, b = rng.uniform(0.1, 0.5), rng.uniform(3.0, 5.0), np.sqrt(m * k)
+    start, speed, b = rng.uniform(0.1, 0.5), rng.uniform(2.5, 3.5), np.sqrt(m * k)
     a = np.arctan(speed * np.sqrt(k / m))
     time = np.arange(0, rng.uniform(3.5, 4.5) * a / b, 1 / RATE)
     return time, start + np.log(np.cos(np.maximum(a - b * time, 0)) / np.cos(a)) / k

@@ -103,6 +103,16 @@ def test_where_else_it_acts_is_told(near, said):
         assert "acts at s = 0.20 to 0.40, diagnosed at s = 0.00 to 0.50" in told
 
 
+def test_a_magnet_acts_where_its_pull_is_a_twentieth_and_more():
+    x = np.linspace(0, 1, 81)
+    part = Component(
+        label="magnetic_return_to_low_end", interval=(0, 1), x=tuple(x), y=tuple(-np.exp(-20 * x))
+    )
+    fitted = LID.with_component("conservative", part)
+    assert departures(LID, fitted, part.label, (0.0, 0.15)).elsewhere is None
+    assert departures(LID, fitted, part.label, (0.0, 0.5)).elsewhere
+
+
 # --- fits
 ADDED = "constant_friction_hinge"
 RUBS = 0.07

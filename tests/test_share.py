@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from joda.component import Component
-from joda.diagnosis.share import divided, overlap, place
+from joda.diagnosis.share import divided, overlap, places
 from joda.effects import AsymmetricFriction, StribeckFriction
 from joda.profile import CHANNELS, Joint, Profile
 
@@ -66,12 +66,22 @@ def test_where_an_effect_acts_in_closed_form(y, interval, where):
     part = Component(label="detent_internal", interval=interval, x=x, y=values)
     for channel in CHANNELS:
         profile = Profile(joint=JOINT).with_component(channel, part)
-        assert place(profile, "detent_internal") == pytest.approx(where, abs=0.005)
+        assert places(profile, "detent_internal")[0] == pytest.approx(where, abs=0.005)
+
+
+def test_a_pull_that_runs_out_slowly_acts_from_a_twentieth_on():
+    x = np.linspace(0, 1, 81)
+    part = Component(
+        label="magnetic_return_to_low_end", interval=(0, 1), x=tuple(x), y=tuple(-np.exp(-10 * x))
+    )
+    profile = Profile(joint=JOINT).with_component("conservative", part)
+    for (low, high), level in zip(places(profile, part.label), (0.2, 0.1, 0.05), strict=True):
+        assert (low, high) == pytest.approx((0.0, -np.log(level) / 10), abs=0.005)
 
 
 def test_a_law_acts_everywhere():
     profile = Profile(joint=JOINT).with_effect(StribeckFriction(velocity=0.1, y=(1.0, 1.0)))
-    assert place(profile, "stribeck_friction") == (0.0, 1.0)
+    assert places(profile, "stribeck_friction") == [(0.0, 1.0)]
 
 
 def test_the_overlap_of_places():

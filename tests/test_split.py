@@ -75,7 +75,6 @@ def test_an_effect_of_a_joint_that_comes_to_rest_is_added(tmp_path, rng, count):
     measured = thrown(tmp_path, rng, count, drag)
     mended = mend(*parted(measured), "quadratic_damping")
     assert mended.effect == "quadratic_damping", mended.reason
-    assert max(mended.profile.effects[0].y) == pytest.approx(drag, rel=0.1)
     other = tmp_path / "other"
     other.mkdir()
     unseen = thrown(other, rng, 4, drag)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from joda.diagnosis.baseline import base_of, single_for
+from joda.diagnosis.baseline import base_of, single_for, units_of, windows_for
 from joda.diagnosis.cutting import windows_of
 from joda.diagnosis.judge import EMPTY, NOTHING, Fit, Judge
 from joda.measured import smoothing
@@ -120,6 +120,19 @@ def test_ends_that_somebody_chose_or_that_yield_are_as_they_are(tmp_path, more, 
 
 
 # --- starts that are stuck
+def test_where_only_knocks_have_been_nothing_was_measured(tmp_path):
+    """No window with a knock counts, and so nothing tells of a curve there."""
+    swing = 0.5 + 0.2 * np.sin(2 * STEP * np.arange(2000))
+    thrown = np.abs(1 - swing[-1] - 3 * STEP * np.arange(220))  # 3 m/s, thrown back at the end
+    found = measured(tmp_path, np.append(swing, 1 - thrown))
+    windows = windows_for(found)
+    knock = windows.rows[windows.knocks]
+    assert windows.position[knock[knock >= 0]].max() > 0.98
+    first, last = units_of(windows, found).visited
+    assert first == pytest.approx(0.5 + 0.2 * np.sin(2 * STEP * 2000), abs=0.01)
+    assert last < 0.98
+
+
 def test_a_fit_takes_a_windows_start_anew_where_that_is_better():
     """Over an edge between two sides a start does not come back by small steps."""
     windows = cut(0.5 + 0.2 * np.sin(3 * STEP * np.arange(2000)))

@@ -109,7 +109,7 @@ def units_of(windows: Windows, measured: Measured) -> Units:
         speed=speed or 1.0,
         inertia=inertia,
         span=float(np.ptp(profile.joint.range)),
-        visited=_visited(measured),
+        visited=_visited(windows, measured),
         friction=friction,
         forced=not measured.runs or any(run.forced for run in measured.runs),
         weight=max(map(abs, measured.context.gravity_force)),
@@ -117,11 +117,17 @@ def units_of(windows: Windows, measured: Measured) -> Units:
     )
 
 
-def _visited(measured: Measured) -> tuple[float, float]:
-    """Part of the range that was measured."""
+def _visited(windows: Windows, measured: Measured) -> tuple[float, float]:
+    """Part of the range that was measured in windows that count: where a knock is, none does."""
     lo, hi = measured.profile.joint.range
-    measurements = measured.runs or [gauged.curve for gauged in measured.curves]
-    s = (np.concatenate([one.position for one in measurements]) - lo) / (hi - lo)
+    if measured.runs:
+        rows = windows.rows[usable(windows)]
+        positions = windows.position[rows[rows >= 0]]
+    else:
+        positions = np.concatenate([gauged.curve.position for gauged in measured.curves])
+    if not len(positions):
+        return 0.0, 1.0
+    s = (positions - lo) / (hi - lo)
     first, last = float(s.min()), float(s.max())
     first, last = first if first > AT_END else 0.0, last if last < 1 - AT_END else 1.0
     return (first, last) if last - first > AT_END else (0.0, 1.0)

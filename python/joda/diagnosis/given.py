@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from joda.component import Component
-from joda.diagnosis.share import Interval, overlap, place
+from joda.diagnosis.share import Interval, overlap, places
 from joda.effects import AnyEffect
 from joda.field import evaluate
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile
@@ -71,7 +71,6 @@ def departures(
         near: where it was diagnosed, in normalised position, if that is known.
     """
     parts = moved(given, profile, effect)
-    there = place(profile, effect, given)
     changed = elsewhere = None
     if parts:
         changed = (
@@ -79,8 +78,9 @@ def departures(
             f"{', '.join(part.told for part in parts)}. With that as given, no fit does as well on "
             "what was held out."
         )
-    if near and overlap(there, near) < SHARED:
-        (a, b), (c, d) = there, near
+    there = places(profile, effect, given)
+    if near and all(overlap(one, near) < SHARED for one in there):
+        (a, b), (c, d) = there[0], near
         elsewhere = (
             f"{effect} acts at s = {a:.2f} to {b:.2f}, diagnosed at s = {c:.2f} to {d:.2f}. No fit "
             "near that place does as well on what was held out."

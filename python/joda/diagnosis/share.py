@@ -9,9 +9,10 @@ from joda.profile import CHANNELS, Channels, Profile
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
-FELT = 0.2
-"""Part of its rise above its least value from which an effect acts."""
-LEVEL = 1e-9
+LEVELS = (0.2, 0.1, 0.05)
+"""Parts of its rise above its least value from which an effect acts: of most; of a free curve; of
+a magnet, whose pull runs out slowly."""
+EVEN = 1e-9
 """What part of its size a curve rises at least that is not the same all over the range."""
 GRID = 401
 """Positions at which that is looked for."""
@@ -44,8 +45,10 @@ def _some(profile: Profile, effect: str, given: Profile | None, *, own: bool) ->
     return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})
 
 
-def place(profile: Profile, effect: str, given: Profile | None = None) -> Interval:
-    """Where a profile's effect acts, in normalised position: all over the range if it is a law.
+def places(profile: Profile, effect: str, given: Profile | None = None) -> list[Interval]:
+    """Where a profile's effect acts, in normalised position, by each of the levels.
+
+    All over the range if it is a law.
 
     Args:
         profile: that has it.
@@ -56,16 +59,17 @@ def place(profile: Profile, effect: str, given: Profile | None = None) -> Interv
     for name in CHANNELS:  # a catch has friction beside its force: the force comes first
         channel = getattr(own.channels, name)
         if channel.components:
-            return _felt(np.abs(merge(channel)(np.linspace(0, 1, GRID))[0]))
-    return 0.0, 1.0
+            value = np.abs(merge(channel)(np.linspace(0, 1, GRID))[0])
+            return [_felt(value, level) for level in LEVELS]
+    return [(0.0, 1.0)]
 
 
-def _felt(value: Array) -> Interval:
+def _felt(value: Array, level: float) -> Interval:
     """Where values over the range rise above the least of them."""
     rise = value - value.min()
-    if rise.max() <= LEVEL * value.max():
+    if rise.max() <= EVEN * value.max():
         return 0.0, 1.0
-    there = np.flatnonzero(rise >= FELT * rise.max())
+    there = np.flatnonzero(rise >= level * rise.max())
     return float(there[0]) / (GRID - 1), float(there[-1]) / (GRID - 1)
 
 
