@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "attributes.h"
+#include "end_stop.h"
 #include "field.h"
 #include "joint_dynamics.h"
 #include "solo.h"
@@ -115,6 +116,9 @@ Raises:
                              "Breakpoints in s, shape (n + 1,).")
       .def_property_readonly("coefficients", &joda::PiecewiseCubic::coefficients,
                              "c0..c3 of each piece about its left knot, shape (4, n).");
+
+  module.def("stop_damping", &joda::StopDamping, py::arg("restitution"),
+             "Damping, times the timestep, of an end stop with this restitution, 0 <= it < 1.");
 
   module.def(
       "set_profile",

@@ -195,6 +195,11 @@ void CheckIntegrator(const mjModel* m, int joint, const Effects& effects) {
              (discrete ? "integrator=\"discrete\"; choose integrator=\"implicitfast\""
                        : "noslip_iterations; set them to 0"));
   }
+  if ((effects.stops.low || effects.stops.high) && discrete) {
+    fail("end_stop_restitution",
+         "which at one end alone does nothing with integrator=\"discrete\"; choose "
+         "integrator=\"implicitfast\"");
+  }
   if (effects.IsAsymmetric() && discrete && !HoldsInDiscrete(m, m->jnt_dofadr[joint])) {
     fail("asymmetric_friction",
          "which makes it creep at rest with integrator=\"discrete\"; write solreffriction=\"0 " +

@@ -6,6 +6,7 @@
 #include "effects.h"
 
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -143,8 +144,24 @@ void ReadGravityOffset(const EffectText& text, Effects* out) {
   out->gravity = {sin, cos, text.Number("force", 0), std::hypot(sin, cos)};
 }
 
-void CheckRestitution(const EffectText& text) {
-  if (text.NotNegative("restitution") >= 1) Fail("restitution must be less than 1");
+void ReadRestitution(const EffectText& text, EndStops* out) {
+  const double restitution = text.NotNegative("restitution");
+  if (restitution >= 1) Fail("restitution must be less than 1");
+  const std::string_view end = text.Has("end") ? text.Value("end") : "both";
+  const bool both = end == "both";
+  if (!both && end != "low" && end != "high") {
+    Fail("end must be low, high or both, got " + internal::Quote(end));
+  }
+  if (out->both || (both && (out->low || out->high))) {
+    Fail("one at both ends excludes another");
+  }
+  if (both) {
+    out->both = true;
+    return;
+  }
+  std::optional<double>& stop = end == "low" ? out->low : out->high;
+  if (stop) Fail("there are two of it at the " + std::string(end) + " end");
+  stop = StopDamping(restitution);
 }
 
 struct Kind {
@@ -174,8 +191,8 @@ constexpr Kind kKinds[] = {
      }},
     {"added_inertia", "inertia", false, false,
      [](const EffectText& text, Effects* out) { out->added_inertia = text.Positive("inertia"); }},
-    {"end_stop_restitution", "restitution", false, false,
-     [](const EffectText& text, Effects*) { CheckRestitution(text); }},
+    {"end_stop_restitution", "restitution end", false, false,
+     [](const EffectText& text, Effects* out) { ReadRestitution(text, &out->stops); }},
 };
 
 const Kind& FindKind(std::string_view name) {
@@ -187,12 +204,18 @@ const Kind& FindKind(std::string_view name) {
   Fail("there is no such effect; there are " + names);
 }
 
+// Whether the effect may be there once for each direction or end, which its reader sees to.
+bool HasSides(const Kind& kind) {
+  const auto keys = internal::Words(kind.keys);
+  return std::any_of(keys.begin(), keys.end(),
+                     [](std::string_view key) { return key == "direction" || key == "end"; });
+}
+
 void ReadEffect(const EffectText& text, std::set<std::string_view>* seen, Effects* out) {
   const Kind& kind = FindKind(text.name());
   text.CheckKeys(kind.keys);
   if (!kind.has_curve) text.CheckNoCurve();
-  const bool may_repeat = std::string_view(kind.keys) == "direction";
-  if (!seen->insert(kind.name).second && !may_repeat) Fail("there are two of it");
+  if (!seen->insert(kind.name).second && !HasSides(kind)) Fail("there are two of it");
   kind.read(text, out);
   if (kind.needs_row) out->needs_row = kind.name;
 }

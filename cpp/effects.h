@@ -10,6 +10,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "end_stop.h"
 #include "field.h"
 
 namespace joda {
@@ -55,6 +56,7 @@ struct Effects {
   Presliding presliding;       // of the friction row
   GravityOffset gravity;       // a passive force
   Backlash backlash;           // between the applied force and the part
+  EndStops stops;              // of the range
   double added_inertia = 0;    // that the joint's armature must hold (kg m^2)
   const char* needs_row = "";  // an effect that needs the friction row, "": none of them does
 

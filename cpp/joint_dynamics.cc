@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -112,6 +114,24 @@ double JointDynamics::SetFrictionRow(const Step& step, mjData* d, int row, const
   return stiffened.damping;
 }
 
+void JointDynamics::SetStops(const mjModel* m, const Step& step, mjData* d, const Joint& joint) {
+  const EndStops& stops = joint.profile.effects->stops;
+  if (!stops.low && !stops.high) return;
+  const int first = d->ne + d->nf, last = first + d->nl;
+  const auto is_own = [&](int row) {
+    return row >= first && row < last && d->efc_type[row] == mjCNSTR_LIMIT_JOINT &&
+           d->efc_id[row] == joint.id;
+  };
+  int row = FindRow(d, first, last, 0, mjCNSTR_LIMIT_JOINT, joint.id);
+  if (is_own(row - 1)) --row;  // a margin may bring both ends near
+  for (; is_own(row); ++row) {
+    const std::ptrdiff_t dense = static_cast<std::ptrdiff_t>(row) * m->nv + joint.dof;
+    const mjtNum side = d->efc_J[step.sparse ? d->efc_J_rowadr[row] : dense];
+    const std::optional<double>& damping = side > 0 ? stops.low : stops.high;
+    if (damping) SetStop(step, d, row, MakeStopRow(*damping, step.h, 1 / d->efc_diagA[row]));
+  }
+}
+
 double JointDynamics::PushThroughPlay(const mjData* d, const mjtNum* state, double h,
                                       Joint* joint) {
   joint->applied = d->qfrc_applied[joint->dof];
@@ -138,6 +158,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
     if (effects) {
       spring += OffsetForce(effects->gravity, q);
       if (step.damper) drag += ExtraDamping(*effects, s, v);
+      SetStops(m, step, d, joint);
     }
     const double stiffness = ImplicitStiffness(p, step.spring, h, s, v, spring, inertia);
     drag += h * stiffness;

@@ -62,6 +62,9 @@ class JointDynamics {
   static double SetFrictionRow(const Step& step, mjData* d, int row, const Joint& joint,
                                double bound, double state, double inertia);
 
+  // Sets the rows of those ends of the joint's range that have a restitution of their own.
+  static void SetStops(const mjModel* m, const Step& step, mjData* d, const Joint& joint);
+
   // Moves the joint's handle; returns what it exerts on the part beyond the applied force.
   static double PushThroughPlay(const mjData* d, const mjtNum* state, double h, Joint* joint);
 

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "end_stop.h"
+
 namespace joda {
 
 // Row among [first, last) of this step's constraints that belongs to the object, -1: none. Rows
@@ -42,14 +44,14 @@ struct Step {
         // compliance of friction rows
         keeps_rows(m->opt.integrator != mjINT_DISCRETE && m->opt.noslip_iterations == 0),
         dual(m->opt.solver == mjSOL_PGS || m->opt.noslip_iterations > 0),
-        sparse(dual && mj_isSparse(m)) {}
+        sparse(mj_isSparse(m)) {}
 };
 
-// Makes the row resist the velocity at the end of the step: force = offset - D (a + v / h), within
-// +-bound.
-inline void SetRow(const Step& step, mjData* d, int row, double D, double bound, double offset) {
+// Gives the row another D, wherever the solvers read it.
+inline void SetD(const Step& step, mjData* d, int row, double D) {
   const double R = 1 / D;
-  if (step.dual) {  // the dual solvers see R on the diagonal of A + R
+  // the dual solvers see R on the diagonal of A + R, which mj_inverse does not make
+  if (step.dual && d->efc_AR) {
     mjtNum* diagonal = d->efc_AR + static_cast<std::ptrdiff_t>(row) * (d->nefc + 1);
     if (step.sparse) {
       const int* colind = d->efc_AR_colind + d->efc_AR_rowadr[row];
@@ -60,19 +62,36 @@ inline void SetRow(const Step& step, mjData* d, int row, double D, double bound,
   }
   d->efc_D[row] = D;
   d->efc_R[row] = R;
-  d->efc_frictionloss[row] = bound;
-  // the engine computes the reference a = -B v - K I pos from these right after the passive forces
-  d->efc_pos[row] = -offset * R;
-  mjtNum* KBIP = d->efc_KBIP + 4 * row;
-  KBIP[0] = 1;
-  KBIP[1] = step.per_h;
-  KBIP[2] = 1;
   if (d->nisland > 0) {
     const int i = d->map_efc2iefc[row];
     d->iefc_D[i] = D;
     d->iefc_R[i] = R;
-    d->iefc_frictionloss[i] = bound;
   }
+}
+
+// Sets the reference a = -damping v - stiffness (pos - margin), which the engine computes right
+// after the passive forces.
+inline void SetReference(mjData* d, int row, double stiffness, double damping) {
+  mjtNum* KBIP = d->efc_KBIP + 4 * row;
+  KBIP[0] = stiffness;
+  KBIP[1] = damping;
+  KBIP[2] = 1;
+}
+
+// Makes the row resist the velocity at the end of the step: force = offset - D (a + v / h), within
+// +-bound.
+inline void SetRow(const Step& step, mjData* d, int row, double D, double bound, double offset) {
+  SetD(step, d, row, D);
+  d->efc_frictionloss[row] = bound;
+  if (d->nisland > 0) d->iefc_frictionloss[d->map_efc2iefc[row]] = bound;
+  d->efc_pos[row] = -offset * d->efc_R[row];
+  SetReference(d, row, 1, step.per_h);
+}
+
+// Makes the limit's row that of an end stop.
+inline void SetStop(const Step& step, mjData* d, int row, const StopRow& stop) {
+  SetD(step, d, row, stop.D);
+  SetReference(d, row, stop.stiffness, stop.damping);
 }
 
 }  // namespace joda

@@ -135,6 +135,12 @@ Solo::Limit Solo::EndAt(double h, double q, double v) const {
   const auto [lo, hi] = body_.range;
   const bool low = q < lo;
   const double sign = low ? 1 : -1, distance = low ? q - lo : hi - q;
+  if (const Effects* effects = profile_.effects.get()) {
+    if (const auto& own = low ? effects->stops.low : effects->stops.high) {
+      const StopRow stop = MakeStopRow(*own, h, body_.row_inertia);
+      return {sign, stop.D, -stop.damping * sign * v - stop.stiffness * distance};
+    }
+  }
   const double dmax = body_.solimp[1], impedance = Impedance(-distance);
   double stiffness = -body_.solref[0], damping = -body_.solref[1];
   if (body_.solref[0] > 0) {

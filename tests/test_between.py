@@ -7,6 +7,7 @@ import pytest
 from refine_table import MODELS, NOISE, STEP, cabinet_profile, errors, planted, quiet_rig
 
 from joda import context
+from joda.effects import EndStopRestitution
 from joda.joints import single
 from joda.joints.parameters import KINDS, Parameters
 from joda.refining.between import Between
@@ -124,3 +125,22 @@ def test_every_kind_of_number_does_what_it_does_in_jax():
         path, jax_solo.rollout(other, state, jnp.array(force), STEP)[1:], atol=1e-5
     )
     assert np.ptp(path) > 0.5
+
+
+@pytest.mark.parametrize("end", ["low", "high", "both"])
+def test_the_ends_bounce_as_those_of_the_model(end):
+    found = context(MODELS + "/cabinet.xml", "door")
+    profile = cabinet_profile(found, 2.5, 0.4)
+    profile = profile.with_effect(EndStopRestitution(restitution=0.6, end=end))
+    model = quiet_rig(found, profile)
+    model.opt.timestep = STEP
+    own = single.single(found, profile, model, 0)
+    solref, solimp = own.limits(profile, STEP)
+    parameters = Parameters(profile, KINDS)
+    joint = Between(replace(own, solref=solref, solimp=solimp), parameters, [], 1e-3, STEP)
+    force = np.repeat([-40.0, 40.0, 40.0, -40.0], 150)
+    begin = np.zeros(1, int), np.array([[0.3, 0.5]]), np.array([True])
+    path = joint.solo(parameters.start).replay(force, *begin, STEP)[1]
+    wanted = own.solo(profile, STEP).replay(force, *begin, STEP)[1]
+    np.testing.assert_array_equal(path, wanted)
+    assert path.min() < found.joint.range[0] and path.max() > found.joint.range[1]

@@ -124,6 +124,11 @@ REFUSED = {  # options of the scene: what the plugin says at load
         'the effect "presliding_friction", which does nothing with noslip_iterations; set them to '
         "0",
     ),
+    "one end stop": (
+        dict(effects="end_stop_restitution restitution=0.5 end=low", integrator="discrete"),
+        'the effect "end_stop_restitution", which at one end alone does nothing with '
+        'integrator="discrete"; choose integrator="implicitfast"',
+    ),
     "asymmetric": (
         dict(
             effects=f"asymmetric_friction direction=positive: {flat(1)}", integrator="discrete"

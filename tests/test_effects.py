@@ -48,6 +48,10 @@ ALL = (
     EndStopRestitution(restitution=0.35),
     Backlash(play=0.02, inertia=0.003),
 )
+EACH_END = (
+    EndStopRestitution(restitution=0.7, end="low"),
+    EndStopRestitution(restitution=0.1, end="high"),
+)
 SCENE = """<mujoco>
   <compiler angle="radian"/>
   <worldbody>
@@ -81,7 +85,7 @@ def test_every_effect_tells_its_law_units_and_typical_values(cls):
     for name in (*cls.parameters(), *({"y"} & set(cls.model_fields))):
         field = cls.model_fields[name]
         assert field.description, name
-        if name != "direction":
+        if name not in ("direction", "end"):
             unit, typical = (field.json_schema_extra[key] for key in ("unit", "typical"))
             assert len(unit) == 2
             assert typical[0] < typical[1]
@@ -98,10 +102,10 @@ def test_the_page_lists_what_the_catalogue_holds():
 
 
 def test_files_and_attributes_keep_everything(tmp_path):
-    whole = profile(*ALL)
-    file = write(tmp_path, whole.to_json(), "composed.json")
-    assert Profile.read(file) == whole
-    assert Profile.from_attributes(DOOR, whole.attributes()) == whole
+    for whole in (profile(*EACH_END), profile(*ALL)):
+        file = write(tmp_path, whole.to_json(), "composed.json")
+        assert Profile.read(file) == whole
+        assert Profile.from_attributes(DOOR, whole.attributes()) == whole
     assert json.loads(whole.to_json())["schema_version"] == 2
     assert json.loads(profile().to_json())["schema_version"] == 1
 
@@ -131,6 +135,11 @@ WRONG = {
     "effects[0].quadratic_damping: y must not be negative.": {
         "effect": "quadratic_damping",
         "y": [-1, 1],
+    },
+    "effects[0].end_stop_restitution.end: must be 'both', 'low' or 'high'.": {
+        "effect": "end_stop_restitution",
+        "restitution": 0.5,
+        "end": "upper",
     },
     "effects[0].backlash.width: unknown key": {
         "effect": "backlash",
@@ -165,6 +174,23 @@ def test_the_same_effect_twice_is_refused_unless_in_two_directions():
             QuadraticDamping(y=(1, 1)),
             QuadraticDamping(direction="positive", y=(1, 1)),
         )
+
+
+def test_each_end_has_one_restitution():
+    assert profile(*EACH_END).effects == EACH_END
+    assert EndStopRestitution(restitution=0.7).end == "both"
+    with pytest.raises(ValueError, match="has end_stop_restitution low already"):
+        profile(EACH_END[0], EACH_END[0])
+    with pytest.raises(ValueError, match="end_stop_restitution at both ends excludes that at one"):
+        profile(EndStopRestitution(restitution=0.7), EACH_END[1])
+    other = EndStopRestitution(restitution=0.3, end="low")
+    assert changes(profile(*EACH_END), profile(*EACH_END).with_effect(other)) == [
+        "end stop restitution, restitution 0.3, end low, "
+        "before end stop restitution, restitution 0.7, end low"
+    ]
+    assert changes(profile(*EACH_END), profile(EACH_END[0])) == [
+        "without end stop restitution high"
+    ]
 
 
 def test_an_effect_takes_the_place_of_its_like():
@@ -211,9 +237,10 @@ def attached(folder, *effects, more="", scene="in.xml", out="out.xml"):
     return mujoco.MjModel.from_xml_path(str(folder / out))
 
 
-def test_a_scene_carries_them_and_gives_them_back(tmp_path):
-    attached(tmp_path, *ALL)
-    assert read_profiles(tmp_path / "out.xml")["door"].effects == ALL
+@pytest.mark.parametrize("effects", [ALL, EACH_END])
+def test_a_scene_carries_them_and_gives_them_back(effects, tmp_path):
+    attached(tmp_path, *effects)
+    assert read_profiles(tmp_path / "out.xml")["door"].effects == effects
 
 
 def test_inertia_is_armature_and_goes_with_the_effect(tmp_path):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mujoco import mjx
 from slopes import FAST, check_slopes
-from test_solo_effects import cases, profile_of, pushes, run
+from test_solo_effects import STOPS, cases, profile_of, pushes, run
 
 import joda
 
@@ -22,6 +22,7 @@ import joda.mjx  # noqa: E402
 from joda.field.jaxeffects import NAMES, from_effects  # noqa: E402
 from joda.joints import solo  # noqa: E402
 from joda.profile import Channels  # noqa: E402
+from joda.scenes.scene import profiles_of  # noqa: E402
 
 H, STEPS = 0.004, 300
 JOINTS = {"arm": "hinge", "drawer": "slide"}
@@ -172,6 +173,57 @@ def test_joints_with_different_effects_stand_side_by_side(folder):
     assert (np.abs(found - np.stack(alone, 1)).max(0) < 1e-9 * SPANS).all()
 
 
+STOPPED = """
+<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.004" gravity="0 0 0" tolerance="1e-14" iterations="50"/>
+  <extension><plugin plugin="joda.joint_dynamics">
+    <instance name="low">
+      <config key="effects" value="end_stop_restitution restitution=0.7 end=low"/></instance>
+    <instance name="each"><config key="effects" value="end_stop_restitution restitution=0.2 end=low;
+      end_stop_restitution restitution=0.8 end=high"/></instance>
+  </plugin></extension>
+  <worldbody>
+    <body><joint name="first" type="slide" axis="1 0 0" range="0 1"/>{geom}</body>
+    <body pos="0 1 0"><joint name="low" type="slide" axis="1 0 0" range="0 1" margin="0.02"/>{geom}
+      <plugin instance="low"/></body>
+    <body pos="0 2 0"><joint type="ball" range="0 0.3"/>{geom}</body>
+    <body pos="0 3 0"><joint name="free" type="slide" axis="1 0 0" frictionloss="0.1"/>{geom}</body>
+    <body pos="0 4 0"><joint name="each" axis="1 0 0" range="0 1"/>{geom}
+      <plugin instance="each"/></body>
+  </worldbody>
+  <tendon><fixed frictionloss="0.1" range="-9 9"><joint joint="free" coef="1"/></fixed></tendon>
+  <equality><joint joint1="free" joint2="first"/></equality>
+</mujoco>""".replace("{geom}", '<geom size="0.1" mass="0.5" contype="0" conaffinity="0"/>')
+
+
+def test_end_stops_among_other_rows_are_the_plugins():
+    """Of two joints; others have limits and friction before and behind them."""
+    model = mujoco.MjModel.from_xml_string(STOPPED)
+    dof = np.array([model.joint(name).dofadr[0] for name in ("low", "each")])
+    place = np.array([model.joint(name).qposadr[0] for name in ("low", "each")])
+    forces = np.zeros((400, model.nv))
+    forces[:, 0] = forces[:, dof[0]] = np.repeat([8.0, -8.0, -8.0, 8.0], 100)
+    forces[:, dof[1]] = np.repeat([-0.2, 0.2, 0.2, -0.2], 100)
+    d = mujoco.MjData(model)
+    d.qpos[place] = 0.5
+    path = []
+    for force in forces:
+        d.qfrc_applied[:] = force
+        mujoco.mj_step(model, d)
+        path.append(d.qpos.copy())
+    path = np.array(path)
+    assert (path[:, place].min(0) < 0).all() and (path[:, place].max(0) > 1).all()
+    m, d = mjx.put_model(model), mjx.make_data(model)
+    d = d.replace(qpos=d.qpos.at[place].set(0.5))
+    fields = joda.mjx.put_fields(model, profiles_of(mujoco.MjSpec.from_string(STOPPED), model))
+    step, found = jax.jit(joda.mjx.step, compiler_options=FAST), []
+    for force in forces:
+        d = step(m, d.replace(qfrc_applied=jnp.asarray(force)), fields)
+        found.append(np.asarray(d.qpos))
+    np.testing.assert_allclose(found, path, rtol=0, atol=1e-7)
+
+
 def test_the_example_of_the_docs(folder):
     scene = Scene(folder, "stribeck_friction")
     text = (Path(__file__).parents[1] / "docs/mjx.md").read_text()
@@ -199,7 +251,7 @@ def test_derivatives_by_all_numbers_are_those_of_central_differences(folder):
         fields = scene.fields | {"arm": scene.fields["arm"].replace(effects=effects)}
         return joda.mjx.rollout(m, d, fields, jnp.array(swing), read=lambda d: d.qpos[0])[1]
 
-    path = check_slopes(positions, scene.fields["arm"].effects)
+    path = check_slopes(positions, scene.fields["arm"].effects, skip=STOPS)
     path = (path - LOW[0]) / SPANS[0]
     assert path.min() > 0 and path.max() < 1 and np.ptp(path) > 0.8
 

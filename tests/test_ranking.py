@@ -16,9 +16,10 @@ from joda.diagnosis.judge import BEND
 from joda.diagnosis.ranking import WELLS, WORST, rank
 from joda.diagnosis.verdict import diagnosed
 from joda.diagnosis.weighing import weigh
+from joda.effects import EndStopRestitution, QuadraticDamping
 from joda.field import evaluate
 from joda.hidden import EFFECTS, draw
-from joda.profile import Channel
+from joda.profile import Channel, Joint, Profile
 
 EFFECT = "quadratic_damping"
 OTHERS = (
@@ -134,6 +135,22 @@ def test_ends_that_are_bouncier_than_the_model_s_are_unexplained_if_that_is_excl
     without = diagnosed(train, {*others, "end_stop_restitution"}).diagnosis
     assert without.verdict == "unexplained"
     assert without.summary.startswith("The ends of the range throw the joint back")
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        EndStopRestitution(restitution=0.5, end="low"),
+        EndStopRestitution(restitution=0.5),
+        QuadraticDamping(direction="positive", y=(1, 1)),
+    ],
+)
+def test_what_a_profile_has_cannot_be_missing(effect):
+    joint = Joint(name="j", type="hinge", range=(0, 1), unit="rad")
+    profile = Profile(joint=joint, effects=(effect,))
+    offered = {h.effect for h in hypotheses(UNITS, templates(), profile)}
+    assert effect.effect not in offered
+    assert "added_inertia" in offered
 
 
 @pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])

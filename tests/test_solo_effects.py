@@ -76,8 +76,14 @@ def cases(kind, force, inertia, play):
         "backlash": (Backlash(play=play, inertia=0.2 * inertia),),
         "added_inertia": (AddedInertia(inertia=0.4 * inertia),),
         "end_stop_restitution": (EndStopRestitution(restitution=0.4),),
+        "end_stop_restitution low": (EndStopRestitution(restitution=0.7, end="low"),),
+        "end_stop_restitution each": (
+            EndStopRestitution(restitution=0.2, end="low"),
+            EndStopRestitution(restitution=0.8, end="high"),
+        ),
     }
     left_out = ("quadratic_damping down", "dahl", "prandtl")
+    left_out += ("end_stop_restitution low", "end_stop_restitution each")
     every = tuple(e for name, own in out.items() if name not in left_out for e in own)
     return {**out, "all": every}
 
@@ -293,6 +299,8 @@ def test_two_seconds_under_random_forces_are_the_plugins(kind, case):
 
 # --- derivatives
 
+STOPS = ("end_stop_restitution.low[]", "end_stop_restitution.high[]")
+"""Numbers of joints that do not come to their ends."""
 SWINGS = {"hinge": (5.0, -0.3, 1.3), "slide": (2.0, 0.0, 0.8)}
 """Amplitude and mean of a force that swings the joint through its range, and its period, s."""
 
@@ -309,8 +317,22 @@ def test_derivatives_by_all_numbers_are_those_of_central_differences(kind):
     def positions(effects):
         return solo.rollout(replace(joint, effects=effects), start, jnp.array(force * swing), h)
 
-    path = check_slopes(positions, joint.effects)
+    path = check_slopes(positions, joint.effects, skip=STOPS)
     assert path.min() > lo and path.max() < hi and np.ptp(path) > 0.8 * (hi - lo)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_derivatives_by_the_stops_are_those_of_central_differences(kind):
+    _, joint, profile = joint_of(kind, "end_stop_restitution each", 0.004)
+    (lo, hi), force = profile.joint.range, found_of(kind)[1]
+    push = np.repeat(np.array([-4.0, 4.0, 4.0, -4.0]), 60) * force
+    start = solo.State(*numbers(lo + 0.3 * (hi - lo), 0, 0))
+
+    def positions(effects):
+        return solo.rollout(replace(joint, effects=effects), start, jnp.array(push), 0.004)
+
+    path = check_slopes(positions, joint.effects)
+    assert path.min() < lo and path.max() > hi
 
 
 def test_derivatives_at_rest_are_finite():

@@ -18,6 +18,7 @@ from joda.effects import (
     AsymmetricFriction,
     Backlash,
     DirectionDependentDamping,
+    EndStopRestitution,
     GravityOffset,
     LoadDependentFriction,
     PreslidingFriction,
@@ -38,6 +39,7 @@ ALL_EFFECTS = (
     LoadDependentFriction(coefficient=0.05),
     GravityOffset(sin=0.1, cos=0.1),
     Backlash(play=0.01, inertia=0.001),
+    EndStopRestitution(restitution=0.3, end="low"),
 )
 """All that act in the step; the others are attributes of the scene."""
 ROUNDS = 31

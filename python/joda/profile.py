@@ -32,6 +32,11 @@ ATTRIBUTES = (
 )
 """The plugin's attributes for one joint."""
 
+BOTH = {
+    "quadratic_damping": "in both directions excludes that in one",
+    "end_stop_restitution": "at both ends excludes that at one",
+}
+"""Effects that act on both sides unless they name one, and what follows from it."""
 
 FARTHEST, NARROWEST = 1e6, 1e-9
 """Bounds of a joint's range, rad or m: beyond them its positions are not finite or not distinct."""
@@ -177,8 +182,9 @@ class Profile(File):
             if isinstance(effect, GravityOffset) and not effect.fits(self.joint.type):
                 needed = "sin and cos" if self.joint.type == "hinge" else "force"
                 raise ValueError(f"effects[{number}]: a {self.joint.type} needs {needed}")
-        if "quadratic_damping both" in keys and sum("quadratic_damping" in k for k in keys) > 1:
-            raise ValueError("quadratic_damping in both directions excludes that in one")
+        for name, said in BOTH.items():
+            if f"{name} both" in keys and sum(name in key for key in keys) > 1:
+                raise ValueError(f"{name} {said}")
         return self
 
     @property
@@ -187,7 +193,7 @@ class Profile(File):
         return sum((e.inertia for e in self.effects if isinstance(e, AddedInertia)), 0.0)
 
     def with_effect(self, effect: AnyEffect) -> Self:
-        """The profile with the effect, in the place of one of the same name and direction."""
+        """The profile with the effect, in the place of one of the same name and side."""
         kept = tuple(other for other in self.effects if other.key != effect.key)
         return type(self)(
             joint=self.joint,

@@ -17,7 +17,7 @@ const char* const kEvery =
     "presliding_friction breakaway=0.7 damping=0.5 stiffness=300; "
     "load_dependent_friction coefficient=0.1; gravity_offset sin=0.3 cos=-0.4; "
     "backlash play=0.01 inertia=0.002; added_inertia inertia=0.01; "
-    "end_stop_restitution restitution=0.4;";
+    "end_stop_restitution restitution=0.4 end=low;";
 
 std::string Error(const std::string& text) {
   try {
@@ -50,6 +50,8 @@ TEST_CASE("every effect is parsed") {
   CHECK(e.backlash.play == 0.01);
   CHECK(e.backlash.inertia == 0.002);
   CHECK(e.added_inertia == 0.01);
+  CHECK(Rebound(e.stops.low.value()) == doctest::Approx(0.4));
+  CHECK(!e.stops.high);
   CHECK(std::string(e.needs_row) == "load_dependent_friction");
 }
 
@@ -59,6 +61,10 @@ TEST_CASE("parameters that may be left out have their defaults") {
   CHECK(e.presliding.damping == 0);
   CHECK(e.presliding.breakaway == 1);
   CHECK(e.gravity.cos == 0);
+  const EndStops stops = ParseEffects("end_stop_restitution restitution=0.4").stops;
+  CHECK(stops.both);
+  CHECK(!stops.low);
+  CHECK(!stops.high);
 }
 
 TEST_CASE("a blank text has no effects") {
@@ -72,6 +78,15 @@ TEST_CASE("an effect with a direction may be there once for each") {
       "quadratic_damping direction=negative: 0 1 | 0 1 | 2 2");
   CHECK(ExtraDamping(e, 0.5, 3) == 3);
   CHECK(ExtraDamping(e, 0.5, -3) == 6);
+}
+
+TEST_CASE("each end of the range may have a restitution of its own") {
+  const EndStops stops = ParseEffects(
+                             "end_stop_restitution restitution=0.7 end=high;"
+                             "end_stop_restitution end=low restitution=0.2")
+                             .stops;
+  CHECK(Rebound(stops.low.value()) == doctest::Approx(0.2));
+  CHECK(Rebound(stops.high.value()) == doctest::Approx(0.7));
 }
 
 TEST_CASE("each mistake in the effects has its sentence") {
@@ -110,6 +125,8 @@ TEST_CASE("each parameter out of bounds has its sentence") {
         "effect 1 \"load_dependent_friction\": coefficient must not be negative");
   CHECK(Error("end_stop_restitution restitution=1") ==
         "effect 1 \"end_stop_restitution\": restitution must be less than 1");
+  CHECK(Error("end_stop_restitution restitution=0.1 end=up") ==
+        "effect 1 \"end_stop_restitution\": end must be low, high or both, got \"up\"");
   CHECK(Error("added_inertia inertia=0") == "effect 1 \"added_inertia\": inertia must be positive");
   CHECK(Error("quadratic_damping direction=up: 0 1 | 0 1 | 1 1") ==
         "effect 1 \"quadratic_damping\": direction must be positive, negative or both, got \"up\"");
@@ -132,6 +149,28 @@ TEST_CASE("no effect is there twice") {
   CHECK(Error("quadratic_damping direction=both: 0 1 | 0 1 | 1 1;"
               "quadratic_damping direction=negative: 0 1 | 0 1 | 1 1") ==
         "effect 2 \"quadratic_damping\": there are two of it for the negative direction");
+  const std::string low = "end_stop_restitution restitution=0.1 end=low;";
+  const std::string both = "end_stop_restitution restitution=0.1 end=both;";
+  CHECK(Error(low + low) ==
+        "effect 2 \"end_stop_restitution\": there are two of it at the low end");
+  for (const std::string& two : {low + both, both + low, both + both}) {
+    CHECK(Error(two) == "effect 2 \"end_stop_restitution\": one at both ends excludes another");
+  }
+}
+
+TEST_CASE("an end stop throws back as a spring and a damper that only push do") {
+  // Schwager and Poeschel, Granular Matter 9 (2007) 465
+  const double w0 = std::sqrt(kStopStiffness);
+  for (const double damping : {0.0, 0.01, 0.05, 0.1, 0.2}) {
+    CAPTURE(damping);
+    const double g = damping / 2, w = std::sqrt(w0 * w0 - g * g);
+    const double exact = std::exp(-g / w * (std::acos(-1) - std::atan2(2 * g * w, w * w - g * g)));
+    CHECK(Rebound(damping) == doctest::Approx(exact).epsilon(0.05));
+  }
+  for (const double restitution : {0.05, 0.3, 0.9, 0.9999}) {
+    CHECK(Rebound(StopDamping(restitution)) == doctest::Approx(restitution).epsilon(1e-9));
+  }
+  CHECK(StopDamping(0) == 1);
 }
 
 TEST_CASE("damping depends on the direction and grows with the speed") {

@@ -87,6 +87,7 @@ inline std::string Positive(Random& random) {
 
 inline std::string WriteEffect(Random& random, int kind) {
   static const char* const directions[] = {"positive", "negative", "both"};
+  static const char* const ends[] = {"low", "high", "both"};
   const std::string direction = std::string(" direction=") + Pick(random, directions);
   const std::string curve = ": " + Curve(random, true), part = Print(Uniform(random));
   switch (kind) {
@@ -111,7 +112,8 @@ inline std::string WriteEffect(Random& random, int kind) {
     case 8:
       return "added_inertia inertia=" + Positive(random);
     default:
-      return "end_stop_restitution restitution=" + part;
+      return "end_stop_restitution restitution=" + part +
+             (Below(random, 3) ? std::string(" end=") + Pick(random, ends) : "");
   }
 }
 
@@ -129,7 +131,8 @@ inline std::string Rearrange(Random& random, const std::string& text) {
   for (const auto part : internal::Split(text, separator ? separator : ' ')) {
     parts.emplace_back(part);
   }
-  static const char* const words[] = {"direction", "positive", "velocity", "play", "0 1", "", "|"};
+  static const char* const words[] = {"direction", "positive", "velocity", "play",
+                                      "end",       "0 1",      "",         "|"};
   std::string& part = parts[random() % parts.size()];
   const std::string copy = parts[random() % parts.size()];
   switch (Below(random, 5)) {

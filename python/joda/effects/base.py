@@ -49,9 +49,9 @@ class Effect(Frozen):
 
     @property
     def key(self) -> str:
-        """What a joint may have only once: the name, with the direction where there is one."""
-        direction = getattr(self, "direction", None)
-        return f"{self.effect} {direction}" if direction else self.effect
+        """What a joint may have only once: the name, with direction or end where there is one."""
+        side = getattr(self, "direction", None) or getattr(self, "end", None)
+        return f"{self.effect} {side}" if side else self.effect
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:

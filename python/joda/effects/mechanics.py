@@ -2,7 +2,7 @@
 
 from typing import Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from joda.effects.base import Effect, parameter
 
@@ -63,9 +63,9 @@ class Backlash(Effect):
 
 
 class EndStopRestitution(Effect):
-    """How the ends of the range throw the joint back."""
+    """How the ends of the range, or one of them, throw the joint back."""
 
-    DESCRIPTION = "The ends of the range bounce more, or less, than the model's."
+    DESCRIPTION = "The ends of the range, or one of them, bounce more, or less, than the model's."
     LAW = "speed after / speed before = restitution; the limit's solver parameters are set so"
     SOURCE = "Newton's coefficient of restitution"
     SHOWS = "After a knock at an end the speed is another one than simulated."
@@ -73,4 +73,7 @@ class EndStopRestitution(Effect):
     effect: Literal["end_stop_restitution"] = "end_stop_restitution"
     restitution: float = parameter(
         "speed after a knock per speed before", "1", "1", (0, 0.8), ge=0, lt=1
+    )
+    end: Literal["both", "low", "high"] = Field(
+        default="both", description="of the range that does so; the other one stays the scene's"
     )

@@ -22,6 +22,8 @@ register = jax.tree_util.register_dataclass
 
 RIGID = 1e30
 """Stiffness of bristles that do not give: beyond any row's."""
+SCENES = -1.0
+"""Damping of an end stop whose restitution is the scene's."""
 
 
 @register
@@ -82,6 +84,18 @@ class Backlash:
 
 @register
 @dataclass(frozen=True)
+class EndStops:
+    """Damping of the end stops with a restitution of their own, times the timestep: at least 0.
+
+    See `joda._core.stop_damping`. Below 0 an end is as the scene has it.
+    """
+
+    low: Array
+    high: Array
+
+
+@register
+@dataclass(frozen=True)
 class AddedInertia:
     """kg·m²; MJX has it in the joint's armature."""
 
@@ -93,7 +107,7 @@ class AddedInertia:
 class Effects:
     """A joint's effects, named as in the profile; a pytree whose leaves are numbers.
 
-    An end stop's restitution is in the scene's solver parameters.
+    A restitution of both end stops is in the scene's solver parameters.
     """
 
     direction_dependent_damping: Directed | None = None
@@ -105,6 +119,7 @@ class Effects:
     gravity_offset: GravityOffset | None = None
     backlash: Backlash | None = None
     added_inertia: AddedInertia | None = None
+    end_stop_restitution: EndStops | None = None
 
     def replace(self, **changes: Any) -> "Effects":
         """The same with other effects."""
@@ -132,6 +147,7 @@ NUMBERS = {
 """Effects that have numbers and no curve."""
 
 WAYS = ("positive", "negative")
+ENDS = ("low", "high")
 
 
 def from_effects(
@@ -166,6 +182,8 @@ def from_effects(
             return Stribeck(curve(name), **numbers(name))
         if name in NUMBERS:
             return NUMBERS[name](**numbers(name))
+        if name == "end_stop_restitution":
+            return EndStops(*(put(_stop(own.get(f"{name} {end}"))) for end in ENDS))
         return Directed(*(curve(f"{name} {way}", f"{name} both") for way in WAYS))
 
     return Effects(**{name: make(name) for name in NAMES if name in present})
@@ -186,3 +204,12 @@ def prepare(own: Effects) -> Effects:
 def _component(effect: effects.Effect) -> Component:
     assert isinstance(effect, effects.CurveEffect)
     return Component(interval=effect.interval, x=effect.x, y=effect.y)
+
+
+def _stop(effect: effects.Effect | None) -> float:
+    if effect is None:
+        return SCENES
+    import joda._core as core
+
+    assert isinstance(effect, effects.EndStopRestitution)
+    return core.stop_damping(effect.restitution)

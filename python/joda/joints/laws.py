@@ -13,11 +13,13 @@ from joda.field.jaxeffects import (
     Curve,
     Directed,
     Effects,
+    EndStops,
     GravityOffset,
     Presliding,
     Stribeck,
 )
 from joda.joints.stiffness import IDLE_ROW, STIFF_ROW
+from joda.scenes.limits import IMPEDANCE, STIFFNESS
 
 Array = jax.Array
 
@@ -135,6 +137,26 @@ def backlash(
     after = jnp.clip(g + h * (w + h * force / inertia - v), -half, half)
     speed = v + (after - g) / h
     return force - handle.inertia * (speed - w) / h, after, speed
+
+
+def end_stop(
+    own: EndStops, low: Array, inertia: Array, h: Array | float
+) -> tuple[Array, Array, Array, Array]:
+    """The row of an end stop with a restitution of its own.
+
+    Args:
+        own: the joint's.
+        low: whether it is the low end.
+        inertia: of the joint, kg·m².
+        h: timestep, s.
+
+    Returns:
+        whether the end has one; if so D of its row, kg·m², and the stiffness, 1/s², and damping,
+        1/s, of its reference acceleration.
+    """
+    damping = jnp.where(low, own.low, own.high)
+    D = IMPEDANCE / (1 - IMPEDANCE) * inertia
+    return damping >= 0, D, jnp.asarray(STIFFNESS / h**2), damping / (IMPEDANCE * h)
 
 
 def _along(own: Directed, s: Array, v: Array) -> Array:

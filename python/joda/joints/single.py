@@ -55,9 +55,12 @@ class Single:
         return replace(self, weight=(0.0, 0.0))
 
     def limits(self, profile: Profile, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Solver parameters of the ends of the range, solref and solimp, for steps of h (s)."""
+        """Solver parameters of the ends of the range, solref and solimp, for steps of h (s).
+
+        An end with a restitution of its own has others, see cpp/end_stop.h.
+        """
         for effect in profile.effects:
-            if isinstance(effect, EndStopRestitution):
+            if isinstance(effect, EndStopRestitution) and effect.end == "both":
                 words = limit_parameters(round(effect.restitution, 3), h)
                 solref, solimp = (tuple(map(float, text.split())) for text in words)
                 return solref, (*solimp, *self.solimp[len(solimp) :])

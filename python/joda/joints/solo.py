@@ -49,8 +49,8 @@ class Solo:
         gravity: hinge: factors of cos q and sin q of gravity's torque, N·m; slide: force and 0.
             Shape (2,).
         solref: time constant (s) and damping ratio of the range's ends, or minus their stiffness
-            (1/s²) and damping (1/s), shape (2,).
-        solimp: impedance of the range's ends, shape (5,).
+            (1/s²) and damping (1/s), shape (2,); but for those with a restitution of their own.
+        solimp: their impedance, shape (5,).
         effects: beyond the three channels.
         seen: what MuJoCo's rows take for the inertia of a body that only slides: its mass, without
             armature (kg); None of others, where they take all.
@@ -266,8 +266,16 @@ def _limit(joint: Solo, q: Array, v: Array, s: Array, h: float) -> tuple[Array, 
     constant, ratio = (jnp.where(first > 0, x, 1.0) for x in (jnp.maximum(first, 2 * h), second))
     stiffness = jnp.where(first > 0, 1 / (constant * ratio) ** 2, -first) / dmax**2
     damping = jnp.where(first > 0, 2 / constant, -second) / dmax
-    D = jnp.where(distance < 0, impedance / (1 - impedance) * _inertia(joint)[1], 0.0)
-    return sign, D, -damping * sign * v - stiffness * impedance * distance
+    inertia = _inertia(joint)[1]
+    D, stiffness = impedance / (1 - impedance) * inertia, stiffness * impedance
+    if (stops := joint.effects.end_stop_restitution) is not None:
+        has, *own = laws.end_stop(stops, low, inertia, h)
+        scenes = D, stiffness, damping
+        D, stiffness, damping = (
+            jnp.where(has, one, other) for one, other in zip(own, scenes, strict=True)
+        )
+    D = jnp.where(distance < 0, D, 0.0)
+    return sign, D, -damping * sign * v - stiffness * distance
 
 
 def rollout(joint: Solo, start: State, force: Array, h: float) -> Array:

@@ -37,6 +37,7 @@ if not f"{version('mujoco-mjx')}.".startswith(f"{SUPPORTED}."):
         f"run: pip install 'mujoco-mjx=={SUPPORTED}.*'"
     )
 
+from joda._core import stop_damping  # noqa: E402
 from joda.mjx.fields import Field, Fields, Place, Prepared, prepare, put_fields  # noqa: E402
 from joda.mjx.simulate import rollout, step  # noqa: E402
 from joda.mjx.state import put_state  # noqa: E402
@@ -51,4 +52,5 @@ __all__ = [
     "put_state",
     "rollout",
     "step",
+    "stop_damping",
 ]

@@ -39,6 +39,7 @@ class Place:
         friction_row: row of its dry friction among the constraints, -1: none.
         damping_row: row of its damping, -1: none.
         equality: id of the constraint that has that row, -1: none.
+        limit_row: row of the end of its range that is near, -1: none.
     """
 
     joint: int
@@ -47,6 +48,7 @@ class Place:
     friction_row: int
     damping_row: int
     equality: int
+    limit_row: int
 
 
 @partial(
@@ -233,10 +235,18 @@ def _place(model: mujoco.MjModel, joint: int) -> Place:
                 equality, damping_row = int(k), int(before + joints[:k].sum())
                 break
     dof = int(model.jnt_dofadr[joint])
-    if model.dof_frictionloss[dof] > 0 and not (none or off & bit.mjDSBL_FRICTIONLOSS):
-        rows = 0 if off & bit.mjDSBL_EQUALITY else int(sizes.sum())
-        friction_row = rows + int((model.dof_frictionloss[:dof] > 0).sum())
-    return Place(joint, dof, int(model.jnt_qposadr[joint]), friction_row, damping_row, equality)
+    rows = 0 if off & bit.mjDSBL_EQUALITY else int(sizes.sum())
+    if not (none or off & bit.mjDSBL_FRICTIONLOSS):
+        if model.dof_frictionloss[dof] > 0:
+            friction_row = rows + int((model.dof_frictionloss[:dof] > 0).sum())
+        rows += int((model.dof_frictionloss > 0).sum() + (model.tendon_frictionloss > 0).sum())
+    limit_row = -1
+    if model.jnt_limited[joint] and not (none or off & bit.mjDSBL_LIMIT):
+        ball = model.jnt_type == int(mujoco.mjtJoint.mjJNT_BALL)
+        limited = model.jnt_limited != 0
+        limit_row = rows + int((ball & limited).sum() + (~ball & limited)[:joint].sum())
+    qpos = int(model.jnt_qposadr[joint])
+    return Place(joint, dof, qpos, friction_row, damping_row, equality, limit_row)
 
 
 def _stack(items: list[Any]) -> Any:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 from mujoco import mjx
 from mujoco.mjx._src import forward, sensor, solver
 
@@ -11,18 +12,27 @@ Array = jax.Array
 
 
 class Rows:
-    """Rows that resist the velocity at the end of the step."""
+    """The constraints' rows of a step."""
 
     def __init__(self, d: mjx.Data) -> None:
         """Takes the rows that MJX has made."""
         self.D, self.aref = d._impl.efc_D, d._impl.efc_aref
         self.frictionloss = d._impl.efc_frictionloss
+        self.J, self.pos = d._impl.efc_J, d._impl.efc_pos - d._impl.efc_margin
 
     def set(self, row: Any, D: Any, bound: Any, offset: Any, rate: Any) -> None:
-        """Makes the force offset - D (a + rate), within +-bound; rate is velocity / timestep."""
+        """Makes a row resist the velocity at the end of the step.
+
+        Its force is offset - D (a + rate), within +-bound; rate is velocity / timestep.
+        """
         self.D = self.D.at[row].set(D)
         self.aref = self.aref.at[row].set(offset / D - rate)
         self.frictionloss = self.frictionloss.at[row].set(bound)
+
+    def limit(self, row: Any, on: Any, D: Any, aref: Any) -> None:
+        """Makes limits push with D (aref - a), where `on`."""
+        self.D = self.D.at[row].set(jnp.where(on, D, self.D[row]))
+        self.aref = self.aref.at[row].set(jnp.where(on, aref, self.aref[row]))
 
     def write(self, d: mjx.Data) -> mjx.Data:
         """The state with these rows."""

@@ -8,7 +8,7 @@ import numpy as np
 from mujoco import mjx
 
 from joda.field import jaxfield
-from joda.field.jaxeffects import Backlash
+from joda.field.jaxeffects import Backlash, EndStops
 from joda.joints import laws
 from joda.joints.stiffness import IDLE_ROW, implicit_stiffness, reach, stays_beyond
 from joda.mjx.fields import Prepared
@@ -33,7 +33,7 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
         return d
     index = {
         key: np.array([getattr(place, key) for place in prepared.places])
-        for key in ("joint", "dof", "qpos", "friction_row", "damping_row", "equality")
+        for key in vars(prepared.places[0])
     }
     dof, h, own = index["dof"], m.opt.timestep, prepared.effects
     inertia, v, q = 1 / m.dof_invweight0[dof], d.qvel[dof], d.qpos[index["qpos"]]
@@ -80,6 +80,10 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
     resistance = jnp.maximum(h * drag[at], IDLE_ROW * inertia[at])
     rows.set(row, resistance, 0, 0, v[at] / h)
     held = jnp.zeros(len(dof), bool).at[at].set(on)
+    if own.end_stop_restitution is not None:
+        at = np.flatnonzero(index["limit_row"] >= 0)
+        stops = jax.tree.map(lambda x: x[at], own.end_stop_restitution)
+        _set_stops(rows, index["limit_row"][at], dof[at], stops, v[at], inertia[at], h)
     force = jnp.where(held, force, force / (1 + h * h * stiffness / inertia))
     drag = jnp.where(held, 0, drag)
 
@@ -89,6 +93,25 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
     force = force + shift - jnp.sign(v) * limited
     d, pushed = _move_handles(m, rows.write(d), dof, own.backlash)
     return d.replace(qfrc_passive=d.qfrc_passive.at[dof].add(force + pushed))
+
+
+def _set_stops(
+    rows: Rows, row: Any, dof: Any, stops: EndStops, v: Array, inertia: Array, h: Array
+) -> None:
+    """Sets the rows of joints beyond an end of the range that has a restitution of its own.
+
+    Args:
+        rows: of the step.
+        row, dof: of the joints.
+        stops: theirs.
+        v: their velocities, rad/s.
+        inertia: theirs, kg·m².
+        h: timestep, s.
+    """
+    side = rows.J[row, dof]  # 1: beyond the low end, -1: the high one, 0: neither
+    has, D, stiffness, damping = laws.end_stop(stops, side > 0, inertia, h)
+    reference = -damping * side * v - stiffness * rows.pos[row]
+    rows.limit(row, has & (side != 0), D, reference)
 
 
 def _gravity(m: mjx.Model, d: mjx.Data, joint: Any) -> Array:

@@ -16,7 +16,6 @@ from joda._core import Solo
 from joda.diagnosis.cutting import windows_of
 from joda.diagnosis.judge import Fit, Judge, Unknowns
 from joda.diagnosis.windows import Windows
-from joda.effects import EndStopRestitution
 from joda.field import evaluate
 from joda.joints.parameters import Parameters
 from joda.joints.single import Single
@@ -102,8 +101,8 @@ class Between:
             solref=(old.solref[0], old.solref[1] * float(np.exp(of("damping_ratio")))),
         )
         profile = self.parameters.written(theta, exact=True)
-        # a restitution is in the solver parameters already
-        kept = tuple(e for e in profile.effects if not isinstance(e, EndStopRestitution))
+        # a restitution of both ends is in the solver parameters already
+        kept = tuple(e for e in profile.effects if e.key != "end_stop_restitution both")
         return changed.solo(profile.model_copy(update={"effects": kept}), self.h)
 
     def _smooth(self, theta: Array, iterations: int, told: Told) -> Array:

@@ -212,7 +212,10 @@ class EditedScene:
         return changes
 
     def _limit(self, joint: int, profile: Profile) -> dict[str, str]:
-        """The joint-limit hint as the limit's damping ratio, its stiffness as it is."""
+        """A restitution of both ends, or else the joint-limit hint: its damping ratio.
+
+        An end with a restitution of its own has it from the plugin.
+        """
         hint = profile.joint_limit_hint
         limited = self.model.jnt_limited[joint]
         for effect in profile.effects:
@@ -220,9 +223,10 @@ class EditedScene:
                 if not limited:
                     self._note(joint, "has no limits, so end_stop_restitution does nothing")
                     return {}
-                step = float(self.model.opt.timestep)
-                values, impedance = limit_parameters(effect.restitution, step)
-                return {"solreflimit": values, "solimplimit": impedance}
+                if effect.end == "both":
+                    step = float(self.model.opt.timestep)
+                    values, impedance = limit_parameters(effect.restitution, step)
+                    return {"solreflimit": values, "solimplimit": impedance}
         if not limited or hint.selected_side == "none" or hint.elasticity == "none":
             return {}
         ratio = DAMP_RATIO[hint.elasticity]
@@ -245,7 +249,10 @@ class EditedScene:
         if not m.jnt_limited[joint]:
             return {}
         low, high = evaluate(profile.channels.conservative, np.array([0.0, 1.0]))[0]
-        pressed = max(-low, high, 0.0) * float(m.dof_invweight0[m.jnt_dofadr[joint]])
+        own = {e.end for e in profile.effects if isinstance(e, EndStopRestitution)}
+        against = {"low": -low, "high": high}
+        force = max([0.0, *(push for end, push in against.items() if end not in own)])
+        pressed = force * float(m.dof_invweight0[m.jnt_dofadr[joint]])
         solref = [float(x) for x in changes.get("solreflimit", "").split()] or m.jnt_solref[joint]
         span = profile.joint.range[1] - profile.joint.range[0]
         firm = firm_limit(pressed, span, solref, m.jnt_solimp[joint], float(m.opt.timestep))

@@ -2,25 +2,25 @@
 
 MuJoCo's limit is a spring and a damper that only push (docs, "Solver parameters"), with the
 acceleration -stiffness * depth - damping * speed per unit of inertia where the impedance is
-constant. In a step of that length the ratio of the speeds does not depend on the speed.
+constant. In a step of that length the ratio of the speeds does not depend on the speed. What gives
+a ratio is in cpp/end_stop.h, where the plugin takes it for an end with a restitution of its own.
 """
 
 from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from scipy.optimize import brentq
 
-STEPS = 16
-"""How many steps a knock lasts without damping: enough for the ratio to hardly depend on where
-within a step the stop is met, few enough for a stop to be hard."""
+from joda._core import stop_damping
+
+STIFFNESS = (np.pi / 16) ** 2
+"""Of a stop with a restitution, times the timestep squared: as kStopStiffness in cpp/end_stop.h."""
 IMPEDANCE = 0.99
+"""As kStopImpedance there."""
 YIELDING, FIRM = 1e-2, 1e-3
 """A stop that yields by more than the first share of the range is made to yield by the second."""
 MOST = 0.9999
 """Largest impedance that MuJoCo takes."""
-PHASES = np.linspace(0, 1, 16, endpoint=False) + 1 / 32
-"""Where within a step the stop is met."""
 
 
 @cache
@@ -31,12 +31,7 @@ def limit_parameters(restitution: float, timestep: float) -> tuple[str, str]:
         restitution: speed after a knock divided by the speed before, 0 <= restitution < 1.
         timestep: s; for another one the restitution is another one too.
     """
-    stiffness = (np.pi / (STEPS * timestep)) ** 2
-    damping = 1 / timestep  # stops the joint within one step
-    if restitution > _rebound(stiffness, damping, timestep):
-        damping = brentq(
-            lambda b: _rebound(stiffness, b, timestep) - restitution, 0, damping, xtol=1e-9
-        )
+    stiffness, damping = STIFFNESS / timestep**2, stop_damping(restitution) / timestep
     # documented: the stiffness is multiplied by d / d^2 and the damping by 1 / d; then, with the
     # impedance d, the row makes the share d of the acceleration
     d = IMPEDANCE
@@ -74,15 +69,3 @@ def firm_limit(
         damping = -solref[1] * np.sqrt(hardest / stiffness)
         return f"{-hardest:.6g} {-damping:.6g}", words
     return f"{2 * timestep:.6g} {ratio:.6g}", words
-
-
-def _rebound(stiffness: float, damping: float, h: float) -> float:
-    """Speed after a knock that begins with speed 1, as MuJoCo steps it; mean over `PHASES`."""
-    x, v = -h * PHASES, -np.ones(len(PHASES))
-    for _ in range(20 * STEPS):
-        push = np.where(x < 0, np.maximum(-stiffness * x - damping * v, 0.0), 0.0)
-        v = v + h * push
-        x = x + h * v
-        if np.all((x >= 0) & (v >= 0)):
-            break
-    return float(v.mean())

@@ -21,5 +21,6 @@ def hypotheses(
 
 
 def _there(h: Hypothesis, present: set[str]) -> bool:
-    key = h.effect if h.direction == "both" else f"{h.effect} {h.direction}"
-    return key in present or f"{h.effect} both" in present
+    if h.direction == "both":
+        return any(key.split()[0] == h.effect for key in present)
+    return bool({f"{h.effect} {h.direction}", f"{h.effect} both"} & present)
