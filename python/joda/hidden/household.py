@@ -104,7 +104,7 @@ def _whole(die: Die) -> Shape:
 
 
 def _constant(die: Die) -> Shape:
-    return shapes.Slope(die.between(-0.15, 0.15))
+    return shapes.Slope()
 
 
 def _sloping(die: Die) -> Shape:

@@ -86,7 +86,11 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
 
 # --- laws
 def _whole(die: Die) -> Shape:
-    return shapes.Slope(die.between(-0.1, 0.1))
+    return shapes.Slope()
+
+
+def _pull(die: Die) -> Shape:
+    return shapes.Trapezoid(*die.stretch(0.3, 0.9), die.between(0.02, 0.1))
 
 
 def _rippled(die: Die) -> Shape:
@@ -134,8 +138,8 @@ _snap = forms.barrier(shapes.quartic, (0.6, 1.4))
 KNOWN: dict[str, Builder] = {
     "constant_friction_hinge": forms.friction(_whole, 0.12, 0.6),
     "constant_damping_hinge": forms.damping(_whole),
-    "constant_positive_conservative_hinge": forms.force(_whole, 0.15),
-    "constant_negative_conservative_hinge": forms.force(_whole, 0.15, way=-1),
+    "constant_positive_conservative_hinge": forms.force(_pull),
+    "constant_negative_conservative_hinge": forms.force(_pull, way=-1),
     "detent_internal": forms.force(_detent),
     "bistable_mechanism": forms.force(_strut),
     "bistable_mechanism_internal": forms.force(_two_wells),
