@@ -12,6 +12,7 @@ from joda.diagnosis.asking import asked
 from joda.diagnosis.guessing import beside
 from joda.diagnosis.hypotheses import Units, hypotheses
 from joda.diagnosis.hypotheses.base import KNOWN_SHAPE
+from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.judge import BEND
 from joda.diagnosis.ranking import WELLS, WORST, rank
 from joda.diagnosis.verdict import diagnosed
@@ -153,10 +154,23 @@ def test_what_a_profile_has_cannot_be_missing(effect):
     assert "added_inertia" in offered
 
 
+def is_curve(hypothesis, effect):
+    """Whether it is the effect as a free curve, and not as a constant on a part of the range."""
+    return hypothesis.effect == effect and len(hypothesis.unknowns.low) == KNOTS
+
+
+@pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])
+def test_a_constant_on_less_than_0_8_of_the_range_differs_along_the_way(begun, effect):
+    """As the contract has it; what covers more is the constant effect."""
+    zone = next(h for h in begun.hypotheses if h.effect == effect and len(h.unknowns.low) == 4)
+    for (a, b), itself in (((0.3, 0.6), True), ((0.0, 0.78), True), ((0.1, 0.95), False)):
+        assert zone.itself(np.array([1.0, 0.002, a, b])) == itself
+
+
 @pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])
 def test_a_curve_that_hardly_differs_along_the_way_is_none(begun, effect):
     """Another effect, a constant one, is all that it is; excluding that makes no curve of it."""
-    found = begun.tell(next(h for h in begun.hypotheses if h.effect == effect))
+    found = begun.tell(next(h for h in begun.hypotheses if is_curve(h, effect)))
     n = len(begun.base.places)
     for y, vanished in ((np.full(9, 0.3), True), (np.linspace(0, 0.6, 9), False)):
         fit = replace(found.fit, x=np.append(found.fit.x[:n], y))
@@ -166,9 +180,8 @@ def test_a_curve_that_hardly_differs_along_the_way_is_none(begun, effect):
 @pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])
 def test_a_curve_is_level_where_no_run_has_been(begun, effect):
     units = replace(UNITS, visited=(0.2, 0.7))
-    curve = next(
-        h for h in hypotheses(units, templates(), begun.base.profile) if h.effect == effect
-    )
+    every = hypotheses(units, templates(), begun.base.profile)
+    curve = next(h for h in every if is_curve(h, effect))
     written = curve.write(begun.base.profile, np.arange(1.0, len(curve.unknowns.low) + 1))
     channel = getattr(written.channels, "friction" if "friction" in effect else "damping")
     part = channel.components[-1]

@@ -40,12 +40,12 @@ class Asked:
     def tell(self, hypothesis: Hypothesis) -> Guess | None:
         """The hypothesis fitted; None if the data cannot tell of it."""
         if hypothesis.effect == RESTITUTION:
-            return self.restitution(hypothesis)
+            return self.restitution(hypothesis, surely=False)
         return self.finished(self.rough(hypothesis))
 
-    def restitution(self, hypothesis: Hypothesis) -> Guess | None:
-        """How bouncy the ends are; None if the data cannot tell."""
-        return knock_guess(self.judge, self.base, self.given, self.fit, hypothesis)
+    def restitution(self, hypothesis: Hypothesis, surely: bool = True) -> Guess | None:
+        """How bouncy the ends are; None if the data cannot tell, or if they surely are not."""
+        return knock_guess(self.judge, self.base, self.given, self.fit, hypothesis, surely)
 
     def rough(self, hypothesis: Hypothesis) -> "Rough":
         """The hypothesis fitted roughly to windows without knocks."""

@@ -1,13 +1,14 @@
 """How bouncy the ends of the range are: by the windows with knocks, which tell of nothing else."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._core import Solo
 from joda.diagnosis.baseline import LEAST, Base
-from joda.diagnosis.guessing import ROUGH, Guess, guessed
+from joda.diagnosis.guessing import Guess, guessed
 from joda.diagnosis.hypotheses import Hypothesis
-from joda.diagnosis.judge import NOTHING, Fit, Judge
+from joda.diagnosis.judge import Fit, Judge
 from joda.diagnosis.windows import Windows
 from joda.joints.single import Single
 from joda.profile import Channels
@@ -19,6 +20,8 @@ KNOCKS = 2
 CLEARLY, SURELY = 0.07, 3.0
 """How much more of its speed an end must throw back than the model's: at the least, and in standard
 errors."""
+CLEAR = 3.0
+"""How far off an end a joint must be, in noises, not to be at it."""
 AROUND = 5
 """Samples before and after a knock that tell its speeds."""
 KNOCK_TIME = 0.6
@@ -26,44 +29,55 @@ KNOCK_TIME = 0.6
 
 
 def knock_guess(
-    judge: Judge, base: Base, given: Single, fit: Fit, hypothesis: Hypothesis
+    judge: Judge,
+    base: Base,
+    given: Single,
+    fit: Fit,
+    hypothesis: Hypothesis,
+    surely: bool = True,
 ) -> Guess | None:
-    """How bouncy an end is, or both, by the windows with knocks there.
+    """How bouncy an end is, or both, by the speeds before and after the knocks there.
+
+    How long and how deep a knock is tells of the stop's stiffness, which is another matter.
 
     Args:
         judge, base, fit: the model and how it was fitted.
         given: the joint with its own ends.
         hypothesis: bouncy ends.
+        surely: whether it is asked if they are.
 
     Returns:
-        None if the joint does not come back from there clearly faster than the model does.
+        None if there are no knocks, or if it is asked and the joint does not come back from each of
+        the ends clearly faster than the model does.
     """
-    windows = judge.windows
+    windows, ends = judge.windows, ends_of(hypothesis)
     sides = knocked(windows, base)
-    first, last = hypothesis.interval(hypothesis.trials[0])
-    ends = [side for side, there in ((-1, first <= 0.0), (1, last >= 1.0)) if there]
     own = rebound(base, given)
-    if not all(_bouncier(windows, sides == side, own) for side in ends):
+    if surely and not all(_bouncier(rebounds(windows, base, [side]), own) for side in ends):
         return None
-    there = Judge(windows, np.isin(sides, ends))
+    measured = rebounds(windows, base, ends)
+    if not len(measured):
+        return None
+    low, high = hypothesis.unknowns.low, hypothesis.unknowns.high
+    x = np.clip([mean_of(measured)[0]], low, high)
     profile = base.written(fit.x)
-
-    def make(x: Array) -> Solo:
-        if not len(x):
-            return given.solo(profile, base.h)
-        return base.single.solo(hypothesis.write(profile, x), base.h)
-
-    soft = there.fit(make, NOTHING, np.zeros(0), fit.start, ROUGH)
-    trials = [*hypothesis.trials, [np.median(rebounds(windows, there.counts)[:, 0])]]
-    fits = [there.fit(make, hypothesis.unknowns, np.array(x), fit.start, ROUGH) for x in trials]
-    best = min(fits, key=lambda f: f.loss)
+    there = Judge(windows, np.isin(sides, ends))
+    bouncy = base.single.solo(hypothesis.write(profile, x), base.h)
+    solos = given.solo(profile, base.h), bouncy
+    soft, best = (there.started(solo) for solo in solos)
     whole = Fit(
-        np.concatenate([fit.x, best.x]),
+        np.concatenate([fit.x, x]),
         np.where(there.counts[:, None], best.start, fit.start),
         np.where(there.counts, best.squares, fit.squares),
         fit.loss - soft.loss + best.loss,
     )
     return guessed(judge, hypothesis, whole)
+
+
+def ends_of(hypothesis: Hypothesis) -> list[int]:
+    """Which ends it is of: -1 the low one, 1 the high one."""
+    first, last = hypothesis.interval(hypothesis.trials[0])
+    return [side for side, there in ((-1, first <= 0.0), (1, last >= 1.0)) if there]
 
 
 def knocked(windows: Windows, base: Base) -> NDArray[np.intp]:
@@ -78,16 +92,62 @@ def knocked(windows: Windows, base: Base) -> NDArray[np.intp]:
     return out
 
 
-def _bouncier(windows: Windows, there: NDArray[np.bool_], own: float) -> bool:
-    """Whether an end throws the joint back clearly faster than the model's."""
-    measured = rebounds(windows, there)
+def _bouncier(measured: Array, own: float) -> bool:
+    """Whether an end throws the joint back clearly faster than the model's does."""
     if len(measured) < KNOCKS:
         return False
+    mean, error = mean_of(measured)
+    return mean - own > max(CLEARLY, SURELY * error)
+
+
+def mean_of(measured: Array) -> tuple[float, float]:
+    """Mean restitution of knocks and its standard error, by their errors or their scatter."""
     ratio, error = measured.T
     weight = error**-2.0
     mean = float(weight @ ratio / weight.sum())
-    scatter = float(np.sqrt(weight @ (ratio - mean) ** 2 / weight.sum() / (len(ratio) - 1)))
-    return mean - own > max(CLEARLY, SURELY * max(scatter, float(weight.sum() ** -0.5)))
+    free = max(len(ratio) - 1, 1)
+    scatter = float(np.sqrt(weight @ (ratio - mean) ** 2 / weight.sum() / free))
+    return mean, max(scatter, float(weight.sum() ** -0.5))
+
+
+def rebounds(windows: Windows, base: Base, ends: Sequence[int]) -> Array:
+    """Of the first knock in each window: speed after per speed before, and its standard error.
+
+    The speeds are those of lines through the samples before the joint is at the end, and after it
+    has left it.
+
+    Returns:
+        shape (knocks, 2); knocks without enough samples before or after tell none.
+    """
+    lo, hi = base.profile.joint.range
+    out = []
+    sides = knocked(windows, base)
+    for k in np.flatnonzero(np.isin(sides, ends)):
+        row = windows.rows[k]
+        own = row[row >= 0]
+        near = max(own[0] - AROUND, 0), min(own[-1] + 1 + 2 * AROUND, len(windows.time))
+        t, y = windows.time[slice(*near)], windows.position[slice(*near)]
+        noise = 1 / float(windows.whitener[k, 0, 0])
+        inside = (hi - y if sides[k] > 0 else y - lo) > CLEAR * noise
+        first = int(np.argmin(inside))  # at the end
+        back = first + int(np.argmax(inside[first:]))  # off it again
+        parts = slice(first - AROUND, first), slice(back, back + AROUND)
+        if inside.all() or first < AROUND or not inside[parts[1]].all() or back == first:
+            continue
+        if len(t[parts[1]]) < AROUND or (np.diff(t[parts[0].start : parts[1].stop]) <= 0).any():
+            continue  # another run
+        (before, off), (after, off_after) = (_slope(t[part], y[part]) for part in parts)
+        if before * sides[k] > 0:
+            ratio = -after / before
+            out.append((ratio, noise * np.hypot(off_after, ratio * off) / abs(before)))
+    return np.array(out).reshape(-1, 2)
+
+
+def _slope(t: Array, y: Array) -> tuple[float, float]:
+    """Of a line through samples, and its standard error for noise of 1."""
+    t = t - t.mean()
+    square = float(t @ t)
+    return float(t @ y) / square, square**-0.5
 
 
 def rebound(base: Base, given: Single) -> float:
@@ -100,39 +160,3 @@ def rebound(base: Base, given: Single) -> float:
     solo = given.without_weight().solo(profile, base.h)
     before, after = solo.replay(np.zeros(steps), begin, start, np.ones(1, bool), base.h)
     return float((before[-1] - after[-1]) / base.h / speed)
-
-
-def rebounds(windows: Windows, there: NDArray[np.bool_]) -> Array:
-    """Of the first knock in each window: speed after per speed before, and its standard error.
-
-    Args:
-        windows: of the runs.
-        there: windows with knocks, shape (m,).
-
-    Returns:
-        shape (knocks, 2); windows with too few samples before or after a knock tell none.
-    """
-    out = []
-    for k in np.flatnonzero(there):
-        row = windows.rows[k]
-        own = row[row >= 0]
-        t, y = windows.time[own], windows.position[own]
-        turns = np.flatnonzero(np.diff(np.sign(np.diff(y))) != 0) + 1
-        turns = turns[(turns >= AROUND) & (turns < len(own) - AROUND)]
-        if not len(turns):
-            continue
-        turn = turns[np.argmax(np.abs(y[turns] - y[0]))]
-        parts = slice(turn - AROUND, turn), slice(turn + 1, turn + 1 + AROUND)
-        (before, off), (after, off_after) = (_slope(t[part], y[part]) for part in parts)
-        if before:
-            ratio = -after / before
-            noise = 1 / float(windows.whitener[k, 0, 0])
-            out.append((ratio, noise * np.hypot(off_after, ratio * off) / abs(before)))
-    return np.array(out).reshape(-1, 2)
-
-
-def _slope(t: Array, y: Array) -> tuple[float, float]:
-    """Of a line through samples, and its standard error for noise of 1."""
-    t = t - t.mean()
-    square = float(t @ t)
-    return float(t @ y) / square, square**-0.5

@@ -15,6 +15,7 @@ SAME = (
     ": the joint was moved in one direction only, where a resistance and a force over position are "
     "the same"
 )
+BOUNCY = "The ends of the range throw the joint back more than the model's: not explained."
 SUREST = 0.99
 """Highest probability that is said."""
 
@@ -65,7 +66,7 @@ def _sum(first: Finding, weighed: Weighed) -> float:
 
 def _unexplained(what: str, weighed: Weighed, one_way: bool, bouncy: bool) -> str:
     if bouncy and weighed.excess[0] < MUCH:
-        return "The ends of the range throw the joint back more than the model's: not explained."
+        return BOUNCY
     share = 100 * min(weighed.share, 1.0)
     same = SAME if one_way and " or " in what else ""
     if share <= 1:

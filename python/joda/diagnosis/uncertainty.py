@@ -22,6 +22,7 @@ from joda.diagnosis.guessing import Guess
 from joda.diagnosis.hypotheses.base import FREE_CURVE, KNOWN_LAW, KNOWN_SHAPE, STRENGTH, TRIAL
 from joda.diagnosis.hypotheses.intervals import GRID
 from joda.diagnosis.judge import BEND, Judge, Make, Unknowns
+from joda.diagnosis.knocks import ends_of, mean_of, rebounds
 from joda.field import merge
 from joda.profile import CHANNELS, Profile
 
@@ -64,6 +65,8 @@ STRETCHED = 0.125
 PLAUSIBLE = 2.0
 """How much larger a strength may be than the effect's largest, a priori (one standard
 deviation)."""
+AT_END = 0.02
+"""Doubt of the place of an end that throws back, in normalised position."""
 HARDLY = 0.005
 """Part of the samples at either end of what was visited that do not count as visited."""
 
@@ -114,6 +117,8 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
     fitted = _fitted(asked, found)
     gain = max(asked.fit.loss - found.fit.loss, 0.0)
     best = fitted.told(fitted.x)
+    if found.hypothesis.effect == RESTITUTION:
+        return _restitution(asked, found)
     data = from_data(fitted, TOLERATED * gain * (found.hypothesis.remains == KNOWN_SHAPE))
     magnitude, a, b = map(float, best)
     shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.remains])
@@ -208,16 +213,16 @@ def _gaps(interval: tuple[float, float], visited: tuple[float, float]) -> list[f
 
 def _fitted(asked: Asked, found: Guess) -> _Fitted:
     judge, base, hypothesis = asked.judge, asked.base, found.hypothesis
-    if hypothesis.effect != RESTITUTION:
-        return _Fitted(judge, *joined(base, hypothesis), found, found.fit.x)
-    windows = judge.windows
-    profile = base.written(found.fit.x[: len(base.places)])
+    return _Fitted(judge, *joined(base, hypothesis), found, found.fit.x)
 
-    def make(x: Array) -> Solo:
-        return base.single.solo(hypothesis.write(profile, x), base.h)
 
-    knocks = Judge(windows, windows.knocks & (windows.count > 0))
-    return _Fitted(knocks, make, hypothesis.unknowns, found, found.x)
+def _restitution(asked: Asked, found: Guess) -> Uncertainty:
+    """By the scatter of the knocks; an end is where it is."""
+    measured = rebounds(asked.judge.windows, asked.base, ends_of(found.hypothesis))
+    size = found.hypothesis.magnitude(found.x)
+    error = mean_of(measured)[1]
+    own = OWN_SHAPE[RESTITUTION] * size
+    return Uncertainty(float(np.hypot(error, own)), (AT_END, AT_END))
 
 
 def _overdispersion(fitted: _Fitted) -> float:

@@ -14,7 +14,7 @@ from joda.diagnosis.phrases import explained
 from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
 from joda.diagnosis.ranking import Ranking, Told, rank
 from joda.diagnosis.rivals import indistinguishable
-from joda.diagnosis.summary import strengths_off, summarised
+from joda.diagnosis.summary import BOUNCY, strengths_off, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, excess_of, weigh
 from joda.measured.adequacy import MULTIPLE
@@ -116,7 +116,8 @@ def diagnosed(
     sized = [k for k, one in every.items() if one.sized]
     experiment = _next(measured, ranking, weighed, one_way)
     if not sized:
-        said = _said(measured, "unexplained", NO_EFFECT, (), experiment)
+        why = BOUNCY if ranking.bouncy else NO_EFFECT
+        said = _said(measured, "unexplained", why, (), experiment)
         return Diagnosed(said, puzzling=puzzling)
     findings = tuple(every[k] for k in sized)
     profile = ranking.guesses[sized[0]].written(ranking.asked.base)

@@ -29,6 +29,8 @@ AT_ONCE = 100_000
 FIRST_HORIZON, LONGER, HORIZON = 30, 4, 5.0
 """How much of a whole run tells its start: at first so many samples, then so many times as much, up
 to so many seconds. A start that is far off runs into an end soon, and then tells nothing."""
+AT_REST = 2.0
+"""How much larger the sum of squares may be from a start at rest, where a joint seems to rest."""
 SETTLED = 0.1
 """Change of a sum of squared residuals below which a start is no better."""
 ENSEMBLE = 8
@@ -160,44 +162,49 @@ class Replayer:
 
         Those of the smoothed samples, moved within their errors to where the model follows the
         first `HORIZON` seconds best: a velocity that is a little off is a position that is far off
-        at the end of a run. A joint that seems to be at rest is tried at rest and moving.
+        at the end of a run. A joint that seems to be at rest is, unless the model follows clearly
+        better from a start that moves.
         """
         begun = smoothing.smooth(time, position, time[:1], sigma)
         prior = _Prior(
             np.array([begun.position[0], begun.velocity[0]]),
             np.array([begun.position_error[0], begun.velocity_error[0]]),
         )
-        tried = [np.zeros(2)]
+        least, best, covariance = self._fitted_start(time, position, force, sigma, prior, False)
         if smoothing.begins_at_rest(time, position, sigma):
-            tried.append(np.array([0.0, -prior.mean[1] / prior.deviation[1]]))
-        fitted = [self._fitted_start(time, position, force, sigma, prior, z) for z in tried]
-        _, best, covariance = min(fitted, key=lambda one: one[0])
+            still = self._fitted_start(time, position, force, sigma, prior, True)
+            if still[0] < AT_REST * least:
+                _, best, covariance = still
         factor = prior.deviation[:, None] * np.linalg.cholesky(covariance)
         return prior.mean + prior.deviation * best, factor
 
     def _fitted_start(
-        self, time: Array, position: Array, force: Array, sigma: float, prior: "_Prior", z: Array
+        self, time: Array, position: Array, force: Array, sigma: float, prior: "_Prior", rests: bool
     ) -> tuple[float, Array, Array]:
         """Gauss-Newton over longer and longer horizons.
 
         Args:
             time, position, force, sigma: of the run.
             prior: of the start.
-            z: where to begin, in prior standard deviations, shape (2,).
+            rests: whether the velocity is zero there, and not fitted.
 
         Returns:
             sum of squares, its minimiser and the covariance there, both in prior standard
             deviations; what the model fails to follow makes the samples tell less.
         """
+        z = np.array([0.0, -prior.mean[1] / prior.deviation[1] if rests else 0.0])
         off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
         covariance, least = np.eye(2), np.inf
+        low, high = np.full(2, -START), np.full(2, START)
+        if rests:
+            low[1] = high[1] = z[1]
         used, most = FIRST_HORIZON, int(np.searchsorted(time, HORIZON, side="right"))
         while True:
             early = slice(0, max(min(used, most), smoothing.LEAST))
             forces = np.tile(force[early], (3, 1))
             step, least = np.zeros(2), np.inf
             for _ in range(TRIES):
-                tried = np.clip(z + step, -START, START)
+                tried = np.clip(z + step, low, high)
                 starts = prior.mean + prior.deviation * (tried + off)
                 found = self._replay(time[early], starts, forces) / sigma
                 misfit = found[0] - position[early] / sigma
