@@ -28,6 +28,8 @@ class RunError:
         rmse_window: of windows of 0.4 s from fresh measured starts; None likewise.
         noise_floor: the measurement's noise: no model gets below it.
         reason: why something could not be replayed; None if all was.
+        rmse_explained: how far errors of the measured start and force alone move the whole run's
+            replay, by an ensemble of starts; None where that was not asked for.
     """
 
     file: str
@@ -35,6 +37,7 @@ class RunError:
     rmse_window: float | None
     noise_floor: float
     reason: str | None = None
+    rmse_explained: float | None = None
 
 
 @dataclass(frozen=True)
@@ -99,12 +102,12 @@ def errors(
         pieces = measured.replayer.windows(run, sigma) if windows else []
         left.append(joined(pieces))
         whole = rms(off[-1])
+        scatter = measured.replayer.scatter(run, sigma) if explained and len(off[-1]) else None
         if len(off[-1]):
-            scatter = measured.replayer.scatter(run, sigma) if explained else 0.0
-            missed.append(Missed(run.name, _multiple(whole, sigma), scatter / sigma))
+            missed.append(Missed(run.name, _multiple(whole, sigma), (scatter or 0.0) / sigma))
         missed += [_missed(run, sigma, piece) for piece in pieces]
         reason = _reason(run, whole, pieces) if windows else None
-        rows.append(RunError(run.name, known(whole), known(rms(left[-1])), sigma, reason))
+        rows.append(RunError(run.name, known(whole), known(rms(left[-1])), sigma, reason, scatter))
     return Errors(
         paths=tuple(paths),
         runs=tuple(rows),
