@@ -1,14 +1,17 @@
 """The verdict of compare: an all-clear only where everything is within the noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hidden_cases import read
+from hidden_model import true_profile
 from scipy.stats import binom
 from test_compare import door, flat, runs_of, scene_of
 
 from joda import JodaError, compare
 from joda.hidden import draw, write
-from joda.measured.adequacy import WINDOWS, residual_pattern
+from joda.measured.adequacy import EXPLAINED, MULTIPLE, WINDOWS, residual_pattern
 from joda.measured.comparison import sentences
 from joda.measured.failing import COLUMNS, FORCE
 from joda.measured.runs import Run, write_run
@@ -128,3 +131,29 @@ def test_two_long_runs_of_signs_are_a_pattern_and_random_ones_rarely():
     found = [residual_pattern(rows_of(rng.normal(size=40))) for _ in range(400)]
     assert np.mean(np.array(found) < 0.05) < 0.1  # Bonferroni: at most 5 %, and chance
     assert residual_pattern(rows_of(np.ones(WINDOWS - 1))) is None
+
+
+@pytest.mark.parametrize("effect", ["spring_return_to_high_end", "quadratic_damping"])
+def test_a_right_model_of_noisy_free_runs_is_not_blamed_for_their_starts(tmp_path, effect):
+    """Noise of 0.8 % of the range: a velocity that is lost in it is not taken for zero."""
+    rng = np.random.default_rng()
+    seed = int(rng.integers(2**31))
+    case = draw(seed, effect, forced=False)
+    sigma = 0.008 * case.truth.joint.span
+    noisy = [
+        replace(run, position=run.position + sigma * rng.standard_normal(len(run.time)))
+        for run in case.held_out_clean
+    ]
+    _, held = read(replace(case, held_out=noisy))
+    right = held.changed(true_profile(case, held.profile))
+    off = [
+        np.sqrt(np.mean((path - run.position) ** 2)) / noise
+        for path, run, noise in zip(right.paths(), right.runs, right.sigma, strict=True)
+    ]
+    assert np.median(off) < 1.5, seed
+    explained = [
+        right.replayer.scatter(run, noise) / noise
+        for run, noise in zip(right.runs, right.sigma, strict=True)
+    ]
+    blamed = [o > MULTIPLE and o > EXPLAINED * e for o, e in zip(off, explained, strict=True)]
+    assert sum(blamed) <= 1, seed

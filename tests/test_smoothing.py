@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from joda.measured.smoothing import noise, smooth
+from joda.measured.smoothing import noise, pace, pooled_noise, smooth
 
 SIGMA = 1e-3
 
@@ -114,3 +114,38 @@ def test_fast_motion_and_snaps_have_the_velocity_errors_that_are_stated(
 def test_slow_turns_do_not_have_their_velocity_error_overstated(speed, hertz, sigma):
     stated, true = stated_and_true(swinging(speed, 1.5), hertz, sigma)
     assert np.sqrt(np.mean(stated**2) / np.mean(true**2)) < 5
+
+
+# --- pace
+@pytest.mark.parametrize("stroke", [0.015, 0.06])
+def test_a_fast_stroke_has_its_own_pace_and_its_velocity_is_not_smeared(stroke):
+    """A button that springs back and then rests: half a sine, in 1 kHz samples."""
+    t = np.arange(0, 0.4, 0.001)
+    inside = np.clip((t - 0.05) / stroke, 0, 1)
+    y = 2e-3 * (1 - np.cos(np.pi * inside))
+    sigma = 2e-6
+    noisy = y + np.random.default_rng().normal(0, sigma, len(t))
+    assert 0.2 * stroke < pace(t, noisy, sigma) < stroke
+    middle = np.array([0.05 + stroke / 2])
+    found = smooth(t, noisy, middle, sigma)
+    assert found.velocity[0] == pytest.approx(np.pi * 2e-3 / stroke, rel=0.15)  # of 7 samples
+
+
+def test_what_does_not_move_has_no_pace():
+    t = np.arange(0, 1, 0.005)
+    assert pace(t, np.random.default_rng().normal(0, SIGMA, len(t)), SIGMA) == np.inf
+
+
+# --- noise
+@pytest.mark.parametrize("step", [1.0, 3.0, 6.0])
+@pytest.mark.parametrize("hertz", [50, 200, 1000])
+def test_the_noise_of_a_noisy_and_quantised_position_that_mostly_rests(step, hertz):
+    """Stretches in which no sample differs tell nothing; a run that only rests has that of all."""
+    rng = np.random.default_rng()
+    t = np.arange(0, 4, 1 / hertz)
+    moves = np.where(t < 3, 0.0, np.sin(3 * (t - 3)))
+    quantum = step * SIGMA
+    runs = [(t, np.round((moves + rng.normal(0, SIGMA, len(t))) / quantum) * quantum)]
+    runs.append((t, np.zeros(len(t))))
+    true = np.hypot(SIGMA, quantum / 12**0.5)
+    assert 0.75 * true < pooled_noise(runs) < 1.7 * true

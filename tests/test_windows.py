@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from joda.diagnosis.baseline import base_of, single_for, units_of, windows_for
-from joda.diagnosis.cutting import windows_of
+from joda.diagnosis.baseline import base_of, single_for, units_of, usable, windows_for
+from joda.diagnosis.cutting import _step, windows_of
 from joda.diagnosis.judge import EMPTY, NOTHING, Fit, Judge
 from joda.measured import smoothing
 from joda.measured.reading import read_measured
@@ -167,3 +167,32 @@ def test_a_good_fit_stays_as_it_is(tmp_path):
     judge = Judge(windows, np.ones(len(windows.count), bool))
     fit = judge.fit(base.solo, base.unknowns, np.ones(len(base.places)))
     assert judge.refit(base.solo, base.unknowns, fit) is fit
+
+
+# --- rest and pace
+def test_rest_at_an_end_does_not_count_and_rest_elsewhere_does():
+    t = STEP * np.arange(1000)
+    windows = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0), 0.4 + 0 * t)
+    told = usable(windows)
+    assert windows.rests[windows.run == 0].sum() == 4
+    assert not told[windows.run == 0][2:].any()
+    assert told[windows.run == 1].all()
+
+
+def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
+    """Full stroke in 20 ms, at 1 kHz, and then rest at the end."""
+    t = STEP * np.arange(300)
+    run = run_of(np.minimum(0.05 + (t / 0.02) ** 2, 1.0))
+    windows = windows_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP)
+    assert windows.length < 0.03
+    told = np.flatnonzero(usable(windows))
+    assert len(told) >= 1
+    assert windows.time[windows.rows[told[-1]].max()] > 0.015
+
+
+@pytest.mark.parametrize(
+    ("timestep", "length", "usual", "step"),
+    [(2e-3, 0.1, 0.1, 1 / 3000), (5e-4, 0.45, 0.45, 1.5e-3), (5e-4, 1.5, 0.45, 1.5e-3)],
+)
+def test_steps_are_short_for_the_windows(timestep, length, usual, step):
+    assert _step(timestep, length, usual) == pytest.approx(step)

@@ -200,7 +200,7 @@ def _before_knocks(begins: Integers, index: Integers, s: Array, noise: Array) ->
     for row, knock in zip(rows, _each_knock(rows, s, noise), strict=True):
         before = 0 if knock is None else knock - APPROACH
         if knock is not None and before < FEWEST:  # a short stroke: up to the knock itself
-            before = knock - 1
+            before = knock
         if before >= smoothing.LEAST:
             more.append(index[row[before]])
     return np.unique(np.append(begins, np.array(more, int)))

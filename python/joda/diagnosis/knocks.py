@@ -128,14 +128,17 @@ def rebounds(windows: Windows, base: Base, ends: Sequence[int]) -> Array:
         near = max(own[0] - AROUND, 0), min(own[-1] + 1 + 2 * AROUND, len(windows.time))
         t, y = windows.time[slice(*near)], windows.position[slice(*near)]
         noise = 1 / float(windows.whitener[k, 0, 0])
-        inside = (hi - y if sides[k] > 0 else y - lo) > CLEAR * noise
+        away = hi - y if sides[k] > 0 else y - lo
+        inside = away > CLEAR * noise
+        if inside.all():  # the knock is between two samples
+            inside[np.argmin(away)] = False
         first = int(np.argmin(inside))  # at the end
         back = first + int(np.argmax(inside[first:]))  # off it again
         parts = slice(first - AROUND, first), slice(back, back + AROUND)
-        if inside.all() or first < AROUND or not inside[parts[1]].all() or back == first:
+        if first < AROUND or back == first or back + AROUND > len(t):
             continue
-        if len(t[parts[1]]) < AROUND or (np.diff(t[parts[0].start : parts[1].stop]) <= 0).any():
-            continue  # another run
+        if not inside[parts[1]].all() or (np.diff(t[parts[0].start : parts[1].stop]) <= 0).any():
+            continue  # it hops there, or another run begins
         (before, off), (after, off_after) = (_slope(t[part], y[part]) for part in parts)
         if before * sides[k] > 0:
             ratio = -after / before
