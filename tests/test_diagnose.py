@@ -142,7 +142,8 @@ def test_adding_lowers_the_error_on_runs_that_nothing_has_seen(hidden):
     added = json.loads(hidden.added.stdout)
     assert added["added"], hidden.seed
     assert added["after"]["window"] < added["before"]["window"], hidden.seed
-    assert added["held_out"] == "run4.csv, run8.csv"
+    held = added["held_out"].split(", ")  # every fourth of those in which the joint moves
+    assert 1 <= len(held) <= 2 and set(held) <= {run.name for run in hidden.runs}
     before, after = (
         compare(hidden.folder / name, "joint", hidden.unseen) for name in ("model.xml", "new.xml")
     )
