@@ -17,7 +17,7 @@ SCENE = f"""<mujoco><compiler angle="radian"/><worldbody><body>
 
 LAWS = {
     "detent_internal": lambda s, d: -1.5 * (s - 0.5) / 0.05 * np.exp(0.5 - (s - 0.5) ** 2 / 0.005),
-    "constant_friction_hinge": lambda s, d: -0.5 * d * ((s > 0.3) & (s < 0.6)),
+    "position_dependent_friction": lambda s, d: -0.5 * d * ((s > 0.3) & (s < 0.6)),
     "spring_return_to_low_end": lambda s, d: -0.3 - s,
     "magnetic_return_to_low_end": lambda s, d: -2 / (1 + s / 0.06) ** 2,
 }

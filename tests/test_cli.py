@@ -10,6 +10,7 @@ from pathlib import Path
 
 import jsonschema
 import mujoco
+import numpy as np
 import pytest
 
 from joda import COMMANDS, JodaError, Profile, bench, demo, plot
@@ -217,7 +218,7 @@ class TestBench:
         joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
         for rows in (bench(), bench(folder / "scene.xml")):
             for row in rows:
-                assert row.ratio > 0
+                assert np.isfinite(row.ratio)  # of differences, negative on a busy machine
                 assert row.microseconds[0] > 0
         assert "one" not in bench(folder / "scene.xml")[0].what
 
