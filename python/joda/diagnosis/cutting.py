@@ -79,7 +79,7 @@ def windows_of(
             begun = smoothing.smooth(time, position, time[0] + h * begins, sigma)
             velocity, doubt = begun.velocity.copy(), begun.velocity_error.copy()
             if smoothing.begins_at_rest(time, position, sigma):
-                velocity[0], doubt[0] = 0.0, 0.5 * doubt[0] / LOOSE
+                velocity[0], doubt[0] = 0.0, 0.1 * doubt[0] / LOOSE
             force = np.interp(time[0] + h * np.arange(steps), time, run.force[piece])
             fresh = np.arange(many) == 0
             start = np.stack([begun.position, velocity], axis=1)
