@@ -19,8 +19,6 @@ EXACT, DRAWS = 12, 4000
 """Windows up to which all signs are gone through; else so many are drawn."""
 WORSE = 1.05
 """How much the geometric mean of the errors of whole runs or blocks may rise."""
-
-
 FALLEN = 0.5
 """To what part that must fall, in every one, where windows are too short to show an effect."""
 

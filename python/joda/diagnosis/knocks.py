@@ -51,17 +51,18 @@ def knock_guess(
         the ends clearly faster than the model does.
     """
     windows, ends = judge.windows, ends_of(hypothesis)
-    sides = knocked(windows, base)
-    own = rebound(base, given)
-    if surely and not all(_bouncier(rebounds(windows, base, [side]), own) for side in ends):
-        return None
-    measured = rebounds(windows, base, ends)
+    each = [rebounds(windows, base, [side]) for side in ends]
+    if surely:
+        own = rebound(base, given)
+        if not all(_bouncier(one, own) for one in each):
+            return None
+    measured = np.concatenate(each)
     if not len(measured):
         return None
     low, high = hypothesis.unknowns.low, hypothesis.unknowns.high
     x = np.clip([mean_of(measured)[0]], low, high)
     profile = base.written(fit.x)
-    there = Judge(windows, np.isin(sides, ends))
+    there = Judge(windows, np.isin(knocked(windows, base), ends))
     bouncy = base.single.solo(hypothesis.write(profile, x), base.h)
     solos = given.solo(profile, base.h), bouncy
     soft, best = (there.started(solo) for solo in solos)

@@ -114,11 +114,11 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
         found: the effect, fitted.
         left: share of the model's misfit beyond the noise that it leaves, 0 to 1.
     """
+    if found.hypothesis.effect == RESTITUTION:
+        return _restitution(asked, found)
     fitted = _fitted(asked, found)
     gain = max(asked.fit.loss - found.fit.loss, 0.0)
     best = fitted.told(fitted.x)
-    if found.hypothesis.effect == RESTITUTION:
-        return _restitution(asked, found)
     data = from_data(fitted, TOLERATED * gain * (found.hypothesis.remains == KNOWN_SHAPE))
     magnitude, a, b = map(float, best)
     shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.remains])
