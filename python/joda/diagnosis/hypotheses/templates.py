@@ -1,6 +1,7 @@
 """The templates as hypotheses: laws of their kind with few numbers, written as PCHIP components."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -44,8 +45,11 @@ RARE = 3.0
 all over a slide's range: a tilt is the same, and more usual."""
 NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
 """Control points of a magnet, in units of its gap: there its force has fallen to 2 %."""
-SEEN = 3.47
-"""Where it has fallen to 5 %."""
+SEEN = 0.05
+"""What is left of its force where it is no longer felt."""
+POWER, USUAL_POWER = (1.0, 4.0, 0.05), (2.0, 0.5)
+"""Of distance in a magnet's law: bounds and step; what it is before the data, and how surely:
+between plate and pole 2, of two poles up to 4, where a yoke leads the flux less than 2."""
 
 
 def from_templates(units: Units, templates: Mapping[str, Template]) -> Iterator[Hypothesis]:
@@ -122,14 +126,17 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
 
 
 def _magnet(units: Units, name: str) -> Hypothesis:
-    """An attraction 1 / (distance + gap)²: strength, friction, gap."""
+    """An attraction 1 / (distance + gap)ⁿ: strength, friction, n, gap."""
     low = name.endswith("low_end")
-    law = (1 + NEAR) ** -2.0 - (1 + NEAR[-1]) ** -2.0
-    law /= law[0]
+
+    def law(n: float) -> Array:
+        y = (1 + NEAR) ** -n - (1 + NEAR[-1]) ** -n
+        return np.asarray(y / y[0])
 
     def write(profile: Profile, x: Array) -> Profile:
-        reach = min(float(x[2]) * NEAR[-1], 1.0)
-        at, y = NEAR * float(x[2]) / reach, units.force * x[0] * law
+        gap = float(x[3])
+        reach = min(gap * NEAR[-1], 1.0)
+        at, y = NEAR * gap / reach, units.force * x[0] * law(float(x[2]))
         kept = at < 1
         end = np.interp(1.0, at, y)
         at, y = np.append(at[kept], 1.0), np.append(y[kept], end)
@@ -141,14 +148,22 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         return _caught(pulled, name, near(x), most)
 
     def near(x: Array) -> tuple[float, float]:
-        reach = min(SEEN * float(x[2]), 1.0)
+        n, gap = float(x[2]), float(x[3])
+        reach = min(min(SEEN ** (-1 / n) - 1, NEAR[-1]) * gap, 1.0)
         return (0.0, reach) if low else (1 - reach, 1.0)
 
+    free = unknowns_of(STRENGTH, CATCH, POWER, (0.004, 0.4, 0.002))
+    usual = replace(
+        free,
+        mean=np.array((0.0, 0.0, USUAL_POWER[0], 0.0)),
+        doubt=np.array((np.inf, np.inf, USUAL_POWER[1], np.inf)),
+    )
+    gaps = (0.02, 0.04, 0.08, 0.16)
     return Hypothesis(
         name,
         "both",
-        unknowns_of(STRENGTH, CATCH, (0.004, 0.4, 0.002)),
-        np.array(list(product((2 * TRIAL,), (0.0, 0.12), (0.02, 0.04, 0.08, 0.16)))),
+        usual,
+        np.array(list(product((2 * TRIAL,), (0.0, 0.12), USUAL_POWER[:1], gaps))),
         write,
         near,
         lambda x: units.force * float(x[0]),
