@@ -54,10 +54,11 @@ class Guess:
 
     @property
     def vanished(self) -> bool:
-        """Whether it is hardly there, or no more than a simpler effect: something else fits."""
-        least = self.hypothesis.unknowns.low[0]
-        hardly = least > 0 and self.x[0] < 1.01 * least
-        return bool(hardly or not self.hypothesis.itself(self.x))
+        """Whether it is hardly there, no more than a simpler effect, or beyond the widest of its
+        bounds: something else fits."""
+        unknowns = self.hypothesis.unknowns
+        hardly = unknowns.low[0] > 0 and self.x[0] < 1.01 * unknowns.low[0]
+        return bool(hardly or unknowns.pressed(self.x) or not self.hypothesis.itself(self.x))
 
     def written(self, base: Base) -> Profile:
         """The model's profile with the effect."""
@@ -157,12 +158,17 @@ def rough(
 
 
 def finished(judge: Judge, base: Base, hypothesis: Hypothesis, near: Sequence[Fit]) -> Guess:
-    """The hypothesis fitted to the end, from rough fits."""
+    """The hypothesis fitted to the end, from rough fits; where it is pressed against a bound that
+    is only usual, within wider ones again."""
     make, unknowns = joined(base, hypothesis)
     fits = [
         judge.refit(make, unknowns, judge.fit(make, unknowns, fit.x, fit.start)) for fit in near
     ]
-    return guessed(judge, hypothesis, min(fits, key=lambda f: f.loss))
+    found = guessed(judge, hypothesis, min(fits, key=lambda f: f.loss))
+    wider = hypothesis.unknowns.widened()
+    if not hypothesis.unknowns.pressed(found.x) or wider is hypothesis.unknowns:
+        return found
+    return finished(judge, base, replace(hypothesis, unknowns=wider), [found.fit])
 
 
 def beside(hypothesis: Hypothesis, found: Guess) -> Hypothesis:

@@ -6,7 +6,7 @@ far off, so that one bad window, or a slightly wrong law, decides nothing.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -44,6 +44,8 @@ class Unknowns:
         step: for central differences.
         mean, doubt: what is known before the data; infinite doubt for nothing.
         constraints: what else must hold.
+        widest: to which bounds those may be widened that are only usual, shape (2, k), lows first;
+            NaN for what cannot be beyond its bound. None for nothing to widen.
     """
 
     low: Array
@@ -52,6 +54,22 @@ class Unknowns:
     mean: Array
     doubt: Array
     constraints: Inequalities | None = None
+    widest: Array | None = None
+
+    def pressed(self, x: Array) -> bool:
+        """Whether a number is as large or as small as is usual, but may be larger or smaller."""
+        if self.widest is None:
+            return False
+        low, high = ~np.isnan(self.widest)
+        return bool(np.any(low & (x < self.low + self.step) | high & (x > self.high - self.step)))
+
+    def widened(self) -> "Unknowns":
+        """With the widest bounds; itself where these are."""
+        if self.widest is None:
+            return self
+        now = np.stack([self.low, self.high])
+        low, high = wide = np.where(np.isnan(self.widest), now, self.widest)
+        return self if np.array_equal(wide, now) else replace(self, low=low, high=high)
 
     def and_(self, other: "Unknowns") -> "Unknowns":
         """Both, one after the other."""

@@ -19,10 +19,17 @@ from joda._core import Solo
 from joda.diagnosis.asking import RESTITUTION, Asked
 from joda.diagnosis.baseline import joined
 from joda.diagnosis.guessing import Guess
-from joda.diagnosis.hypotheses.base import FREE_CURVE, KNOWN_LAW, KNOWN_SHAPE, STRENGTH, TRIAL
+from joda.diagnosis.hypotheses.base import (
+    FREE_CURVE,
+    KNOWN_LAW,
+    KNOWN_SHAPE,
+    STRENGTH,
+    TRIAL,
+    everywhere,
+)
 from joda.diagnosis.hypotheses.intervals import GRID
 from joda.diagnosis.judge import BEND, Judge, Make, Unknowns
-from joda.diagnosis.knocks import ends_of, mean_of, rebounds
+from joda.diagnosis.knocks import KNOCKS, ends_of, mean_of, rebounds
 from joda.field import merge
 from joda.profile import CHANNELS, Profile
 
@@ -57,7 +64,8 @@ TOLERATED = 0.02
 HIDDEN = 0.5
 """Part of the size that may hide in what is left, by the root of the share of the misfit left."""
 FARTHEST = 10.0
-"""Largest doubt of what is extrapolated, in units of the magnitude."""
+"""Largest doubt of what is there, or is extrapolated, in units of the magnitude: nothing is known
+of how large it is."""
 REACHING = 0.5
 """Part of the range over which a pull to an end is felt that is more than a local one's."""
 STRETCHED = 0.125
@@ -67,6 +75,8 @@ PLAUSIBLE = 2.0
 deviation)."""
 AT_END = 0.02
 """Doubt of the place of an end that throws back, in normalised position."""
+UNKNOWN_END = 3**-0.5
+"""The same of the interval's other end, where the other end of the range tells nothing."""
 HARDLY = 0.005
 """Part of the samples at either end of what was visited that do not count as visited."""
 
@@ -125,9 +135,10 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
     part = shape + HIDDEN * float(np.sqrt(np.clip(left, 0.0, 1.0)))
     seen, visited = _seen(asked, found)
     beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
-    if from_afar := _at_bound(found) or (_shaped(found) and _far_end((a, b))):
+    if from_afar := _at_bound(found) or (_pulls(found) and b - a > REACHING):
         beyond = FARTHEST
-    size = np.linalg.norm([data[0], part * magnitude, beyond * magnitude])
+    most = FARTHEST * magnitude if _there(found) else np.inf
+    size = np.linalg.norm([min(data[0], most), part * magnitude, beyond * magnitude])
     width = max(DEFINITION, part, STRETCHED * beyond) * (b - a)
     ends = tuple(
         float(np.linalg.norm([spread, width * (from_afar or 0.0 < end < 1.0), gap]))
@@ -186,6 +197,12 @@ def _seen(asked: Asked, found: Guess) -> tuple[float, tuple[float, float]]:
     return magnitude, (float(low), float(high))
 
 
+def _there(found: Guess) -> bool:
+    """Whether it is more than nothing, however large."""
+    first = found.hypothesis.unknowns
+    return bool(found.x[0] > first.low[0] + first.step[0])
+
+
 def _at_bound(found: Guess) -> bool:
     """Whether the scale of a law that is known by its shape is as large as it may be: what is seen
     may then be the far end of something much larger."""
@@ -198,11 +215,10 @@ def _shaped(found: Guess) -> bool:
     return found.hypothesis.remains == KNOWN_SHAPE and found.hypothesis.ends == 0
 
 
-def _far_end(interval: tuple[float, float]) -> bool:
-    """Whether a pull to one end is felt over most of the range: it may be the far end of a stronger
-    one with a shorter reach, as 1 / distance² looks alike from afar."""
-    a, b = interval
-    return (a <= 0.0) != (b >= 1.0) and b - a > REACHING
+def _pulls(found: Guess) -> bool:
+    """Whether it is a pull to one end that runs out: felt over most of the range it may be the far
+    end of a stronger one with a shorter reach, as 1 / distance² looks alike from afar."""
+    return _shaped(found) and found.hypothesis.interval is not everywhere
 
 
 def _gaps(interval: tuple[float, float], visited: tuple[float, float]) -> list[float]:
@@ -217,12 +233,19 @@ def _fitted(asked: Asked, found: Guess) -> _Fitted:
 
 
 def _restitution(asked: Asked, found: Guess) -> Uncertainty:
-    """By the scatter of the knocks; an end is where it is."""
-    measured = rebounds(asked.judge.windows, asked.base, ends_of(found.hypothesis))
+    """By the scatter of the knocks; an end is where it is, but the other one may throw back too
+    where no knocks tell of it."""
+    windows, base, sides = asked.judge.windows, asked.base, ends_of(found.hypothesis)
     size = found.hypothesis.magnitude(found.x)
-    error = mean_of(measured)[1]
+    error = mean_of(rebounds(windows, base, sides))[1]
     own = OWN_SHAPE[RESTITUTION] * size
-    return Uncertainty(float(np.hypot(error, own)), (AT_END, AT_END))
+    low, high = (
+        AT_END
+        if len(sides) == 2 or side in sides or len(rebounds(windows, base, [side])) >= KNOCKS
+        else UNKNOWN_END
+        for side in (1, -1)
+    )
+    return Uncertainty(float(np.hypot(error, own)), (low, high))
 
 
 def _overdispersion(fitted: _Fitted) -> float:

@@ -18,7 +18,7 @@ from joda.diagnosis.summary import BOUNCY, strengths_off, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, excess_of, weigh
 from joda.measured.adequacy import MULTIPLE
-from joda.measured.misfit import rms
+from joda.measured.errors import worst_explained, worst_missed
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
@@ -41,6 +41,26 @@ RECORD_MORE = (
 )
 GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in both directions."
 GAUGE_BACK = "Measure the way back too, as slowly."
+AGAIN = (
+    "Repeat one slow motion three times, to and fro, then the same fast: what differs between "
+    "repeats depends on time or on what was before, what differs with speed is a resistance, what "
+    "does neither is a force over position."
+)
+BEYOND = 5.0
+"""How many times what noise, start and force explain of it a whole run may be missed by a model
+that is adequate, with its own strengths fitted."""
+DRIFTING = (
+    "Something is missing that no known effect explains: windows show nothing beyond the noise, "
+    "but whole runs are missed by up to {:.0f} times what noise, start and force explain."
+)
+WITH_THESE = (
+    " Whole runs are missed by up to {:.0f} times the noise as the model is, with these numbers "
+    "by no more than noise, start and force explain."
+)
+WITHOUT = (
+    " Whole runs are missed by up to {:.0f} times the noise all the same, but by no more than "
+    "noise, start and force explain; joda compare says where."
+)
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
 NO_EFFECT = "Something is missing that no known effect explains."
@@ -98,12 +118,7 @@ def diagnosed(
     if weighed.verdict == "adequate" and (why := too_little(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if weighed.verdict == "adequate":
-        summary = (
-            f"The model is adequate: nothing beyond the noise ({measured.floor:.2g} "
-            f"{measured.unit}) that an effect would explain.{strengths_off(ranking)}"
-            f"{_astray(measured)}"
-        )
-        return Diagnosed(_said(measured, "adequate", summary, (), None))
+        return Diagnosed(_calm(measured, ranking))
     held = Holdout(ranking.asked, measured)
     named = range(min(NAMED, len(ranking.guesses)))
     every = {
@@ -155,19 +170,20 @@ def _longer(first: Ranking) -> float:
     return min(LONGER * first.asked.judge.windows.length, LONGEST)
 
 
-def _astray(measured: Measured) -> str:
-    """That whole runs are missed by much although windows are not, as a further sentence."""
-    off = [
-        rms((path - run.position)[~np.isnan(path)]) / sigma
-        for run, sigma, path in zip(measured.runs, measured.sigma, measured.paths(), strict=True)
-    ]
-    worst = max((one for one in off if np.isfinite(one)), default=0.0)
-    if worst < MULTIPLE:
-        return ""
-    return (
-        f" Whole runs are missed by up to {worst:.0f} times the noise all the same; joda compare "
-        "says where, and how much of it their starts make."
+def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
+    """No effect shows in windows: the model is adequate, unless whole runs say otherwise."""
+    base, fit = ranking.asked.base, ranking.asked.fit
+    fitted = base.written(fit.x[: len(base.places)])
+    if (left := worst_explained(measured.changed(fitted), BEYOND)) > BEYOND:
+        return _said(measured, "unexplained", DRIFTING.format(left), (), AGAIN)
+    off = strengths_off(ranking)
+    missed = worst_missed(measured)
+    astray = WITH_THESE if off else WITHOUT
+    summary = (
+        f"The model is adequate: nothing beyond the noise ({measured.floor:.2g} {measured.unit}) "
+        f"that an effect would explain.{off}{astray.format(missed) if missed > MULTIPLE else ''}"
     )
+    return _said(measured, "adequate", summary, (), None)
 
 
 def _said(
@@ -262,11 +278,7 @@ def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool)
     if one_way:
         return there_and_back(means).sentence
     if weighed.verdict == "unexplained":
-        return (
-            "Repeat one slow motion three times, to and fro, then the same fast: what differs "
-            "between repeats depends on time or on what was before, what differs with speed is a "
-            "resistance, what does neither is a force over position."
-        )
+        return AGAIN
     if weighed.probabilities[0] > SURE or len(ranking.guesses) < 2:
         return None
     first, second = (

@@ -118,6 +118,31 @@ def errors(
     )
 
 
+def worst_missed(measured: Measured) -> float:
+    """By how many times its noise the worst whole run is missed; 0 where nothing is replayed."""
+    return max((one.multiple for one in errors(measured, windows=False).missed), default=0.0)
+
+
+def worst_explained(measured: Measured, least: float) -> float:
+    """By how many times what noise, start and force explain the worst whole run is missed.
+
+    Args:
+        measured: the runs, and the model.
+        least: multiple of the noise under which that is not looked for, and the multiple is told.
+    """
+
+    def explained(number: int) -> float:
+        one = measured.changed(runs=[number])
+        missed = errors(one, windows=False).missed
+        if any(run.multiple > least for run in missed):
+            missed = errors(one, windows=False, explained=True).missed
+        return max(
+            (run.multiple / float(np.hypot(1.0, run.explained)) for run in missed), default=0
+        )
+
+    return max(map(explained, range(len(measured.runs))), default=0.0)
+
+
 def _multiple(error: float, sigma: float) -> float:
     return min(error / sigma, ASTRAY) if np.isfinite(error) else ASTRAY
 

@@ -17,8 +17,10 @@ from joda.profile import Profile
 Array = NDArray[np.float64]
 Write = Callable[[Profile, Array], Profile]
 Direction = Literal["both", "positive", "negative"]
-Bounds = list[tuple[float, float, float]]
-"""Low, high and step of each number."""
+Number = tuple[float, float, float] | tuple[float, float, float, float, float]
+"""Low, high and step; and where low and high are only usual, how far they may be widened."""
+Bounds = list[Number]
+"""Of each number."""
 
 TRIAL = 0.1
 """Strength with which an effect is tried, in usual forces."""
@@ -109,7 +111,18 @@ def everywhere(x: Array) -> tuple[float, float]:
     return 0.0, 1.0
 
 
-def unknowns_of(*rows: tuple[float, float, float]) -> Unknowns:
-    """From low, high and step of each number."""
-    low, high, step = np.array(rows).T
-    return Unknowns(low, high, step, np.zeros(len(low)), np.full(len(low), np.inf))
+def unknowns_of(*rows: Number) -> Unknowns:
+    """From what is known of each number."""
+    low, high, step = np.array([row[:3] for row in rows]).T
+    widest = np.array([row[3:] or (np.nan, np.nan) for row in rows]).T
+    return Unknowns(low, high, step, np.zeros(len(low)), np.full(len(low), np.inf), widest=widest)
+
+
+def known(unknowns: Unknowns, number: int, mean: float, doubt: float) -> Unknowns:
+    """With what one of them is before the data, and by how much that may be off."""
+    at = np.arange(len(unknowns.low)) == number
+    return replace(
+        unknowns,
+        mean=np.where(at, mean, unknowns.mean),
+        doubt=np.where(at, doubt, unknowns.doubt),
+    )

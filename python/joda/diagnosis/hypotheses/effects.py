@@ -169,7 +169,7 @@ def _resistances(units: Units) -> Iterator[Hypothesis]:
     )
     yield _effect(
         "stribeck_friction",
-        [STRENGTH, (np.log(1e-3), np.log(3.0), 0.05)],
+        [STRENGTH, (np.log(1e-3), np.log(3.0), 0.05, np.nan, np.log(6.0))],
         [(TRIAL, np.log(v)) for v in (0.02, 0.06, 0.2, 0.6)],
         lambda x: StribeckFriction(y=flat(F * x[0]), velocity=V * float(np.exp(x[1]))),
         lambda x: F * float(x[0]),
@@ -179,7 +179,7 @@ def _resistances(units: Units) -> Iterator[Hypothesis]:
     if units.forced or units.weight:
         yield _effect(
             "load_dependent_friction",
-            [(0.0, 0.7, 0.002)],
+            [(0.0, 0.7, 0.002, np.nan, 2.0)],
             [[0.05]],
             lambda x: LoadDependentFriction(coefficient=float(x[0])),
             lambda x: float(x[0]),
@@ -198,7 +198,7 @@ def _presliding(units: Units) -> Hypothesis:
 
     return _effect(
         "presliding_friction",
-        [(np.log(20.0), np.log(5e3), 0.05), (0.0, 1.5, 0.02)],
+        [(np.log(20.0), np.log(5e3), 0.05, np.log(4.0), np.log(5e3)), (0.0, 1.5, 0.02)],
         [(np.log(1 / part), 0.0) for part in (0.001, 0.003, 0.01, 0.03)],
         make,
         lambda x: soft * float(np.exp(x[0])),
@@ -211,7 +211,7 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
     F, M, span = units.force, units.inertia, units.span
     yield _effect(
         "added_inertia",
-        [(1e-4, 5.0, 0.002)],
+        [(1e-4, 5.0, 0.002, np.nan, 30.0)],
         [[0.1]],
         lambda x: AddedInertia(inertia=M * float(x[0])),
         lambda x: M * float(x[0]),
@@ -238,7 +238,7 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
     if units.forced:
         yield _effect(
             "backlash",
-            [(3e-3, 0.2, 0.002), (np.log(3e-3), np.log(HEAVIEST), 0.05)],
+            [(3e-3, 0.2, 0.002, np.nan, 0.5), (np.log(3e-3), np.log(HEAVIEST), 0.05)],
             list(product((0.01, 0.03), (np.log(0.03), np.log(0.15)))),
             lambda x: Backlash(play=span * float(x[0]), inertia=M * float(np.exp(x[1]))),
             lambda x: span * float(x[0]),

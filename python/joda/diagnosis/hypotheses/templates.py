@@ -1,7 +1,6 @@
 """The templates as hypotheses: laws of their kind with few numbers, written as PCHIP components."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -12,9 +11,11 @@ from joda.diagnosis.hypotheses.base import (
     STRENGTH,
     TRIAL,
     Array,
+    Bounds,
     Hypothesis,
     Units,
     everywhere,
+    known,
     unit_of,
     unknowns_of,
 )
@@ -26,9 +27,11 @@ WIDEST = 0.5
 """Of a latch."""
 EDGE = (0.002, 0.3, 0.01)
 """Of a constant on a part of the range, in units of that part."""
-CATCH = (0.0, 0.3, 0.01)
+CATCH = (0.0, 0.3, 0.01, np.nan, 0.9)
 """Dry friction of a catch, in units of its force."""
-BARRIER = (0.2, 3.0, 0.02)
+LEAN, USUAL_LEAN = (-1.2, 1.2, 0.03), 0.4
+"""Logarithm of the ratio of a well's flanks: bounds and step; its doubt before the data."""
+BARRIER = (0.2, 3.0, 0.02, 0.05, 12.0)
 """Of a latch, in units of its hold."""
 CENTRES = ((0.5,), (0.27, 0.73))
 """Of one well, and of two, in their interval; their outer flanks run out more slowly."""
@@ -43,6 +46,8 @@ TAIL = 0.5
 RARE = 3.0
 """Rarity of magnets, latches and clicks beside what rubs in every joint, and of a constant force
 all over a slide's range: a tilt is the same, and more usual."""
+GAP = (0.004, 0.4, 0.002, 0.001, 1.2)
+"""Of a magnet, in normalised position."""
 NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
 """Control points of a magnet, in units of its gap: there its force has fallen to 2 %."""
 SEEN = 0.05
@@ -82,7 +87,8 @@ def _caught(profile: Profile, name: str, interval: tuple[float, float], most: fl
 
 
 def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
-    """Potential wells: strength, where within its part each pulls most, friction, the interval.
+    """Potential wells: strength, where within its part each pulls most, friction, how much one
+    flank pulls more than the other (of two wells the outer ones than the inner), the interval.
 
     Args:
         units: of the joint.
@@ -92,6 +98,7 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
     parts = len(lobes)
     zeros = np.arange(parts // 2 + 1) * 2 / parts
     centres = np.array(CENTRES[parts // 2 - 1])
+    outer = np.array(((0.5, -0.5), (0.5, -0.5, -0.5, 0.5))[parts // 2 - 1])
 
     def part(x: Array) -> Component:
         half = float(x[1]) / parts
@@ -100,7 +107,8 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
         at = np.concatenate([zeros, centres, tops, tails])
         order = np.argsort(at)
         still = np.zeros(len(zeros) + len(centres))
-        y = np.concatenate([still, lobes, [TAIL * lobes[0], TAIL * lobes[-1]]])[order]
+        pulls = np.exp(outer * x[3]) * lobes
+        y = np.concatenate([still, pulls, TAIL * pulls[[0, -1]]])[order]
         own = tuple(units.force * x[0] * y)
         return Component(label=name, interval=ends("anywhere", x), x=tuple(at[order]), y=own)
 
@@ -113,11 +121,11 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
     return Hypothesis(
         name,
         "both",
-        unknowns_of(STRENGTH, (0.2, 0.7, 0.02), CATCH, *bounds),
-        np.array([(TRIAL, 0.45, 0.0, *t) for t in tries]),
+        known(unknowns_of(STRENGTH, (0.2, 0.7, 0.02), CATCH, LEAN, *bounds), 3, 0.0, USUAL_LEAN),
+        np.array([(TRIAL, 0.45, 0.0, 0.0, *t) for t in tries]),
         write,
         lambda x: felt(part(np.array([TRIAL, *x[1:]]))),
-        lambda x: units.force * float(x[0]),
+        lambda x: units.force * float(x[0] * np.exp(0.5 * abs(x[3]))),
         unit_of(units),
         len(bounds),
         rarity=RARE,
@@ -152,17 +160,11 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         reach = min(min(SEEN ** (-1 / n) - 1, NEAR[-1]) * gap, 1.0)
         return (0.0, reach) if low else (1 - reach, 1.0)
 
-    free = unknowns_of(STRENGTH, CATCH, POWER, (0.004, 0.4, 0.002))
-    usual = replace(
-        free,
-        mean=np.array((0.0, 0.0, USUAL_POWER[0], 0.0)),
-        doubt=np.array((np.inf, np.inf, USUAL_POWER[1], np.inf)),
-    )
     gaps = (0.02, 0.04, 0.08, 0.16)
     return Hypothesis(
         name,
         "both",
-        usual,
+        known(unknowns_of(STRENGTH, CATCH, POWER, GAP), 2, *USUAL_POWER),
         np.array(list(product((2 * TRIAL,), (0.0, 0.12), USUAL_POWER[:1], gaps))),
         write,
         near,
@@ -227,7 +229,8 @@ def _snap(units: Units, name: str) -> Hypothesis:
         return felt(part(np.array([TRIAL, *x[1:]])), FELT * min(1.0, float(x[1])))
 
     bounds, tries = places(place, WIDEST)
-    own = [STRENGTH, BARRIER, (0.0, 1.0, 0.02), (0.3, 0.75, 0.01), (0.15, 0.7, 0.02), CATCH]
+    own: Bounds = [STRENGTH, BARRIER, (0.0, 1.0, 0.02)]
+    own += [(0.3, 0.75, 0.01, 0.1, 0.92), (0.15, 0.7, 0.02, 0.05, 0.95), CATCH]
     return Hypothesis(
         name,
         "both",
