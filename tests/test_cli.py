@@ -1,12 +1,16 @@
 """The commands as a user types them: what they print, what they leave, how they fail."""
 
+import contextlib
+import io
 import json
 import os
 import shlex
+import signal
 import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
+from unittest import mock
 
 import jsonschema
 import mujoco
@@ -16,7 +20,7 @@ import pytest
 from joda import COMMANDS, JodaError, Profile, bench, demo, plot
 from joda._bench import _without_plugin, hinges
 from joda._refine import Refined
-from joda.cli import app
+from joda.cli import app, main
 from joda.cli.tell import tell_viewer
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -35,13 +39,23 @@ def joda(*arguments, cwd=None, **environment):
 
 
 def fails(*arguments, cwd=None) -> str:
-    """The one sentence that a mistake is answered with."""
-    result = joda(*arguments, cwd=cwd)
-    assert result.returncode == 2, result
-    assert result.stdout == ""
-    assert result.stderr.startswith("joda: ")
-    assert result.stderr.count("\n") == 1
-    return result.stderr
+    """The one sentence that a mistake is answered with; in this process, where joda is loaded."""
+    out, told = io.StringIO(), io.StringIO()
+    kept = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    with (
+        contextlib.chdir(cwd or "."),
+        mock.patch.object(sys, "argv", ["joda", *map(str, arguments)]),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(told),
+        pytest.raises(SystemExit) as ended,
+    ):
+        main()
+    signal.signal(signal.SIGINT, kept[0])
+    sys.unraisablehook = kept[1]
+    assert (ended.value.code, out.getvalue()) == (2, ""), told.getvalue()
+    assert told.getvalue().startswith("joda: ")
+    assert told.getvalue().count("\n") == 1
+    return told.getvalue()
 
 
 @pytest.fixture

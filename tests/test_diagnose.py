@@ -66,7 +66,7 @@ def hidden(tmp_path_factory):
     effect = str(rng.choice(["quadratic_damping", "constant_friction_hinge"]))
     case = clear_case(effect)
     folder = tmp_path_factory.mktemp("hidden")
-    runs = write(case, folder, count=8)
+    runs = write(case, folder, count=5)
     names = [run.name for run in runs]
     told = joda(
         "diagnose", "model.xml", *names, "--joint", "joint", "--json", "d.json", "--report",

@@ -38,7 +38,7 @@ def digest(case):
     return found.hexdigest()[:16]
 
 
-@pytest.mark.sweep(2)
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(
     ("args", "expected"),
     [
@@ -62,7 +62,7 @@ def test_every_family_hides_every_effect_and_laws_of_no_catalogue():
         assert not set(family.beyond) & set(EFFECTS)
 
 
-@pytest.mark.sweep(8)
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize(("family", "effect", "forced"), HIDDEN)
 def test_a_case_shows_its_effect_and_is_read(family, effect, forced):
     case = draw(1, effect, forced, family=family)
@@ -188,6 +188,7 @@ COURSES = [
 ]
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("course", COURSES, ids=lambda course: type(course).__name__)
 def test_a_conservative_law_takes_no_energy_around_a_loop(course):
     law = ForceAlong(0.5, course)

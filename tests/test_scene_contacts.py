@@ -334,7 +334,7 @@ def test_a_run_through_a_contact_is_a_fault_of_the_scene(tmp_path):
     assert total == 301 and 30 < count <= inside
     assert not any("scene blocks" in note for note in found.notes)
     assert json.loads((tmp_path / "c.json").read_text())["adequacy"]["barred"].startswith(says)
-    runs = [run, *(swung(tmp_path, f"more{k}.csv") for k in range(3))]
+    runs = [run, swung(tmp_path, "more.csv")]
     diagnosed = diagnose(path, "hinge", runs, json=tmp_path / "d.json")
     assert any(note.startswith(says) for note in diagnosed.notes)
     improved = improve(path, "hinge", runs, tmp_path / "new.xml")

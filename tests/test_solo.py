@@ -94,6 +94,7 @@ def test_a_second_under_random_forces_is_that_of_mjx():
     assert wanted.max() > hi  # past the end of the range
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
 def test_derivatives_are_those_of_central_differences(kind):
     path = next(p for p in MODELS if p.stem == ("cabinet" if kind == "hinge" else "drawer"))

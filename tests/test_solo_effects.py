@@ -305,6 +305,7 @@ SWINGS = {"hinge": (5.0, -0.3, 1.3), "slide": (2.0, 0.0, 0.8)}
 """Amplitude and mean of a force that swings the joint through its range, and its period, s."""
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_by_all_numbers_are_those_of_central_differences(kind):
     h = 0.004
@@ -321,6 +322,7 @@ def test_derivatives_by_all_numbers_are_those_of_central_differences(kind):
     assert path.min() > lo and path.max() < hi and np.ptp(path) > 0.8 * (hi - lo)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives_by_the_stops_are_those_of_central_differences(kind):
     _, joint, profile = joint_of(kind, "end_stop_restitution each", 0.004)

@@ -73,6 +73,7 @@ def test_a_size_of_zero_is_no_effect(size, error, sized):
     assert replace(DETENT, magnitude=size, magnitude_error=error).sized == sized
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("none", [1, None])
 def test_what_has_no_size_is_not_named(none, tmp_path, monkeypatch):
     """A joint with damping that its model lacks: the first effect, or all, found with size 0."""
