@@ -190,3 +190,21 @@ def test_a_curve_is_level_where_no_run_has_been(begun, effect):
     assert values[0] == values[1] == values[2] == part.y[0] > 0
     assert values[3] == pytest.approx(values[4]) == pytest.approx(part.y[-1])
     assert part.y[-1] > part.y[0]
+
+
+def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened(begun):
+    """Drag as an effect of which usually only a tenth of the true size is looked for."""
+    every = [h for h in begun.hypotheses if h.effect == EFFECT]
+    size = begun.tell(every[0]).x[0]
+    usual, widest = (np.array([0.1, 10.0]) * size)[:, None]
+
+    def told(high, widest):
+        bounds = replace(every[0].unknowns, high=high, widest=np.stack([[np.nan], widest]))
+        return begun.tell(replace(every[0], unknowns=bounds, trials=np.array([[0.05 * size]])))
+
+    wide = told(usual, widest)
+    assert wide.x[0] == pytest.approx(size, rel=0.02) and not wide.vanished
+    pressed = told(usual, 2 * usual)
+    assert pressed.x[0] == pytest.approx(2 * usual[0]) and pressed.vanished
+    hard = told(usual, [np.nan])
+    assert hard.x[0] == pytest.approx(usual[0]) and not hard.vanished

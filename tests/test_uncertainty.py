@@ -9,9 +9,9 @@ from hidden_cases import case_of, dice, job_of, read
 from hidden_coverage import pulls
 from test_hidden_bench import RELIABLE, RUNS
 
-from joda.diagnosis.asking import asked
+from joda.diagnosis.asking import RESTITUTION, asked
 from joda.diagnosis.ranking import rank
-from joda.diagnosis.uncertainty import FARTHEST, SHAPE, from_data, uncertainty
+from joda.diagnosis.uncertainty import FARTHEST, REACHING, SHAPE, from_data, uncertainty
 from joda.diagnosis.uncertainty import _fitted as fitted
 from joda.hidden import EFFECTS, draw
 
@@ -59,6 +59,36 @@ def test_of_a_known_law_the_size_is_as_uncertain_as_linear_least_squares_says():
     assert 0.8 * by_hand < data < 10 * by_hand
     size = guess.hypothesis.magnitude(guess.x)
     assert uncertainty(begun, guess, 0.0).magnitude >= SHAPE[guess.hypothesis.remains] * size
+
+
+def test_what_is_there_has_a_size_however_badly_it_is_known():
+    """A latch at the low end that runs with positions only tell little of."""
+    case, begun, guess = found(1720741344, "spring_loaded_snap_detent_to_low_end", forced=False)
+    size = guess.hypothesis.magnitude(guess.x)
+    assert from_data(fitted(begun, guess))[0] > FARTHEST * size
+    said = uncertainty(begun, guess, 0.0).magnitude
+    assert FARTHEST * size <= said < (FARTHEST + 1) * size
+    assert abs(size - case.seal["magnitude"]) < 2 * said
+
+
+def test_a_pull_that_is_felt_all_over_may_be_the_far_end_of_any(seed=1629234564):
+    case, begun, guess = found(seed, "magnetic_return_to_high_end", forced=False)
+    a, b = guess.hypothesis.interval(guess.x)
+    assert b - a > REACHING
+    said = uncertainty(begun, guess, 0.0).magnitude
+    assert abs(guess.hypothesis.magnitude(guess.x) - case.seal["magnitude"]) < 2 * said
+
+
+def test_the_end_that_was_not_knocked_at_may_throw_back_too(seed=918226542):
+    case = draw(seed, "end_stop_restitution", forced=False)
+    begun = asked(read(case)[0])
+    ranking = rank(begun, [h.effect for h in begun.hypotheses if h.effect != RESTITUTION])
+    guess = ranking.guesses[0]
+    interval = guess.hypothesis.interval(guess.x)
+    assert (interval, case.seal["interval"]) == ((0.0, 0.02), [0, 1])
+    low, high = uncertainty(ranking.asked, guess, 0.0).ends
+    assert low < 0.05
+    assert abs(interval[1] - 1) < 2 * high
 
 
 def test_what_is_left_and_what_nobody_visited_make_it_less_sure():

@@ -243,7 +243,7 @@ def _restitution(asked: Asked, found: Guess) -> Uncertainty:
         AT_END
         if len(sides) == 2 or side in sides or len(rebounds(windows, base, [side])) >= KNOCKS
         else UNKNOWN_END
-        for side in (1, -1)
+        for side in (-1, 1)
     )
     return Uncertainty(float(np.hypot(error, own)), (low, high))
 
