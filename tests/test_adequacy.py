@@ -152,7 +152,7 @@ def test_a_right_model_of_noisy_free_runs_is_not_blamed_for_their_starts(tmp_pat
     ]
     assert np.median(off) < 1.5, seed
     explained = [
-        right.replayer.scatter(run, noise) / noise
+        right.replayer.scatter(run, right.replayer.start(run, noise)) / noise
         for run, noise in zip(right.runs, right.sigma, strict=True)
     ]
     blamed = [o > MULTIPLE and o > EXPLAINED * e for o, e in zip(off, explained, strict=True)]

@@ -96,13 +96,14 @@ def errors(
     off, left = [np.zeros(0)], [np.zeros(0)]
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         begin(run.name)
-        paths.append(measured.replayer.whole(run, sigma))
+        start = measured.replayer.start(run, sigma)
+        paths.append(measured.replayer.whole(run, start))
         misfit = paths[-1] - run.position
         off.append(misfit[~np.isnan(paths[-1])])
         pieces = measured.replayer.windows(run, sigma) if windows else []
         left.append(joined(pieces))
         whole = rms(off[-1])
-        scatter = measured.replayer.scatter(run, sigma) if explained and len(off[-1]) else None
+        scatter = measured.replayer.scatter(run, start) if explained and start else None
         if len(off[-1]):
             missed.append(Missed(run.name, _multiple(whole, sigma), (scatter or 0.0) / sigma))
         missed += [_missed(run, sigma, piece) for piece in pieces]
@@ -130,17 +131,15 @@ def worst_explained(measured: Measured, least: float) -> float:
         measured: the runs, and the model.
         least: multiple of the noise under which that is not looked for, and the multiple is told.
     """
-
-    def explained(number: int) -> float:
-        one = measured.changed(runs=[number])
-        missed = errors(one, windows=False).missed
-        if any(run.multiple > least for run in missed):
-            missed = errors(one, windows=False, explained=True).missed
-        return max(
-            (run.multiple / float(np.hypot(1.0, run.explained)) for run in missed), default=0
-        )
-
-    return max(map(explained, range(len(measured.runs))), default=0.0)
+    replayer, worst = measured.replayer, 0.0
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        if start := replayer.start(run, sigma):
+            misfit = replayer.whole(run, start) - run.position
+            multiple = _multiple(rms(misfit[~np.isnan(misfit)]), sigma)
+            if multiple > least:
+                multiple /= float(np.hypot(1.0, replayer.scatter(run, start) / sigma))
+            worst = max(worst, multiple)
+    return worst
 
 
 def _multiple(error: float, sigma: float) -> float:

@@ -141,7 +141,7 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
             force, doubt = (whole[0].force, whole[0].doubt) if len(whole) == 1 else (force, doubt)
             if abs(force) < max(BLIND * doubt, SLIGHT * _usual_force(measured, run)):
                 continue  # it drifts, but no force on the whole makes it
-        off = measured.replayer.scatter(run, sigma)
+        off = measured.replayer.scatter(run, measured.replayer.start(run, sigma))
         for samples in np.array_split(there, PIECES):
             if len(samples) > 1:
                 misfit = path[samples] - run.position[samples]

@@ -102,8 +102,8 @@ class Measured:
 
     def paths(self) -> list[Array]:
         """Predicted positions of all runs, rad or m; NaN from where the force is not known."""
-        pairs = zip(self.runs, self.sigma, strict=True)
-        return [self.replayer.whole(run, sigma) for run, sigma in pairs]
+        replayer, pairs = self.replayer, zip(self.runs, self.sigma, strict=True)
+        return [replayer.whole(run, replayer.start(run, sigma)) for run, sigma in pairs]
 
     def with_runs(self, parts: Sequence[Run], of: Sequence[int]) -> "Measured":
         """The same joint with parts of its runs, and of each the number of its run."""
@@ -194,9 +194,11 @@ def taken(
     own = single(found, profile, model, joint)
     replayer = Replayer(found, profile, own, step)
     static = [curve for curve in clear.measured if isinstance(curve, QuasiStatic)]
-    if len(timed) == 1 and (
-        slow := as_curve(timed[0], sigma[0], profile, own.inertia, replayer.whole)
-    ):
+
+    def replay(run: Run, sigma: float) -> Array:
+        return replayer.whole(run, replayer.start(run, sigma))
+
+    if len(timed) == 1 and (slow := as_curve(timed[0], sigma[0], profile, own.inertia, replay)):
         timed, sigma, static = (), (), [*static, slow]
         notes.append(
             f"{slow.name}: taken as a quasi-static curve, as it goes one way only and so slowly "

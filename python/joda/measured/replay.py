@@ -87,6 +87,19 @@ class Window:
 
 
 @dataclass(frozen=True)
+class Start:
+    """Where a whole run begins under a model.
+
+    Attributes:
+        best: position and velocity, shape (2,).
+        spread: a factor of their covariance, shape (2, 2).
+    """
+
+    best: Array
+    spread: Array
+
+
+@dataclass(frozen=True)
 class _Prior:
     """What smoothed samples tell of a run's start: position and velocity, shape (2,) each."""
 
@@ -106,34 +119,56 @@ class Replayer:
         self.data = mujoco.MjData(self.model)
         self.inertia = single.inertia
 
-    def whole(self, run: Run, sigma: float) -> Array:
+    def whole(self, run: Run, start: Start | None) -> Array:
         """Predicted positions at the run's times, from its start; NaN where force is unknown on."""
         out = np.full(len(run.time), np.nan)
-        if known := _known(run):
-            time, force = run.time[known] - run.time[0], run.force[known]
-            start = self._start(time, run.position[known], force, sigma)[0]
-            out[known] = self._replay(time, start[None], force[None])[0]
+        if start:
+            time, force = _known(run)
+            out[: len(time)] = self._replay(time, start.best[None], force[None])[0]
         return out
 
-    def scatter(self, run: Run, sigma: float) -> float:
+    def scatter(self, run: Run, start: Start | None) -> float:
         """RMS by which errors of the measured start and force alone move a whole run's replay.
 
         An ensemble of replays: from starts within their errors, under forces with their noise. Near
         a barrier, or over minutes, it may be far more than the position's noise.
         """
-        known = _known(run)
-        if not known:
+        if not start:
             return 0.0
-        time, force = run.time[known] - run.time[0], run.force[known]
-        start, spread = self._start(time, run.position[known], force, sigma)
+        time, force = _known(run)
         every = slice(None, None, len(time) // DENSEST + 1)
         off = smoothing.force_error(time, force, run.forced)[every] / np.sqrt(every.step)
         time, force = time[every], force[every]
         rng = np.random.default_rng(0)
-        starts = start + rng.standard_normal((ENSEMBLE, 2)) @ spread.T
+        starts = start.best + rng.standard_normal((ENSEMBLE, 2)) @ start.spread.T
         forces = force + off * rng.standard_normal((ENSEMBLE, len(time)))
-        paths = self._replay(time, np.vstack([start, starts]), np.vstack([force, forces]))
+        paths = self._replay(time, np.vstack([start.best, starts]), np.vstack([force, forces]))
         return float(np.sqrt(np.mean((paths[1:] - paths[0]) ** 2)))
+
+    def start(self, run: Run, sigma: float) -> Start | None:
+        """Where a whole run begins; None where its force is unknown from the beginning.
+
+        At the smoothed samples, moved within their errors to where the model follows the first
+        `HORIZON` seconds best: a velocity that is a little off is a position that is far off at the
+        end of a run. A joint that seems to be at rest is, unless the model follows clearly better
+        from a start that moves.
+        """
+        time, force = _known(run)
+        if not len(time):
+            return None
+        position = run.position[: len(time)]
+        begun = smoothing.smooth(time, position, time[:1], sigma)
+        prior = _Prior(
+            np.array([begun.position[0], begun.velocity[0]]),
+            np.array([begun.position_error[0], begun.velocity_error[0]]),
+        )
+        least, best, covariance = self._fitted_start(time, position, force, sigma, prior, False)
+        if smoothing.begins_at_rest(time, position, sigma):
+            still = self._fitted_start(time, position, force, sigma, prior, True)
+            if still[0] < AT_REST * least:
+                _, best, covariance = still
+        factor = prior.deviation[:, None] * np.linalg.cholesky(covariance)
+        return Start(prior.mean + prior.deviation * best, factor)
 
     def _replay(self, time: Array, starts: Array, forces: Array) -> Array:
         """Positions at some times from starts (k, 2), under forces (k, n); shape (k, n).
@@ -154,29 +189,6 @@ class Replayer:
             own = slice(*np.searchsorted(time, (at[0], at[-1])))
             out[:, own] = np.stack([np.interp(time[own], at, path) for path in paths])
         return out
-
-    def _start(
-        self, time: Array, position: Array, force: Array, sigma: float
-    ) -> tuple[Array, Array]:
-        """Position and velocity at the beginning, shape (2,), and a factor of their covariance.
-
-        Those of the smoothed samples, moved within their errors to where the model follows the
-        first `HORIZON` seconds best: a velocity that is a little off is a position that is far off
-        at the end of a run. A joint that seems to be at rest is, unless the model follows clearly
-        better from a start that moves.
-        """
-        begun = smoothing.smooth(time, position, time[:1], sigma)
-        prior = _Prior(
-            np.array([begun.position[0], begun.velocity[0]]),
-            np.array([begun.position_error[0], begun.velocity_error[0]]),
-        )
-        least, best, covariance = self._fitted_start(time, position, force, sigma, prior, False)
-        if smoothing.begins_at_rest(time, position, sigma):
-            still = self._fitted_start(time, position, force, sigma, prior, True)
-            if still[0] < AT_REST * least:
-                _, best, covariance = still
-        factor = prior.deviation[:, None] * np.linalg.cholesky(covariance)
-        return prior.mean + prior.deviation * best, factor
 
     def _fitted_start(
         self, time: Array, position: Array, force: Array, sigma: float, prior: "_Prior", rests: bool
@@ -308,11 +320,12 @@ class Replayer:
         return np.hstack([initial[:, 1:2], states[:, :, 1]]), states[:, -1]
 
 
-def _known(run: Run) -> slice | None:
-    """From the beginning to where the force is unknown; None if that is too short."""
+def _known(run: Run) -> tuple[Array, Array]:
+    """Times from 0 on (s) and forces, to where the force is unknown; none if that is too short."""
     unknown = np.flatnonzero(np.isnan(run.force))
     end = int(unknown[0]) if len(unknown) else len(run.time)
-    return slice(0, end) if end >= smoothing.LEAST else None
+    known = slice(0, end if end >= smoothing.LEAST else 0)
+    return run.time[known] - run.time[0], run.force[known]
 
 
 def _spread(count: int) -> Array:
