@@ -17,8 +17,9 @@ from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import BOUNCY, strengths_off, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, excess_of, weigh
+from joda.diagnosis.whole import BEYOND, worst
 from joda.measured.adequacy import MULTIPLE
-from joda.measured.errors import worst_explained, worst_missed
+from joda.measured.errors import worst_missed
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
@@ -46,9 +47,6 @@ AGAIN = (
     "repeats depends on time or on what was before, what differs with speed is a resistance, what "
     "does neither is a force over position."
 )
-BEYOND = 5.0
-"""How many times what noise, start and force explain of it a whole run may be missed by a model
-that is adequate, with its own strengths fitted."""
 DRIFTING = (
     "Something is missing that no known effect explains: windows show nothing beyond the noise, "
     "but whole runs are missed by up to {:.0f} times what noise, start and force explain."
@@ -172,9 +170,7 @@ def _longer(first: Ranking) -> float:
 
 def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     """No effect shows in windows: the model is adequate, unless whole runs say otherwise."""
-    base, fit = ranking.asked.base, ranking.asked.fit
-    fitted = base.written(fit.x[: len(base.places)])
-    if (left := worst_explained(measured.changed(fitted), BEYOND)) > BEYOND:
+    if (left := worst(measured, ranking.asked)) > BEYOND:
         return _said(measured, "unexplained", DRIFTING.format(left), (), AGAIN)
     off = strengths_off(ranking)
     missed = worst_missed(measured)

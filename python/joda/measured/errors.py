@@ -124,24 +124,6 @@ def worst_missed(measured: Measured) -> float:
     return max((one.multiple for one in errors(measured, windows=False).missed), default=0.0)
 
 
-def worst_explained(measured: Measured, least: float) -> float:
-    """By how many times what noise, start and force explain the worst whole run is missed.
-
-    Args:
-        measured: the runs, and the model.
-        least: multiple of the noise under which that is not looked for, and the multiple is told.
-    """
-    replayer, worst = measured.replayer, 0.0
-    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        if start := replayer.start(run, sigma):
-            misfit = replayer.whole(run, start) - run.position
-            multiple = _multiple(rms(misfit[~np.isnan(misfit)]), sigma)
-            if multiple > least:
-                multiple /= float(np.hypot(1.0, replayer.scatter(run, start) / sigma))
-            worst = max(worst, multiple)
-    return worst
-
-
 def _multiple(error: float, sigma: float) -> float:
     return min(error / sigma, ASTRAY) if np.isfinite(error) else ASTRAY
 

@@ -1,0 +1,70 @@
+"""Whole runs of a model with its own strengths fitted: how much they are missed by, and why."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.diagnosis.asking import Asked
+from joda.diagnosis.judge import BEND
+from joda.measured.misfit import rms
+from joda.measured.reading import Measured
+from joda.measured.runs import Run
+
+Array = NDArray[np.float64]
+
+BEYOND = 5.0
+"""How many times what errors explain of it a model that is adequate may miss a whole run by."""
+DRAWS = 8
+"""Strengths that are drawn, to tell how far their errors move a run."""
+CLEAR = 3.0
+"""How far off an end of its range a joint must be, in noises, not to be at it."""
+
+
+def worst(measured: Measured, asked: Asked) -> float:
+    """By how many times what errors explain of it the worst whole run is missed.
+
+    Errors of positions, of the start, of the recorded force and of the fitted strengths. A run
+    counts up to where the joint meets an end of its range: after that the stop decides, not a law
+    of the joint. A run that is missed by no more than `BEYOND` noises is told in those.
+
+    Args:
+        measured: the joint and its runs.
+        asked: the model fitted to them.
+    """
+    drawn = [measured.changed(asked.base.written(x)).replayer for x in _strengths(asked)]
+    replayer, *others = drawn
+    out = 0.0
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        part = _free(run, sigma, measured.profile.joint.range)
+        if not (start := replayer.start(part, sigma)):
+            continue
+        path = replayer.whole(part, start)
+        there = ~np.isnan(path)
+        missed = rms(path[there] - part.position[there]) / sigma
+        if missed > BEYOND:
+            moved = [other.whole(part, start)[there] - path[there] for other in others]
+            apart = rms(np.concatenate(moved)) if moved else 0.0
+            missed *= sigma / float(np.linalg.norm([sigma, replayer.scatter(part, start), apart]))
+        out = max(out, missed)
+    return out
+
+
+def _strengths(asked: Asked) -> list[Array]:
+    """The model's fitted strengths, and others within their errors; shape (k,) each."""
+    judge, base, fit = asked.judge, asked.base, asked.fit
+    best = fit.x[: len(base.places)]
+    if not len(best):
+        return [best]
+    H = judge.linear(base.solo, base.unknowns, fit.x, fit.start).normal()[0]
+    noise = judge.loss(fit.squares) / max(judge.samples, 1.0) / (BEND * float(np.log1p(1 / BEND)))
+    covariance = max(noise, 1.0) * np.linalg.inv(H + np.diag(base.unknowns.doubt**-2.0))
+    drawn = np.random.default_rng(0).multivariate_normal(best, covariance, DRAWS, method="svd")
+    return [best, *np.clip(drawn, base.unknowns.low, base.unknowns.high)]
+
+
+def _free(run: Run, sigma: float, span: tuple[float, float]) -> Run:
+    """A run up to where the joint comes to an end of its range from elsewhere."""
+    lo, hi = span
+    away = np.minimum(run.position - lo, hi - run.position) > CLEAR * sigma
+    left = int(np.argmax(away)) if away.any() else len(away)
+    back = np.flatnonzero(~away[left:])
+    return run.part(slice(0, left + int(back[0]) if len(back) else len(away)))

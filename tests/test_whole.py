@@ -1,0 +1,32 @@
+"""Whole runs of an adequate model: missed by no more than errors explain, up to an end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_cases import read
+
+from joda.diagnosis.asking import asked
+from joda.diagnosis.whole import BEYOND, _free, worst
+from joda.hidden import draw
+from joda.measured.runs import Run
+
+
+def test_a_run_counts_up_to_where_the_joint_comes_to_an_end():
+    position = np.array([0.0, 0.001, 0.2, 0.9, 0.999, 0.7, 0.5])
+    run = Run("a.csv", np.arange(7.0), position, None, np.zeros(7), False)
+    assert len(_free(run, 1e-3, (0.0, 1.0)).time) == 4
+    assert len(_free(run, 1e-5, (0.0, 1.0)).time) == 7
+    assert len(_free(run, 1.0, (0.0, 1.0)).time) == 7
+
+
+@pytest.mark.parametrize("forced", [True, False])
+def test_errors_explain_the_runs_of_a_right_model_and_not_those_of_a_wrong_one(forced):
+    seed = int(np.random.default_rng().integers(2**31))
+    print(seed)
+    train, _ = read(draw(seed, None, forced))
+    begun = asked(train)
+    assert worst(train, begun) < BEYOND
+    assert len(begun.fit.x)
+    wrong = replace(begun, fit=replace(begun.fit, x=3.0 * begun.fit.x))
+    assert worst(train, wrong) > worst(train, begun)
