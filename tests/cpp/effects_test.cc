@@ -48,7 +48,8 @@ TEST_CASE("every effect is parsed") {
   CHECK(e.gravity.cos == -0.4);
   CHECK(e.gravity.descent == doctest::Approx(0.5));
   CHECK(e.backlash.play == 0.01);
-  CHECK(e.backlash.inertia == 0.002);
+  CHECK(e.backlash.handle == 0.002);
+  CHECK(e.backlash.load == 0);
   CHECK(e.added_inertia == 0.01);
   CHECK(Rebound(e.stops.low.value()) == doctest::Approx(0.4));
   CHECK(!e.stops.high);
@@ -98,7 +99,7 @@ TEST_CASE("each mistake in the effects has its sentence") {
                    "direction_dependent_damping, quadratic_damping, ",
                    0) == 0);
   CHECK(Error("backlash play=1 width=1") ==
-        "effect 1 \"backlash\": unknown key \"width\"; its keys: play inertia");
+        "effect 1 \"backlash\": unknown key \"width\"; its keys: play inertia side share");
   CHECK(Error("backlash play=1") == "effect 1 \"backlash\": inertia is missing");
   CHECK(Error("backlash play=1 play=1") == "effect 1 \"backlash\": play is given twice");
   CHECK(Error("backlash play 1") == "effect 1 \"backlash\": expected key=value, got \"play\"");
@@ -243,18 +244,18 @@ TEST_CASE("the gravity offset is a sine of the position, or a force") {
 }
 
 TEST_CASE("a handle moves freely within its play and exerts nothing") {
-  Handle handle;
+  Loose handle;
   CHECK(MoveHandle({0.1, 2}, 0.01, 4, 0, &handle) == doctest::Approx(0));
   CHECK(handle.velocity == doctest::Approx(0.02));
   CHECK(handle.gap == doctest::Approx(0.0002));
 }
 
 TEST_CASE("a handle at the end of its play moves with the part and passes on its momentum") {
-  Handle handle = {0.05, 3};
+  Loose handle = {0.05, 3};
   CHECK(MoveHandle({0.1, 2}, 0.01, 4, 1, &handle) == doctest::Approx(4 + 2 * (3 - 1) / 0.01));
   CHECK(handle.velocity == 1);
   CHECK(handle.gap == 0.05);
-  Handle outside = {9, 1};  // a profile with less play took over
+  Loose outside = {9, 1};  // a profile with less play took over
   CHECK(MoveHandle({0.1, 2}, 0.01, 4, 1, &outside) == doctest::Approx(4));
   CHECK(outside.gap == 0.05);
 }
