@@ -171,13 +171,13 @@ void CheckInertia(const mjModel* m, int joint, const Effects& effects) {
                          const char* told) {
     if (part <= most * whole) return;
     throw std::invalid_argument(JointName(m, joint) + " has inertia " + Print(whole) +
-                                ", and the " + what + " of its effect \"backlash\" " +
-                                Print(part) + "; at most " + told + " is possible");
+                                ", and the " + what + " of its effect \"backlash\" " + Print(part) +
+                                "; at most " + told + " is possible");
   };
   const Backlash& backlash = effects.backlash;
   // a heavier handle would make the contact, which is explicit, unstable
   check("handle", backlash.handle, 1 / m->dof_invweight0[dof], 0.5, "half");
-  check("load", backlash.load, m->dof_M0[dof], kHeaviestLoad, "nine tenths");
+  check("load", backlash.load, m->dof_M0[dof], kHeaviestLoad, "0.95 of it");
 }
 
 // Throws where the integrator, or noslip, gives the effect no place in which it would be right.
@@ -189,10 +189,9 @@ void CheckIntegrator(const mjModel* m, int joint, const Effects& effects) {
                                 what);
   };
   if (effects.backlash.play > 0 && m->opt.integrator == mjINT_RK4) {
-    fail("backlash",
-         std::string("whose ") + (effects.backlash.load > 0 ? "load" : "handle") +
-             " would have half its inertia with integrator=\"RK4\"; choose "
-             "integrator=\"implicitfast\"");
+    fail("backlash", std::string("whose ") + (effects.backlash.load > 0 ? "load" : "handle") +
+                         " would have half its inertia with integrator=\"RK4\"; choose "
+                         "integrator=\"implicitfast\"");
   }
   if (effects.presliding.stiffness > 0 && (discrete || noslip)) {
     fail("presliding_friction",

@@ -195,12 +195,12 @@ struct Passage {
 };
 
 // Largest part of the joint's inertia that a load may be.
-inline constexpr double kHeaviestLoad = 0.9;
+inline constexpr double kHeaviestLoad = 0.95;
 
-// Whether part and load move together in the step that begins with the part at v: if they overlapped
-// after a step by themselves. `force` is what is known to act on the part, `own` and `other` are the
-// joint's resistance at the part's velocity and at the load's, `spring` is resistance of the part
-// alone.
+// Whether part and load move together in the step that begins with the part at v: if they
+// overlapped after a step by themselves. `force` is what is known to act on the part, `own` and
+// `other` are the joint's resistance at the part's velocity and at the load's, `spring` is
+// resistance of the part alone.
 inline Passage Meet(const Backlash& backlash, double h, double inertia, double force, double v,
                     const Resistance& own, double spring, const Resistance& other,
                     const Loose& load) {

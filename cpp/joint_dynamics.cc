@@ -111,9 +111,8 @@ double JointDynamics::SetFrictionRow(const Step& step, mjData* d, int row, const
                                      double bound, double state, double inertia) {
   const double held = step.keeps_rows ? std::clamp(state, -bound, bound) : 0;
   const Effects* effects = step.keeps_rows ? joint.profile.effects.get() : nullptr;
-  const FrictionRow stiffened =
-      StiffenFrictionRow(effects, step.h, held, bound, d->qvel[joint.dof], inertia,
-                         joint.load.resistance);
+  const FrictionRow stiffened = StiffenFrictionRow(effects, step.h, held, bound, d->qvel[joint.dof],
+                                                   inertia, joint.load.resistance);
   SetRow(step, d, row, stiffened.D, bound, held);
   return stiffened.damping;
 }

@@ -29,10 +29,10 @@ class JointDynamics {
 
   // Remembers the dry friction of the step just taken, one number per joint in plugin_state: the
   // next step's friction continues from it, so that a held joint does not creep. A joint with
-  // backlash has three numbers more: those of the handle or the load, and the force that was applied
-  // after Compute (between mj_step1 and mj_step2, or by mjcb_control). That force reached the part
-  // directly: the next step gives it to the handle and takes it back from the part, or makes up for
-  // the load's inertia.
+  // backlash has three numbers more: those of the handle or the load, and the force that was
+  // applied after Compute (between mj_step1 and mj_step2, or by mjcb_control). That force reached
+  // the part directly: the next step gives it to the handle and takes it back from the part, or
+  // makes up for the load's inertia.
   void Advance(const mjModel* m, mjData* d, int instance) const;
 
   // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint

@@ -78,8 +78,7 @@ void Solo::Advance(double h, double force, State* state) const {
   double drag = load.On(own).drag + load.scale * stiffness;
 
   const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
-  const FrictionRow row =
-      StiffenFrictionRow(effects, h, held, bound, v, inertia, load.resistance);
+  const FrictionRow row = StiffenFrictionRow(effects, h, held, bound, v, inertia, load.resistance);
   drag += row.damping;
   const Friction friction = {held - row.D * v / h, row.D, bound};
 

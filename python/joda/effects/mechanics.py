@@ -46,7 +46,7 @@ class GravityOffset(Effect):
         return not (self.force if kind == "hinge" else self.sin or self.cos)
 
 
-HEAVIEST = {"load": 0.45, "motor": 0.88}
+HEAVIEST = {"load": 0.45, "motor": 0.94}
 """Inertia of what is beyond the play, by the side on which the joint is, in units of the joint's: a
 little less than what the plugin takes."""
 

@@ -31,7 +31,7 @@ LEAST_SHARE = 0.05
 """Part of it that is left in the row where it is far stiffer than the step resolves."""
 STILL = 1e-9
 """As kStill in cpp/effects.h."""
-HEAVIEST_LOAD = 0.9
+HEAVIEST_LOAD = 0.95
 """As kHeaviestLoad in cpp/effects.h."""
 NOTHING = 1e-30
 """Less than any number that matters."""

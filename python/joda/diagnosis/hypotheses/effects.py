@@ -243,27 +243,31 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
 def _backlash(units: Units) -> Iterator[Hypothesis]:
     """Play before the joint, and behind it."""
     M, span = units.inertia, units.span
-    plays, wide = (3e-3, 0.2, 0.002), (0.01, 0.03)
+    play = (3e-3, 0.2, 0.002)
 
     def size(x: Array) -> float:
         return span * float(x[0])
 
+    def before(x: Array) -> Backlash:
+        return Backlash(play=size(x), inertia=M * float(np.exp(x[1])))
+
     def behind(x: Array) -> Backlash:
-        return Backlash(play=size(x), inertia=M * float(x[1]), side="motor", share=float(x[2]))
+        inertia = M * float(np.exp(x[1]))
+        return Backlash(play=size(x), inertia=inertia, side="motor", share=float(x[2]))
 
     unit = "rad" if units.hinge else "m"
     yield _effect(
         "backlash",
-        [plays, (np.log(3e-3), np.log(HEAVIEST["load"]), 0.05)],
-        list(product(wide, (np.log(0.03), np.log(0.15)))),
-        lambda x: Backlash(play=size(x), inertia=M * float(np.exp(x[1]))),
+        [play, (np.log(3e-3), np.log(HEAVIEST["load"]), 0.05)],
+        list(product((0.01, 0.03), (np.log(0.03), np.log(0.15)))),
+        before,
         size,
         unit,
     )
     yield _effect(
         "backlash",
-        [plays, (0.05, HEAVIEST["motor"], 0.01), (0.0, 1.0, 0.02)],
-        list(product(wide, (0.4, 0.75), (0.5, 0.85))),
+        [(3e-3, 0.2, 0.005), (np.log(0.01), np.log(HEAVIEST["motor"]), 0.15), (0.0, 1.0, 0.05)],
+        list(product((0.015, 0.05), (np.log(0.12), np.log(0.5)), (0.85,))),
         behind,
         size,
         unit,
