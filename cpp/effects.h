@@ -184,7 +184,7 @@ inline double Coast(double inertia, double h, double force, const Resistance& ag
 // What a load makes of the joint's step. Where the part moves alone, MuJoCo's inertia, which is
 // that of both, moves as the part does if all that acts on the part is larger by `scale`.
 struct Passage {
-  bool touches = true;    // the part moves the load
+  double side = 0;        // of the part, at which it moves the load: 1, -1, or 0 for none
   double scale = 1;       // of the known forces on the part
   double resistance = 1;  // of friction and damping
   double force = 0;       // besides: the load's blow (N m)
@@ -212,8 +212,8 @@ inline Passage Meet(const Backlash& backlash, double h, double inertia, double f
   Resistance alone = own.Part(1 - share);
   alone.drag += spring;
   const double next = out.gap + h * (out.velocity - Coast(part, h, force, alone, v));
-  out.touches = std::abs(next) >= half;
-  if (out.touches) {
+  if (std::abs(next) >= half) {
+    out.side = internal::Sign(next);
     out.force = backlash.load * load.velocity / h;
   } else {
     out.scale = inertia / part;
@@ -222,11 +222,12 @@ inline Passage Meet(const Backlash& backlash, double h, double inertia, double f
   return out;
 }
 
-// The load after the step, at whose end the part moves at v.
+// The load after the step, at whose end the part moves at v. Where they met, it is left behind only
+// if it is slower, as where a stop has thrown the part back.
 inline Loose Settle(const Backlash& backlash, double h, const Passage& passage, double v) {
   const double half = 0.5 * backlash.play, ahead = passage.velocity - v;
-  const double gap = std::clamp(passage.gap + h * ahead, -half, half);
-  return {gap, passage.touches && std::abs(gap) == half ? 0 : ahead};
+  if (passage.side * ahead >= 0 && passage.side != 0) return {passage.side * half, 0};
+  return {std::clamp(passage.gap + h * ahead, -half, half), ahead};
 }
 
 }  // namespace joda

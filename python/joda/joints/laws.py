@@ -55,7 +55,7 @@ class Passage(NamedTuple):
     """What a load behind a play makes of the joint's step.
 
     Attributes:
-        touches: whether the joint moves it.
+        side: of the joint, at which it moves the load: 1, -1, or 0 for none.
         scale: of the known forces on the joint: where it moves alone, the inertia is too large.
         resistance: of friction and damping.
         force: besides: the load's blow, N·m.
@@ -63,7 +63,7 @@ class Passage(NamedTuple):
         w: velocity of the load after the step, by itself, rad/s.
     """
 
-    touches: Array
+    side: Array
     scale: Array
     resistance: Array
     force: Array
@@ -224,7 +224,7 @@ def meet(
     """
     still, one = jnp.zeros_like(v), jnp.ones_like(v)
     if behind is None:
-        return Passage(one > 0, one, one, still, still, still)
+        return Passage(still, one, one, still, still, still)
     half, is_there = 0.5 * behind.play, behind.load > 0
     part = jnp.maximum(inertia - behind.load, (1 - HEAVIEST_LOAD) * inertia)
     load = jnp.where(is_there, behind.load, 1)
@@ -232,12 +232,12 @@ def meet(
     after = _coast(load, still, other.part(behind.share), v + w, h)
     alone = own.part(1 - behind.share)
     alone = alone._replace(drag=alone.drag + spring)
-    touches = jnp.abs(g + h * (after - _coast(part, force, alone, v, h))) >= half
-    touches = touches | ~is_there
+    ahead = g + h * (after - _coast(part, force, alone, v, h))
+    touches = (jnp.abs(ahead) >= half) | ~is_there
     scale = jnp.where(touches, 1, inertia / part)
     left = jnp.where(touches, 1, scale * (1 - behind.share))
     blow = jnp.where(touches, behind.load * w / h, 0)
-    return Passage(touches, scale, left, blow, g, after)
+    return Passage(jnp.where(touches, jnp.sign(ahead), 0), scale, left, blow, g, after)
 
 
 def settle(
@@ -245,14 +245,15 @@ def settle(
 ) -> tuple[Array, Array]:
     """The load after a step, at whose end the joint moves at v; g and w as for `meet`.
 
-    Without a load they stay as they are.
+    Where they met, it is left behind only if it is slower. Without a load both stay as they are.
     """
     if behind is None:
         return g, w
     half, is_there = 0.5 * behind.play, behind.load > 0
     ahead = passage.w - v
+    stays = (passage.side * ahead >= 0) & (passage.side != 0)
     after = jnp.clip(passage.g + h * ahead, -half, half)
-    ahead = jnp.where(passage.touches & (jnp.abs(after) == half), 0, ahead)
+    after, ahead = jnp.where(stays, passage.side * half, after), jnp.where(stays, 0, ahead)
     return jnp.where(is_there, after, g), jnp.where(is_there, ahead, w)
 
 
