@@ -96,8 +96,8 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> tuple[mjx.
 
     at = np.flatnonzero(index["damping_row"] >= 0)
     row, on = index["damping_row"][at], d.eq_active[index["equality"][at]] != 0
-    resistance = jnp.maximum(h * drag[at], IDLE_ROW * inertia[at])
-    rows.set(row, resistance, 0, 0, v[at] / h)
+    D = jnp.maximum(h * drag[at], IDLE_ROW * inertia[at])
+    rows.set(row, D, 0, 0, v[at] / h)
     held = jnp.zeros(len(dof), bool).at[at].set(on)
     if own.end_stop_restitution is not None:
         at = np.flatnonzero(index["limit_row"] >= 0)
