@@ -28,7 +28,7 @@ NARROWEST = 0.005
 
 SIGNED = ("sin", "cos", "force")
 """Numbers of effects that may have either sign."""
-LARGEST = {"breakaway": 1.0, "restitution": 0.95, "share": 1.0}
+LARGEST = {"breakaway": 1.0, "restitution": 0.95, "share": 0.99}
 LEAST_LEFT = 0.02
 """Least part of an effect's number that a fit may leave."""
 

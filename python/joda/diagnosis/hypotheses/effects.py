@@ -52,6 +52,8 @@ RAISED = 0.1
 """Part of its rise above its least value from which a free curve is told to act."""
 VARIED = 0.5
 """How much a curve varies at least that differs along the way, in units of its mean."""
+KEPT = 3
+"""Rough fits of a load behind a play that are fitted to the end: each knock may be or not."""
 TINY = 1e-12
 """As good as no force."""
 
@@ -264,14 +266,15 @@ def _backlash(units: Units) -> Iterator[Hypothesis]:
         size,
         unit,
     )
-    yield _effect(
+    load = _effect(
         "backlash",
-        [(3e-3, 0.2, 0.005), (np.log(0.01), np.log(HEAVIEST["motor"]), 0.15), (0.0, 1.0, 0.05)],
+        [(3e-3, 0.2, 0.003), (np.log(0.01), np.log(HEAVIEST["motor"]), 0.1), (0.0, 0.98, 0.04)],
         list(product((0.015, 0.05), (np.log(0.12), np.log(0.5)), (0.85,))),
         behind,
         size,
         unit,
     )
+    yield replace(load, kept=KEPT)
 
 
 def _restitution(end: End) -> Hypothesis:
