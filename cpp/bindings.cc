@@ -163,8 +163,8 @@ Args:
   force: applied at each step, shape (n,).
   at: steps before which the joint is set to a start, increasing from 0, shape (m,).
   start: position and velocity there, shape (m, 2).
-  fresh: whether the joint forgets its friction's force there and centres its handle; otherwise
-    both stay, the handle in its motion beside the part. Shape (m,).
+  fresh: whether the joint forgets its friction's force there and centres its handle or load;
+    otherwise both stay, what is loose in its motion beside the part. Shape (m,).
   h: timestep, s.
 
 Returns:

@@ -167,13 +167,17 @@ void CheckInertia(const mjModel* m, int joint, const Effects& effects) {
                                 "\"added_inertia\" of " + needed + "; write armature=\"" + needed +
                                 "\" on the joint");
   }
+  const auto check = [&](const char* what, double part, double whole, double most,
+                         const char* told) {
+    if (part <= most * whole) return;
+    throw std::invalid_argument(JointName(m, joint) + " has inertia " + Print(whole) +
+                                ", and the " + what + " of its effect \"backlash\" " + Print(part) +
+                                "; at most " + told + " is possible");
+  };
+  const Backlash& backlash = effects.backlash;
   // a heavier handle would make the contact, which is explicit, unstable
-  if (effects.backlash.inertia * m->dof_invweight0[dof] > 0.5) {
-    throw std::invalid_argument(JointName(m, joint) + " has inertia " +
-                                Print(1 / m->dof_invweight0[dof]) +
-                                ", and the handle of its effect \"backlash\" " +
-                                Print(effects.backlash.inertia) + "; at most half is possible");
-  }
+  check("handle", backlash.handle, 1 / m->dof_invweight0[dof], 0.5, "half");
+  check("load", backlash.load, m->dof_M0[dof], kHeaviestLoad, "0.95 of it");
 }
 
 // Throws where the integrator, or noslip, gives the effect no place in which it would be right.
@@ -185,9 +189,9 @@ void CheckIntegrator(const mjModel* m, int joint, const Effects& effects) {
                                 what);
   };
   if (effects.backlash.play > 0 && m->opt.integrator == mjINT_RK4) {
-    fail("backlash",
-         "whose handle would have half its inertia with integrator=\"RK4\"; choose "
-         "integrator=\"implicitfast\"");
+    fail("backlash", std::string("whose ") + (effects.backlash.load > 0 ? "load" : "handle") +
+                         " would have half its inertia with integrator=\"RK4\"; choose "
+                         "integrator=\"implicitfast\"");
   }
   if (effects.presliding.stiffness > 0 && (discrete || noslip)) {
     fail("presliding_friction",

@@ -164,6 +164,19 @@ void ReadRestitution(const EffectText& text, EndStops* out) {
   stop = StopDamping(restitution);
 }
 
+void ReadBacklash(const EffectText& text, Effects* out) {
+  const double play = text.Positive("play"), inertia = text.Positive("inertia");
+  const std::string_view side = text.Has("side") ? text.Value("side") : "load";
+  if (side != "load" && side != "motor") {
+    Fail("side must be load or motor, got " + internal::Quote(side));
+  }
+  const double share = text.Number("share", 0);
+  if (share < 0 || share > 1) Fail("share must lie between 0 and 1");
+  if (side == "load" && share > 0) Fail("share is of what lies behind, where side=motor");
+  out->backlash = {play, 0, 0, share};
+  (side == "load" ? out->backlash.handle : out->backlash.load) = inertia;
+}
+
 struct Kind {
   const char* name;
   const char* keys;
@@ -185,10 +198,7 @@ constexpr Kind kKinds[] = {
      [](const EffectText& text, Effects* out) { out->load = text.NotNegative("coefficient"); }},
     {"presliding_friction", "stiffness damping breakaway", false, true, ReadPresliding},
     {"gravity_offset", "sin cos force", false, false, ReadGravityOffset},
-    {"backlash", "play inertia", false, false,
-     [](const EffectText& text, Effects* out) {
-       out->backlash = {text.Positive("play"), text.Positive("inertia")};
-     }},
+    {"backlash", "play inertia side share", false, false, ReadBacklash},
     {"added_inertia", "inertia", false, false,
      [](const EffectText& text, Effects* out) { out->added_inertia = text.Positive("inertia"); }},
     {"end_stop_restitution", "restitution end", false, false,

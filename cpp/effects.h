@@ -40,10 +40,13 @@ struct GravityOffset {
   double descent = 0;       // largest stiffness, hypot(sin, cos)
 };
 
-// A handle that moves the part only at the ends of its play.
+// Play before the joint's part, which a handle then moves, or behind it, which then moves a load:
+// the one has inertia, the other none.
 struct Backlash {
-  double play = 0;     // total width (rad), 0: none
-  double inertia = 0;  // of the handle (kg m^2)
+  double play = 0;    // total width (rad), 0: none
+  double handle = 0;  // inertia of the handle, on which the applied force acts (kg m^2)
+  double load = 0;    // inertia of the load, out of the joint's (kg m^2)
+  double share = 0;   // of the joint's friction and damping, that acts on the load
 };
 
 // All effects of one joint; what it lacks is zero. Immutable after parsing.
@@ -55,7 +58,7 @@ struct Effects {
   double load = 0;             // times |load|, added to the friction
   Presliding presliding;       // of the friction row
   GravityOffset gravity;       // a passive force
-  Backlash backlash;           // between the applied force and the part
+  Backlash backlash;           // before or behind the part
   EndStops stops;              // of the range
   double added_inertia = 0;    // that the joint's armature must hold (kg m^2)
   const char* needs_row = "";  // an effect that needs the friction row, "": none of them does
@@ -140,23 +143,91 @@ inline double OffsetForce(const GravityOffset& gravity, double q) {
   return gravity.force + gravity.sin * std::sin(q) + gravity.cos * std::cos(q);
 }
 
-// The handle: its position minus the part's (within +-play / 2), and its velocity.
-struct Handle {
+// What is loose beside the part: its position minus the part's (within +-play / 2), and its
+// velocity, a load's minus the part's.
+struct Loose {
   double gap = 0, velocity = 0;
 };
 
 // Moves the handle, on which `applied` acts, by a step beside the part that moves at v; returns the
 // force that it exerts on the part.
 inline double MoveHandle(const Backlash& backlash, double h, double applied, double v,
-                         Handle* handle) {
+                         Loose* handle) {
   const double half = 0.5 * backlash.play;
   const double gap = std::clamp(handle->gap, -half, half);  // the profile may have been replaced
-  const double free = handle->velocity + h * applied / backlash.inertia;
+  const double free = handle->velocity + h * applied / backlash.handle;
   const double next = std::clamp(gap + h * (free - v), -half, half);
   const double velocity = v + (next - gap) / h;
-  const double force = applied - backlash.inertia * (velocity - handle->velocity) / h;
+  const double force = applied - backlash.handle * (velocity - handle->velocity) / h;
   *handle = {next, velocity};
   return force;
+}
+
+// What resists a motion: damping (N m s/rad) and dry friction.
+struct Resistance {
+  double drag;
+  FrictionBounds dry;
+
+  Resistance Part(double share) const {
+    return {share * drag, {share * dry.positive, share * dry.negative}};
+  }
+};
+
+// Velocity after a step of a mass by itself, which friction may stop.
+inline double Coast(double inertia, double h, double force, const Resistance& against, double v) {
+  const double per_mass = 1 / (inertia + h * against.drag);
+  const double free = per_mass * (inertia * v + h * force), dry = per_mass * h;
+  return free > 0 ? std::max(0.0, free - dry * against.dry.positive)
+                  : std::min(0.0, free + dry * against.dry.negative);
+}
+
+// What a load makes of the joint's step. Where the part moves alone, MuJoCo's inertia, which is
+// that of both, moves as the part does if all that acts on the part is larger by `scale`.
+struct Passage {
+  double side = 0;        // of the part, at which it moves the load: 1, -1, or 0 for none
+  double scale = 1;       // of the known forces on the part
+  double resistance = 1;  // of friction and damping
+  double force = 0;       // besides: the load's blow (N m)
+  double gap = 0;         // the load's before the step
+  double velocity = 0;    // of the load after the step, by itself
+
+  Resistance On(const Resistance& own) const { return own.Part(resistance); }
+};
+
+// Largest part of the joint's inertia that a load may be.
+inline constexpr double kHeaviestLoad = 0.95;
+
+// Whether part and load move together in the step that begins with the part at v: if they
+// overlapped after a step by themselves. `force` is what is known to act on the part, `own` and
+// `other` are the joint's resistance at the part's velocity and at the load's, `spring` is
+// resistance of the part alone.
+inline Passage Meet(const Backlash& backlash, double h, double inertia, double force, double v,
+                    const Resistance& own, double spring, const Resistance& other,
+                    const Loose& load) {
+  const double half = 0.5 * backlash.play, share = backlash.share;
+  const double part = std::max(inertia - backlash.load, (1 - kHeaviestLoad) * inertia);
+  Passage out;
+  out.gap = std::clamp(load.gap, -half, half);
+  out.velocity = Coast(backlash.load, h, 0, other.Part(share), v + load.velocity);
+  Resistance alone = own.Part(1 - share);
+  alone.drag += spring;
+  const double next = out.gap + h * (out.velocity - Coast(part, h, force, alone, v));
+  if (std::abs(next) >= half) {
+    out.side = internal::Sign(next);
+    out.force = backlash.load * load.velocity / h;
+  } else {
+    out.scale = inertia / part;
+    out.resistance = out.scale * (1 - share);
+  }
+  return out;
+}
+
+// The load after the step, at whose end the part moves at v. Where they met, it is left behind only
+// if it is slower, as where a stop has thrown the part back.
+inline Loose Settle(const Backlash& backlash, double h, const Passage& passage, double v) {
+  const double half = 0.5 * backlash.play, ahead = passage.velocity - v;
+  if (passage.side * ahead >= 0 && passage.side != 0) return {passage.side * half, 0};
+  return {std::clamp(passage.gap + h * ahead, -half, half), ahead};
 }
 
 }  // namespace joda

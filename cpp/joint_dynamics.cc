@@ -58,7 +58,9 @@ double ResistingForce(const FrictionBounds& bounds, double drag, double v, doubl
   return -std::copysign(std::min(resistance, stop), v);
 }
 
-bool HasBacklash(const Effects* effects) { return effects && effects->backlash.play > 0; }
+bool HasHandle(const Effects* effects) { return effects && effects->backlash.handle > 0; }
+
+bool HasLoad(const Effects* effects) { return effects && effects->backlash.load > 0; }
 
 }  // namespace
 
@@ -99,6 +101,7 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
                                   "room in the model; attach the profile and compile anew");
     }
     mine.profile = std::move(profile);
+    mine.load = {};
     return;
   }
   throw std::invalid_argument(JointName(m, joint) + " carries no profile; attach one first");
@@ -108,8 +111,8 @@ double JointDynamics::SetFrictionRow(const Step& step, mjData* d, int row, const
                                      double bound, double state, double inertia) {
   const double held = step.keeps_rows ? std::clamp(state, -bound, bound) : 0;
   const Effects* effects = step.keeps_rows ? joint.profile.effects.get() : nullptr;
-  const FrictionRow stiffened =
-      StiffenFrictionRow(effects, step.h, held, bound, d->qvel[joint.dof], inertia);
+  const FrictionRow stiffened = StiffenFrictionRow(effects, step.h, held, bound, d->qvel[joint.dof],
+                                                   inertia, joint.load.resistance);
   SetRow(step, d, row, stiffened.D, bound, held);
   return stiffened.damping;
 }
@@ -134,7 +137,6 @@ void JointDynamics::SetStops(const mjModel* m, const Step& step, mjData* d, cons
 
 double JointDynamics::PushThroughPlay(const mjData* d, const mjtNum* state, double h,
                                       Joint* joint) {
-  joint->applied = d->qfrc_applied[joint->dof];
   joint->handle = {state[1], state[2]};
   const double pushed = joint->applied + state[3];
   return MoveHandle(joint->profile.effects->backlash, h, pushed, d->qvel[joint->dof],
@@ -153,29 +155,43 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
     const double q = d->qpos[joint.qpos], s = (q - p.lo) * p.per_range;
 
     double spring = step.spring ? p.conservative(s).value : 0;
-    double drag = step.damper ? p.damping(s).value : 0;
-    double friction = step.friction ? p.friction(s).value : 0;
     if (effects) {
       spring += OffsetForce(effects->gravity, q);
-      if (step.damper) drag += ExtraDamping(*effects, s, v);
       SetStops(m, step, d, joint);
     }
-    const double stiffness = ImplicitStiffness(p, step.spring, h, s, v, spring, inertia);
-    drag += h * stiffness;
+    double stiffness = ImplicitStiffness(p, step.spring, h, s, v, spring, inertia);
 
     const int friction_row = FindFrictionRow(d, joint);
+    const double damping = step.damper ? p.damping(s).value : 0;
+    double friction = step.friction ? p.friction(s).value : 0;
     if (friction_row >= 0) friction += m->dof_frictionloss[joint.dof];
-    FrictionBounds bounds = {friction, friction};
-    if (effects && step.friction) {
-      const double load = effects->load > 0 ? LoadOn(m, d, joint.id, joint.body) : 0;
-      bounds = BoundFriction(*effects, friction, s, v, load);
-    }
+    const bool loaded = effects && (effects->load > 0 || HasLoad(effects));
+    const double load = loaded ? LoadOn(m, d, joint.id, joint.body) : 0;
+    const auto resist = [&](double velocity) {
+      Resistance out = {damping, {friction, friction}};
+      if (effects && step.damper) out.drag += ExtraDamping(*effects, s, velocity);
+      if (effects && step.friction) out.dry = BoundFriction(*effects, friction, s, velocity, load);
+      return out;
+    };
+    const Resistance own = resist(v);
+    joint.applied = d->qfrc_applied[joint.dof];
     double force = 0;
+    if (HasLoad(effects)) {
+      const Loose behind = {state[joint.state + 1], state[joint.state + 2]};
+      const double known = load + state[joint.state + 3];
+      joint.load = Meet(effects->backlash, h, m->dof_M0[joint.dof], spring + known, v, own,
+                        h * stiffness, resist(v + behind.velocity), behind);
+      force = joint.load.force + (joint.load.scale - 1) * known;
+      spring *= joint.load.scale;
+      stiffness *= joint.load.scale;
+    }
+    FrictionBounds bounds = joint.load.On(own).dry;
+    double drag = joint.load.On(own).drag + h * stiffness;
     if (friction_row >= 0) {
       const double bristle =
           SetFrictionRow(step, d, friction_row, joint, bounds.Bound(), state[joint.state], inertia);
       if (step.damper) drag += bristle;
-      force = bounds.Shift();  // as the row is symmetric
+      force += bounds.Shift();  // as the row is symmetric
       bounds = {0, 0};
     }
     const int damping_row = step.keeps_rows ? FindDampingRow(d, joint) : -1;
@@ -187,7 +203,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
     }
 
     force += ResistingForce(bounds, drag, v, h, inertia);
-    if (HasBacklash(effects)) force += PushThroughPlay(d, state + joint.state, h, &joint);
+    if (HasHandle(effects)) force += PushThroughPlay(d, state + joint.state, h, &joint);
     d->qfrc_passive[joint.dof] += spring + force;
   }
 }
@@ -200,11 +216,14 @@ void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
     if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
     const int row = FindFrictionRow(d, joint);
     state[joint.state] = row < 0 ? 0 : d->efc_force[row];
-    if (computed && HasBacklash(joint.profile.effects.get())) {
-      state[joint.state + 1] = joint.handle.gap;
-      state[joint.state + 2] = joint.handle.velocity;
-      state[joint.state + 3] = d->qfrc_applied[joint.dof] - joint.applied;
-    }
+    const Effects* effects = joint.profile.effects.get();
+    if (!computed || !(HasHandle(effects) || HasLoad(effects))) continue;
+    const Loose loose = HasHandle(effects) ? joint.handle
+                                           : Settle(effects->backlash, m->opt.timestep, joint.load,
+                                                    d->qvel[joint.dof]);
+    state[joint.state + 1] = loose.gap;
+    state[joint.state + 2] = loose.velocity;
+    state[joint.state + 3] = d->qfrc_applied[joint.dof] - joint.applied;
   }
 }
 

@@ -29,9 +29,10 @@ class JointDynamics {
 
   // Remembers the dry friction of the step just taken, one number per joint in plugin_state: the
   // next step's friction continues from it, so that a held joint does not creep. A joint with
-  // backlash has three numbers more: the handle's two, and the force that was applied after Compute
-  // (between mj_step1 and mj_step2, or by mjcb_control) and so reached the part directly. The next
-  // step gives it to the handle and takes it back from the part.
+  // backlash has three numbers more: those of the handle or the load, and the force that was
+  // applied after Compute (between mj_step1 and mj_step2, or by mjcb_control). That force reached
+  // the part directly: the next step gives it to the handle and takes it back from the part, or
+  // makes up for the load's inertia.
   void Advance(const mjModel* m, mjData* d, int instance) const;
 
   // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint
@@ -49,8 +50,9 @@ class JointDynamics {
     int equality;        // equality constraint whose row carries the damping, -1: none
     int friction_row;    // expected place of its friction row among the friction rows
     int state;           // its place in the instance's state
-    Handle handle;       // after the step being computed, until Advance
-    double applied = 0;  // the force that Compute took to the handle, until Advance
+    Loose handle;        // after the step being computed, until Advance
+    Passage load;        // in the step being computed, until Advance
+    double applied = 0;  // the force that Compute knew of, until Advance
     Profile profile;
   };
 

@@ -31,17 +31,7 @@ Motion Solve(double mass, double drive, const Friction& friction) {
 }
 
 bool IsFinite(const Solo::State& state) {
-  return std::isfinite(state.q + state.v + state.held + state.handle.gap + state.handle.velocity);
-}
-
-void Restart(const Solo::Start& start, bool fresh, Solo::State* state) {
-  if (fresh) {
-    *state = {start.q, start.v, 0, {0, start.v}};
-    return;
-  }
-  state->handle.velocity += start.v - state->v;
-  state->q = start.q;
-  state->v = start.v;
+  return std::isfinite(state.q + state.v + state.held + state.loose.gap + state.loose.velocity);
 }
 
 }  // namespace
@@ -65,29 +55,36 @@ void Solo::Advance(double h, double force, State* state) const {
   const double q = state->q, v = state->v, s = (q - p.lo) * p.per_range;
   const double inertia = body_.row_inertia, weight = Weight(q);
 
-  double spring = p.conservative(s).value;
-  double drag = p.damping(s).value;
-  const double dry = p.friction(s).value;
-  FrictionBounds bounds = {dry, dry};
-  if (effects) {
-    spring += OffsetForce(effects->gravity, q);
-    drag += ExtraDamping(*effects, s, v);
-    bounds = BoundFriction(*effects, dry, s, v, weight + force);
+  const double damping = p.damping(s).value, dry = p.friction(s).value;
+  const auto resist = [&](double velocity) {
+    if (!effects) return Resistance{damping, {dry, dry}};
+    return Resistance{damping + ExtraDamping(*effects, s, velocity),
+                      BoundFriction(*effects, dry, s, velocity, weight + force)};
+  };
+  const Resistance own = resist(v);
+  double spring = p.conservative(s).value, pushed = force;
+  if (effects) spring += OffsetForce(effects->gravity, q);
+  const double stiffness = h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
+
+  Passage load;
+  const bool has_load = effects && effects->backlash.load > 0;
+  if (effects && effects->backlash.handle > 0) {
+    pushed = MoveHandle(effects->backlash, h, force, v, &state->loose);
+  } else if (has_load) {
+    load = Meet(effects->backlash, h, body_.inertia, spring + weight + force, v, own, stiffness,
+                resist(v + state->loose.velocity), state->loose);
   }
-  drag += h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
+  const FrictionBounds bounds = load.On(own).dry;
+  double drag = load.On(own).drag + load.scale * stiffness;
 
   const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
-  const FrictionRow row = StiffenFrictionRow(effects, h, held, bound, v, inertia);
+  const FrictionRow row = StiffenFrictionRow(effects, h, held, bound, v, inertia, load.resistance);
   drag += row.damping;
   const Friction friction = {held - row.D * v / h, row.D, bound};
 
-  double pushed = force;
-  if (effects && effects->backlash.play > 0) {
-    pushed = MoveHandle(effects->backlash, h, force, v, &state->handle);
-  }
-
   const double mass = body_.inertia + h * drag;
-  const double drive = spring + bounds.Shift() + weight + pushed - drag * v;
+  const double drive =
+      load.scale * (spring + weight + pushed) + load.force + bounds.Shift() - drag * v;
   Motion motion = Solve(mass, drive, friction);
   if (q < body_.range[0] || q > body_.range[1]) {
     const Limit limit = EndAt(h, q, v);
@@ -98,6 +95,16 @@ void Solo::Advance(double h, double force, State* state) const {
   state->v = v + h * motion.acceleration;
   state->q = q + h * state->v;
   state->held = motion.held;
+  if (has_load) state->loose = Settle(effects->backlash, h, load, state->v);
+}
+
+void Solo::Restart(const Start& start, bool fresh, State* state) const {
+  if (fresh) *state = {};
+  const Effects* effects = profile_.effects.get();
+  // a load's velocity is beside the part's as it is
+  if (effects && effects->backlash.handle > 0) state->loose.velocity += start.v - state->v;
+  state->q = start.q;
+  state->v = start.v;
 }
 
 void Solo::Replay(double h, const double* force, std::int64_t n, const std::vector<Start>& starts,

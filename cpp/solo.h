@@ -33,7 +33,7 @@ class Solo {
   struct State {
     double q = 0, v = 0;
     double held = 0;  // friction force of the step before
-    Handle handle;
+    Loose loose;
   };
 
   // Where a stretch of steps begins, and whether the joint has forgotten what was before.
@@ -51,8 +51,8 @@ class Solo {
 
   // Steps through n forces; before[k] and after[k] are the positions at both ends of step k. At
   // each start position and velocity are set; unless fresh, friction's memory stays and the handle
-  // as it is beside the part. What follows a number that is not finite is NaN until the next start,
-  // which then is fresh. Starts are in increasing order, the first one at step 0.
+  // or the load as it is beside the part. What follows a number that is not finite is NaN until the
+  // next start, which then is fresh. Starts are in increasing order, the first one at step 0.
   void Replay(double h, const double* force, std::int64_t n, const std::vector<Start>& starts,
               double* before, double* after) const;
 
@@ -62,6 +62,7 @@ class Solo {
     double sign, D, reference;
   };
 
+  void Restart(const Start& start, bool fresh, State* state) const;
   double Weight(double q) const;
   Limit EndAt(double h, double q, double v) const;
   double Impedance(double depth) const;

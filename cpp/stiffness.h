@@ -52,20 +52,21 @@ inline double ImplicitStiffness(const Profile& p, bool field, double h, double s
 }
 
 // The friction row that held with the force `held` within +-bound, and what its bristles add to
-// the damping.
+// the damping; `part` of them are there.
 struct FrictionRow {
   double D, damping;
 };
 
 inline FrictionRow StiffenFrictionRow(const Effects* effects, double h, double held, double bound,
-                                      double v, double inertia) {
+                                      double v, double inertia, double part) {
   const double stiff = kStiffRow * inertia;
   if (!effects || !(effects->presliding.stiffness > 0)) return {stiff, 0};
   const Presliding& bristle = effects->presliding;
   const double left = BristleLeft(bristle, held, bound, v);
-  const double in_row = BristleLeftInRow(left, h, bristle.stiffness, inertia);
-  return {std::clamp(h * h * bristle.stiffness * in_row, kIdleRow * inertia, stiff),
-          bristle.damping * left};
+  const double stiffness = part * bristle.stiffness;
+  const double in_row = BristleLeftInRow(left, h, stiffness, inertia);
+  return {std::clamp(h * h * stiffness * in_row, kIdleRow * inertia, stiff),
+          part * bristle.damping * left};
 }
 
 }  // namespace joda

@@ -15,7 +15,7 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
-from joda.hidden import laws, rubbing, truth
+from joda.hidden import laws, masses, rubbing, truth
 from joda.hidden.cases import Case
 from joda.profile import Channels, Profile, Resistance
 
@@ -76,6 +76,10 @@ def _with(profile: Profile, law: laws.Law) -> Profile:
             return profile.with_effect(AddedInertia(inertia=law.size))
         case truth.Play():
             return profile.with_effect(Backlash(play=law.width, inertia=law.inertia))
+        case masses.Behind():
+            share = law.friction / profile.channels.friction.components[0].y[0]
+            effect = Backlash(play=law.width, inertia=law.inertia, side="motor", share=share)
+            return profile.with_effect(effect)
         case truth.Bounce():
             return profile.with_effect(EndStopRestitution(restitution=law.restitution))
     a, b = _interval(law)

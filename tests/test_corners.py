@@ -108,10 +108,27 @@ def test_a_handle_crosses_its_play_and_takes_the_part_along(integrator):
     assert after - before == pytest.approx(0.5 * force / (MASS + inertia), rel=1e-3)
 
 
+@pytest.mark.parametrize("integrator", ["discrete", "Euler", "implicitfast"])
+def test_a_part_crosses_the_play_before_its_load_and_takes_that_along(integrator):
+    inertia, force, play = 0.6, 4.0, 0.1
+    effect = f"backlash play={play} inertia={inertia} side=motor share=0.8"
+    model, data = slide(effect, integrator=integrator)
+    crossing = np.sqrt(play * (MASS - inertia) / force)
+    before = pushed(model, data, 0.9 * crossing, force)
+    assert before == pytest.approx(0.9 * crossing * force / (MASS - inertia), rel=0.02)
+    before = pushed(model, data, 1, force)
+    assert pushed(model, data, 0.5, force) - before == pytest.approx(0.5 * force / MASS, rel=1e-3)
+
+
 REFUSED = {  # options of the scene: what the plugin says at load
     "backlash": (
         dict(effects="backlash play=0.1 inertia=0.1", integrator="RK4"),
         'the effect "backlash", whose handle would have half its inertia with integrator="RK4"; '
+        'choose integrator="implicitfast"',
+    ),
+    "backlash behind": (
+        dict(effects="backlash play=0.1 inertia=0.1 side=motor", integrator="RK4"),
+        'the effect "backlash", whose load would have half its inertia with integrator="RK4"; '
         'choose integrator="implicitfast"',
     ),
     "presliding discrete": (

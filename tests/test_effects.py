@@ -48,6 +48,7 @@ ALL = (
     EndStopRestitution(restitution=0.35),
     Backlash(play=0.02, inertia=0.003),
 )
+BEHIND = Backlash(play=0.02, inertia=0.003, side="motor", share=0.8)
 EACH_END = (
     EndStopRestitution(restitution=0.7, end="low"),
     EndStopRestitution(restitution=0.1, end="high"),
@@ -85,7 +86,7 @@ def test_every_effect_tells_its_law_units_and_typical_values(cls):
     for name in (*cls.parameters(), *({"y"} & set(cls.model_fields))):
         field = cls.model_fields[name]
         assert field.description, name
-        if name not in ("direction", "end"):
+        if name not in ("direction", "end", "side"):
             unit, typical = (field.json_schema_extra[key] for key in ("unit", "typical"))
             assert len(unit) == 2
             assert typical[0] < typical[1]
@@ -102,7 +103,7 @@ def test_the_page_lists_what_the_catalogue_holds():
 
 
 def test_files_and_attributes_keep_everything(tmp_path):
-    for whole in (profile(*EACH_END), profile(*ALL)):
+    for whole in (profile(*EACH_END), profile(BEHIND), profile(*ALL)):
         file = write(tmp_path, whole.to_json(), "composed.json")
         assert Profile.read(file) == whole
         assert Profile.from_attributes(DOOR, whole.attributes()) == whole
@@ -131,6 +132,12 @@ WRONG = {
         "effect": "backlash",
         "play": -1,
         "inertia": 1,
+    },
+    "effects[0].backlash: share is of what lies behind the play; give side motor.": {
+        "effect": "backlash",
+        "play": 1,
+        "inertia": 1,
+        "share": 0.5,
     },
     "effects[0].quadratic_damping: y must not be negative.": {
         "effect": "quadratic_damping",
@@ -191,6 +198,14 @@ def test_each_end_has_one_restitution():
     assert changes(profile(*EACH_END), profile(EACH_END[0])) == [
         "without end stop restitution high"
     ]
+
+
+def test_what_is_usual_is_left_out_of_an_effects_text_and_description():
+    assert ALL[-1].text() == "backlash play=0.02 inertia=0.003"
+    assert ALL[-1].described() == "backlash, play 0.02, inertia 0.003"
+    assert BEHIND.text() == "backlash play=0.02 inertia=0.003 side=motor share=0.8"
+    assert BEHIND.described() == "backlash, play 0.02, inertia 0.003, side motor, share 0.8"
+    assert QuadraticDamping(y=(1, 1)).text().startswith("quadratic_damping direction=both")
 
 
 def test_an_effect_takes_the_place_of_its_like():

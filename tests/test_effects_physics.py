@@ -284,6 +284,121 @@ def test_within_the_play_the_part_feels_nothing(tmp_path):
     assert np.abs(v[begun + 20 :] - both[20:]).max() < 0.02 * both.max()
 
 
+# --- a load behind the play, against an integration with compliant flanks
+
+
+def behind(play=0.05, part=0.5, share=0.5):
+    return Backlash(play=play, inertia=(1 - part) * MASS, side="motor", share=share)
+
+
+def wobble(t, q=0.0):
+    return 3 * np.sin(7 * t) + 2 * np.sin(17 * t)
+
+
+def reference(load, friction, damping, seconds, h=1e-5):
+    """Positions of the part every ms under `wobble`; flanks give way, damp and never pull."""
+    J, part = load.inertia, MASS - load.inertia
+    stiffness = J * part / MASS * 3000.0**2
+    own, other = 1 - load.share, load.share
+    q = v = there = w = 0.0
+    path = []
+
+    def slowed(speed, mass, share):
+        speed /= 1 + h * share * damping / mass
+        return np.sign(speed) * max(abs(speed) - h * share * friction / mass, 0.0)
+
+    for n in range(round(seconds / h)):
+        if n % round(1e-3 / h) == 0:
+            path.append(q)
+        gap = there - q
+        over = gap - min(max(gap, -0.5 * load.play), 0.5 * load.play)
+        rate = 4 / 3000.0 * (w - v)
+        push = np.sign(over) * max(stiffness * np.sign(over) * (over + rate), 0.0)
+        v = slowed(v + h * (wobble(n * h) + push) / part, part, own)
+        w = slowed(w - h * push / J, J, other)
+        q, there = q + h * v, there + h * w
+    return np.array(path)
+
+
+LOADS = {"light": behind(0.02, 0.87, 0.8), "heavy": behind(0.05, 0.25, 0.5)}
+
+
+@pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
+def test_a_load_behind_the_play_moves_as_compliant_flanks_let_it(tmp_path, load):
+    expected = reference(load, 0.5, 0.3, 3.0)
+    for step, within in ((0.0001, 5e-4), (0.0005, 2e-3), (0.002, 0.01), (0.01, 0.05)):
+        model, data = build(tmp_path, load, friction=0.5, damping=0.3, step=step)
+        q, _ = run(model, data, 3.0, wobble)
+        found = np.interp(1e-3 * np.arange(3000), step * np.arange(len(q)), q)
+        assert np.abs(found - expected).max() < within * np.ptp(expected), step
+
+
+@pytest.mark.parametrize("options", INTEGRATORS)
+def test_within_the_play_the_part_is_light_and_then_shares_its_momentum(tmp_path, options):
+    load, push, h = behind(0.1, 0.25), 4.0, 0.0005
+    model, data = build(tmp_path, load, step=h, options=options)
+    _, v = run(model, data, 1.0, push)
+    rate, crossing = push / (0.25 * MASS), np.sqrt(0.1 * 0.25 * MASS / push)
+    time = h * np.arange(len(v))
+    flight, late = time < crossing - 2 * h, time > crossing + 2 * h
+    np.testing.assert_allclose(v[flight], rate * time[flight], atol=1e-12)
+    np.testing.assert_allclose(v[late] * MASS, push * time[late], rtol=1e-8)
+
+
+def test_a_part_that_presses_its_load_moves_as_without_play(tmp_path):
+    """Bit for bit, until it sticks."""
+    paths = []
+    for effects in ((), (behind(),)):
+        model, data = build(tmp_path, *effects, friction=0.5, damping=0.3)
+        run(model, data, 1.0, 2.0)
+        data.qpos[0], data.qvel[0] = 0.3, 0.2
+        pressed = run(model, data, 2.0, lambda t, q: 1.2 + np.sin(3 * t))
+        paths.append((pressed, run(model, data, 6.0, 0.3)))
+    (moves, sticks), (moves_too, sticks_too) = paths
+    np.testing.assert_array_equal(moves, moves_too)
+    np.testing.assert_allclose(sticks, sticks_too, atol=1e-11)
+    assert np.abs(sticks[1, -1]) < 1e-9 < moves[1].max()
+
+
+def test_a_load_holds_the_part_only_one_way_while_it_sticks(tmp_path):
+    model, data = build(tmp_path, behind(0.05, 0.5, 0.8), friction=1.0)
+    run(model, data, 0.3, 2.0)
+    run(model, data, 1.0, 0.5)  # comes to rest, pressed on
+    for push, moves in ((0.9, False), (-0.19, False), (-0.25, True)):
+        before = data.qpos[0]
+        run(model, data, 2.0, push)
+        assert (abs(data.qpos[0] - before) > 0.04) == moves
+    assert 0.05 < before - data.qpos[0] < 0.053  # as far as the load, and what the knock moves it
+
+
+def test_a_load_goes_on_where_an_end_stops_the_part(tmp_path):
+    model, data = build(tmp_path, behind(0.1, 0.5))
+    run(model, data, 0.3, 2.0)
+    model.jnt_range[0, 1] = data.qpos[0] + 0.02
+    run(model, data, 0.1)
+    assert data.qvel[0] < 0.5
+    assert data.plugin_state[2] > 0.3  # it is faster than the part
+    assert -0.05 < data.plugin_state[1] <= 0.05
+
+
+@pytest.mark.parametrize("step", [0.0001, 0.02])
+def test_a_knocking_load_gains_no_energy(tmp_path, step):
+    load = behind(0.05, 0.1, 0.0)
+    model, data = build(tmp_path, load, step=step)
+    run(model, data, 0.5, 2.0)
+    run(model, data, 0.1, -9.0)
+    data.qfrc_applied[0] = 0
+    least = np.inf
+    for _ in range(round(5 / step)):
+        mujoco.mj_step(model, data)
+        v, ahead = data.qvel[0], data.plugin_state[2]
+        energy = (MASS - load.inertia) * v**2 + load.inertia * (v + ahead) ** 2
+        assert energy < least * (1 + 1e-9)
+        least = min(least, energy)
+
+
+# --- states
+
 STATES = (
     PreslidingFriction(stiffness=300, damping=0.4, breakaway=0.5),
     Backlash(play=0.02, inertia=0.05),
@@ -296,13 +411,14 @@ STATES = (
 )
 
 
-def wobble(t, q):
-    return 3 * np.sin(7 * t) + 2 * np.sin(17 * t)
+WITH_LOAD = (STATES[0], Backlash(play=0.02, inertia=0.05, side="motor", share=0.7), *STATES[2:])
+BOTH = pytest.mark.parametrize("states", [STATES, WITH_LOAD], ids=["handle", "load"])
 
 
+@BOTH
 @pytest.mark.parametrize("options", INTEGRATORS)
-def test_a_saved_state_restarts_exactly(tmp_path, options):
-    model, data = build(tmp_path, *STATES, form="pendulum", friction=0.5, options=options)
+def test_a_saved_state_restarts_exactly(tmp_path, options, states):
+    model, data = build(tmp_path, *states, form="pendulum", friction=0.5, options=options)
     run(model, data, 0.5, wobble)
     full = mujoco.mjtState.mjSTATE_INTEGRATION
     saved = np.empty(mujoco.mj_stateSize(model, full))
@@ -316,9 +432,10 @@ def test_a_saved_state_restarts_exactly(tmp_path, options):
     assert model.npluginstate == 4
 
 
+@BOTH
 @pytest.mark.parametrize("threads", [2, 4])
-def test_threads_are_bit_identical(tmp_path, threads):
-    model, data = build(tmp_path, *STATES, form="pendulum", friction=0.5)
+def test_threads_are_bit_identical(tmp_path, threads, states):
+    model, data = build(tmp_path, *states, form="pendulum", friction=0.5)
     full = mujoco.mjtState.mjSTATE_FULLPHYSICS
     initial = np.empty((16, mujoco.mj_stateSize(model, full)))
     pushes = np.random.default_rng().normal(0, 3, (16, 300, model.nv))
@@ -334,8 +451,9 @@ def test_threads_are_bit_identical(tmp_path, threads):
     assert np.ptp(ends[0][:, -1, 1]) > 1e-3
 
 
-def test_forward_does_not_move_the_states(tmp_path):
-    model, data = build(tmp_path, *STATES, form="pendulum", friction=0.5)
+@BOTH
+def test_forward_does_not_move_the_states(tmp_path, states):
+    model, data = build(tmp_path, *states, form="pendulum", friction=0.5)
     run(model, data, 0.5, wobble)
     before = data.plugin_state.copy()
     for _ in range(3):
@@ -343,11 +461,12 @@ def test_forward_does_not_move_the_states(tmp_path):
     np.testing.assert_array_equal(data.plugin_state, before)
 
 
+@pytest.mark.parametrize("side", ["load", "motor"])
 @pytest.mark.parametrize("step", [0.0005, 0.01, 0.05])
-def test_all_effects_at_once_stay_bounded_at_any_timestep(tmp_path, step):
+def test_all_effects_at_once_stay_bounded_at_any_timestep(tmp_path, step, side):
     strong = (
         PreslidingFriction(stiffness=1e6, damping=1e3, breakaway=0.3),
-        Backlash(play=0.05, inertia=0.05),
+        Backlash(play=0.05, inertia=0.05, side=side),
         StribeckFriction(velocity=1e-4, y=(50, 50)),
         AsymmetricFriction(direction="positive", y=(30, 30)),
         DirectionDependentDamping(direction="negative", y=(1e4, 1e4)),

@@ -88,6 +88,19 @@ def test_a_model_that_was_fitted_badly_is_fitted_anew(begun):
     assert found.loss < 1.5 * begun.fit.loss
 
 
+def test_a_load_behind_a_play_is_told_from_a_handle_before_it():
+    """Of a joint of the independent simulator: flanks that give way, and shares that differ."""
+    case = draw(2, "backlash", family="household")
+    (hidden,) = case.truth.hidden
+    begun = asked(read(case)[0])
+    first, second = (begun.tell(h) for h in begun.hypotheses if h.effect == "backlash")
+    assert second.score < 0.6 * first.score
+    (effect,) = second.written(begun.base).effects
+    assert (effect.side, effect.play) == ("motor", pytest.approx(hidden.width, rel=0.15))
+    assert effect.load == pytest.approx(hidden.inertia, rel=0.15)
+    assert effect.share == pytest.approx(hidden.friction / case.truth.friction, abs=0.15)
+
+
 def test_a_well_is_tried_where_the_other_was_found(begun):
     first, second = (next(h for h in begun.hypotheses if h.effect == name) for name in WELLS)
     found = begun.tell(first)

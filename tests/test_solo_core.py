@@ -196,6 +196,23 @@ def test_the_handle_keeps_its_place_and_motion_beside_the_part():
         assert run[1] == pytest.approx(0.5 + 0.1 * h, rel=1e-3)
 
 
+def test_a_load_keeps_its_place_and_motion_beside_the_part():
+    effect = Backlash(play=0.02, inertia=0.5, side="motor", share=1.0)
+    solo, h, n = joint(effect_text(effect)), 0.001, 10
+    forces = np.full(100, 5.0)
+
+    def steps_to_the_load(starts, fresh):
+        after = solo.replay(forces, [0, n], starts, fresh, h)[1][n:]
+        return int(np.argmin(np.diff(after, 2)))
+
+    plain = steps_to_the_load([(0.5, 0), (0.5, 0)], [True, False])
+    assert plain == steps_to_the_load([(0.5, 0), (0.3, 0)], [True, False])
+    assert steps_to_the_load([(0.5, 0), (0.5, 0)], [True, True]) > plain
+    for fresh in (True, False):  # the load starts with the part
+        run = solo.replay(np.zeros(3), [0, 1], [(0.5, 0), (0.5, 0.1)], [True, fresh], h)[1]
+        assert run[1] == pytest.approx(0.5 + 0.1 * h, rel=1e-3)
+
+
 def effect_text(effect):
     """An effect as in the plugin's attribute."""
     found, _ = found_of("slide")

@@ -74,6 +74,7 @@ def cases(kind, force, inertia, play):
         "prandtl": (PreslidingFriction(stiffness=12 * force),),
         "gravity_offset": (GravityOffset(**{k: x * force for k, x in offset.items()}),),
         "backlash": (Backlash(play=play, inertia=0.2 * inertia),),
+        "backlash behind": (Backlash(play=play, inertia=0.6 * inertia, side="motor", share=0.7),),
         "added_inertia": (AddedInertia(inertia=0.4 * inertia),),
         "end_stop_restitution": (EndStopRestitution(restitution=0.4),),
         "end_stop_restitution low": (EndStopRestitution(restitution=0.7, end="low"),),
@@ -82,7 +83,7 @@ def cases(kind, force, inertia, play):
             EndStopRestitution(restitution=0.8, end="high"),
         ),
     }
-    left_out = ("quadratic_damping down", "dahl", "prandtl")
+    left_out = ("quadratic_damping down", "dahl", "prandtl", "backlash behind")
     left_out += ("end_stop_restitution low", "end_stop_restitution each")
     every = tuple(e for name, own in out.items() if name not in left_out for e in own)
     return {**out, "all": every}
@@ -233,6 +234,24 @@ def test_a_handle_flies_through_its_play_and_gives_its_momentum():
     assert w == 0 and on_part == pytest.approx(force)
 
 
+def test_a_joint_flies_through_its_play_and_shares_its_momentum_with_the_load():
+    h, J, force, none = 0.001, 0.06, 0.5, laws.Resistance(*numbers(0, 0, 0))
+    load = alone(Backlash(play=0.01, inertia=J, side="motor")).backlash
+    g, w, v, flown = *numbers(0, 0, 0), 0.0
+    for n in range(1, 60):
+        passage = laws.meet(load, g, w, v, jnp.array(0.08), jnp.array(force), none, w * 0, none, h)
+        v = v + h * (passage.scale * force + passage.force) / 0.08
+        flown += h * float(v)
+        g, w = laws.settle(load, passage, g, w, v, h)
+        if abs(passage.side) == 0:
+            assert v == pytest.approx(n * h * force / 0.02)
+            assert g == pytest.approx(-flown) and flown <= 0.005
+        else:
+            assert 0.08 * v == pytest.approx(n * h * force)
+            assert g == -0.005 and w == 0
+    assert passage.side == -1
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_added_inertia_slows_the_start(kind):
     joint = replace(joint_of(kind, "added_inertia", 0.001)[1], gravity=jnp.zeros(2))
@@ -263,7 +282,13 @@ def test_an_effect_that_a_joint_has_not_does_nothing():
     assert laws.friction_row(own.presliding_friction, *row, 0.01) == laws.friction_row(
         none.presliding_friction, *row, 0.01
     )
-    assert laws.backlash(own.backlash, *numbers(0, 0.1, 0.3, 7), 0.01)[0] == 7
+    assert laws.backlash(own.backlash, *numbers(0, 0.1, 0.3, 7), 0.01) == (7, 0, 0.1)
+    against = laws.Resistance(*numbers(1, 2, 3))
+    for behind in (own.backlash, None):
+        state = numbers(0.2, 0.1, 0.3)
+        passage = laws.meet(behind, *state, *numbers(1, 7), against, *numbers(0), against, 0.01)
+        assert passage[1:4] == (1, 1, 0)
+        assert laws.settle(behind, passage, *state, 0.01) == (state[0], state[1])
 
 
 # --- the plugin
@@ -301,6 +326,8 @@ def test_two_seconds_under_random_forces_are_the_plugins(kind, case):
 
 STOPS = ("end_stop_restitution.low[]", "end_stop_restitution.high[]")
 """Numbers of joints that do not come to their ends."""
+BEHIND = ("backlash.load[]", "backlash.share[]")
+"""Numbers of a load behind a play, which does not go together with a handle."""
 SWINGS = {"hinge": (5.0, -0.3, 1.3), "slide": (2.0, 0.0, 0.8)}
 """Amplitude and mean of a force that swings the joint through its range, and its period, s."""
 
@@ -318,8 +345,22 @@ def test_derivatives_by_all_numbers_are_those_of_central_differences(kind):
     def positions(effects):
         return solo.rollout(replace(joint, effects=effects), start, jnp.array(force * swing), h)
 
-    path = check_slopes(positions, joint.effects, skip=STOPS)
+    path = check_slopes(positions, joint.effects, skip=(*STOPS, *BEHIND))
     assert path.min() > lo and path.max() < hi and np.ptp(path) > 0.8 * (hi - lo)
+
+
+def test_derivatives_by_the_numbers_of_a_load_are_those_of_central_differences():
+    """From the middle of its play through it and on, under a force that never lets go."""
+    _, joint, profile = joint_of("slide", "backlash behind", 0.004)
+    (lo, hi), force = profile.joint.range, found_of("slide")[1]
+    start = solo.State(*numbers(lo + 0.1 * (hi - lo), 0, 0))
+
+    def positions(effects):
+        push = jnp.full(60, 0.6 * force)
+        return solo.rollout(replace(joint, effects=effects), start, push, 0.004)
+
+    path = check_slopes(positions, joint.effects, skip=("backlash.handle[]", "backlash.play[]"))
+    assert path.max() > lo + 0.3 * (hi - lo)
 
 
 @pytest.mark.sweep(1)
@@ -338,16 +379,19 @@ def test_derivatives_by_the_stops_are_those_of_central_differences(kind):
 
 
 def test_derivatives_at_rest_are_finite():
-    effects = cases("hinge", 1.0, 1.0, 0.1)["all"]
+    both = [cases("hinge", 1.0, 1.0, 0.1)[case] for case in ("all", "backlash behind")]
 
     def everything(own, s, v, held, bound):
         up, down = laws.friction(own, s, v, 0 * v)
         row = laws.friction_row(own.presliding_friction, held, bound, v, 1 + s, 0.01)
         moved = laws.backlash(own.backlash, 0 * v, 0 * v, v, 0 * v, 0.01)
-        parts = (laws.damping(own, s, v), up, down, *row, *moved)
+        against = laws.resistance(own, s, s, s, v, 0 * v)
+        passage = laws.meet(own.backlash, *[0 * v] * 3, 1 + s, 0 * v, against, s, against, 0.01)
+        moved += laws.settle(own.backlash, passage, 0 * v, 0 * v, v, 0.01)
+        parts = (laws.damping(own, s, v), up, down, *row, *moved, passage.scale, passage.force)
         return sum(parts) + sum(laws.gravity(own.gravity_offset, s))
 
     run = jax.jit(jax.grad(everything, argnums=range(5)), compiler_options=FAST)
-    for own in (from_effects(effects), from_effects((), NAMES)):
+    for own in (*map(from_effects, both), from_effects((), NAMES)):
         slopes = run(own, *numbers(0.5, 0, 0, 0))
         assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(slopes))

@@ -13,6 +13,8 @@ ALL = (
     f"asymmetric_friction direction=negative: {flat(0.2)}; quadratic_damping direction=both: "
     f"{flat(0.5)}"
 )
+BEHIND = ALL.replace("inertia=0.05", "inertia=0.5 side=motor share=0.7")
+SIDES = pytest.mark.parametrize("effects", [ALL, BEHIND], ids=["handle", "load"])
 INTEGRATORS = ("Euler", "implicit", "implicitfast")
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -83,17 +85,20 @@ def by_state(model, data, force):
 
 @pytest.mark.parametrize("step", [split, with_forward, in_a_copy, by_state])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_however_a_step_is_taken_it_is_the_same(integrator, step):
-    model, _ = slide(ALL, friction=0.5, integrator=integrator)
+@SIDES
+def test_however_a_step_is_taken_it_is_the_same(integrator, step, effects):
+    model, _ = slide(effects, friction=0.5, integrator=integrator)
     expected = path_of(model, whole)
     assert np.ptp(expected[:, 0]) > 0.1
     np.testing.assert_array_equal(path_of(model, step), expected)
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_looking_does_not_advance_a_state(integrator):
-    model, data = slide(ALL, friction=0.5, integrator=integrator)
+@SIDES
+def test_looking_does_not_advance_a_state(integrator, effects):
+    model, data = slide(effects, friction=0.5, integrator=integrator)
     pushed(model, data, 0.3, 2)
+    pushed(model, data, 0.004, -40)
     before = data.plugin_state.copy()
     assert (before[:3] != 0).all()
     mujoco.mj_step1(model, data)
@@ -102,7 +107,7 @@ def test_looking_does_not_advance_a_state(integrator):
         mujoco.mj_forward(model, data)
         np.testing.assert_array_equal(data.plugin_state, before)
     mujoco.mj_inverse(model, data)
-    assert data.qfrc_inverse[0] == pytest.approx(2, abs=1e-9)
+    assert data.qfrc_inverse[0] == pytest.approx(-40, abs=1e-9)
     np.testing.assert_array_equal(data.plugin_state, before)
     mujoco.mj_resetData(model, data)
     assert not data.plugin_state.any()
@@ -142,6 +147,18 @@ def test_a_force_set_between_the_halves_of_a_step_goes_through_the_play(integrat
     assert abs(data.qvel[0]) < 1e-12
     expected = path_of(model, whole)[:, 0]
     assert np.abs(path_of(model, between)[:, 0] - expected).max() < 1e-3 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_a_force_set_between_the_halves_of_a_step_moves_a_part_without_its_load(integrator):
+    """One step late."""
+    effect = "backlash play=0.1 inertia=0.6 side=motor share=0.5"
+    model, data = slide(effect, integrator=integrator)
+    for _ in range(20):
+        between(model, data, 4.0)
+    assert data.qvel[0] == pytest.approx(20 * H * 4.0 / (MASS - 0.6), rel=1e-9)
+    expected = path_of(model, whole)[:, 0]
+    assert np.abs(path_of(model, between)[:, 0] - expected).max() < 0.02 * np.ptp(expected)
 
 
 def test_a_force_set_by_the_control_callback_goes_through_the_play():

@@ -81,12 +81,18 @@ bool Resist(Random& random, const Effects& e) {
   const double damping = ExtraDamping(e, s, v);
   const FrictionBounds bounds = BoundFriction(e, 1, s, v, load);
   const double left = BristleLeft(e.presliding, held, bounds.Bound(), v);
-  Handle handle = {0, v};
-  const Backlash backlash = e.backlash.play > 0 ? e.backlash : Backlash{1, 1};
+  Loose handle = {0, v};
+  const Backlash backlash = e.backlash.handle > 0 ? e.backlash : Backlash{1, 1};
   const double force = MoveHandle(backlash, h, load, -v, &handle);
+  const Backlash behind = e.backlash.load > 0 ? e.backlash : Backlash{1, 0, 0.5, 0.5};
+  const Resistance own = {damping, bounds};
+  const Passage passage = Meet(behind, h, 1, load, v, own, 0, own, {held, v});
+  const Loose after = Settle(behind, h, passage, -v);
   return damping >= 0 && std::isfinite(damping) && bounds.positive >= 0 && bounds.negative >= 0 &&
          std::isfinite(bounds.Bound()) && left > 0 && left <= 2 && std::isfinite(force) &&
-         std::abs(handle.gap) <= 0.5 * backlash.play && std::isfinite(OffsetForce(e.gravity, v));
+         std::abs(handle.gap) <= 0.5 * backlash.play && std::isfinite(OffsetForce(e.gravity, v)) &&
+         passage.scale >= 1 && passage.scale <= 1 / (1 - kHeaviestLoad) + 1e-9 &&
+         std::isfinite(passage.force + after.velocity) && std::abs(after.gap) <= 0.5 * behind.play;
 }
 
 Trial TryChannel(Random& random) {

@@ -48,7 +48,8 @@ TEST_CASE("every effect is parsed") {
   CHECK(e.gravity.cos == -0.4);
   CHECK(e.gravity.descent == doctest::Approx(0.5));
   CHECK(e.backlash.play == 0.01);
-  CHECK(e.backlash.inertia == 0.002);
+  CHECK(e.backlash.handle == 0.002);
+  CHECK(e.backlash.load == 0);
   CHECK(e.added_inertia == 0.01);
   CHECK(Rebound(e.stops.low.value()) == doctest::Approx(0.4));
   CHECK(!e.stops.high);
@@ -98,7 +99,7 @@ TEST_CASE("each mistake in the effects has its sentence") {
                    "direction_dependent_damping, quadratic_damping, ",
                    0) == 0);
   CHECK(Error("backlash play=1 width=1") ==
-        "effect 1 \"backlash\": unknown key \"width\"; its keys: play inertia");
+        "effect 1 \"backlash\": unknown key \"width\"; its keys: play inertia side share");
   CHECK(Error("backlash play=1") == "effect 1 \"backlash\": inertia is missing");
   CHECK(Error("backlash play=1 play=1") == "effect 1 \"backlash\": play is given twice");
   CHECK(Error("backlash play 1") == "effect 1 \"backlash\": expected key=value, got \"play\"");
@@ -242,19 +243,68 @@ TEST_CASE("the gravity offset is a sine of the position, or a force") {
   CHECK(OffsetForce({0, 0, 7, 0}, 1.2) == 7);
 }
 
+TEST_CASE("backlash is before the part, or behind it") {
+  const Backlash behind = ParseEffects("backlash play=0.1 inertia=2 side=motor share=0.7").backlash;
+  CHECK(behind.load == 2);
+  CHECK(behind.handle == 0);
+  CHECK(behind.share == 0.7);
+  CHECK(ParseEffects("backlash play=0.1 inertia=2 side=load").backlash.handle == 2);
+  CHECK(Error("backlash play=1 inertia=1 side=left") ==
+        "effect 1 \"backlash\": side must be load or motor, got \"left\"");
+  CHECK(Error("backlash play=1 inertia=1 side=motor share=1.1") ==
+        "effect 1 \"backlash\": share must lie between 0 and 1");
+  CHECK(Error("backlash play=1 inertia=1 share=0.5") ==
+        "effect 1 \"backlash\": share is of what lies behind, where side=motor");
+}
+
+TEST_CASE("a load leaves the part its own inertia and resistance, and meets it with its momentum") {
+  const Backlash backlash = {0.1, 0, 3, 0.75};
+  const Resistance own = {2, {4, 6}};
+  const Passage apart = Meet(backlash, 0.01, 4, 8, 1, own, 0, own, {0, -0.5});
+  CHECK(apart.side == 0);
+  CHECK(apart.scale == 4);
+  CHECK(apart.On(own).drag == 2);
+  CHECK(apart.On(own).dry.negative == 6);
+  CHECK(apart.force == 0);
+  // alone the load slows from 0.5, by 0.01 (3 + 1.5 v) / 3
+  CHECK(apart.velocity == doctest::Approx((0.5 - 0.01) / 1.005));
+  const Loose left = Settle(backlash, 0.01, apart, 1.2);
+  CHECK(left.velocity == doctest::Approx(apart.velocity - 1.2));
+  CHECK(left.gap == doctest::Approx(0.01 * left.velocity));
+  const Passage met = Meet(backlash, 0.01, 4, 8, 1, own, 0, own, {-0.05, -0.5});
+  CHECK(met.side == -1);
+  CHECK(met.scale == 1);
+  CHECK(met.On(own).drag == 2);
+  CHECK(met.force == doctest::Approx(-3 * 0.5 / 0.01));
+  const Loose along = Settle(backlash, 0.01, met, 0.625);
+  CHECK(along.gap == -0.05);
+  CHECK(along.velocity == 0);
+  CHECK(Settle(backlash, 0.01, met, -0.1).velocity > 0.5);  // a stop has thrown the part back
+  CHECK(Meet({0.1, 0, 5, 0}, 0.01, 4, 0, 0, own, 0, own, {}).scale ==
+        doctest::Approx(1 / (1 - kHeaviestLoad)));
+}
+
+TEST_CASE("friction stops what coasts, and no more") {
+  CHECK(Coast(2, 0.1, 0, {0, {4, 6}}, 1) == doctest::Approx(0.8));
+  CHECK(Coast(2, 0.1, 0, {0, {4, 6}}, -1) == doctest::Approx(-0.7));
+  CHECK(Coast(2, 0.1, 0, {0, {40, 6}}, 1) == 0);
+  CHECK(Coast(2, 0.1, -5, {10, {4, 6}}, 0) == 0);
+  CHECK(Coast(2, 0.1, -8, {10, {4, 6}}, 0) == doctest::Approx(-0.2 / 3));
+}
+
 TEST_CASE("a handle moves freely within its play and exerts nothing") {
-  Handle handle;
+  Loose handle;
   CHECK(MoveHandle({0.1, 2}, 0.01, 4, 0, &handle) == doctest::Approx(0));
   CHECK(handle.velocity == doctest::Approx(0.02));
   CHECK(handle.gap == doctest::Approx(0.0002));
 }
 
 TEST_CASE("a handle at the end of its play moves with the part and passes on its momentum") {
-  Handle handle = {0.05, 3};
+  Loose handle = {0.05, 3};
   CHECK(MoveHandle({0.1, 2}, 0.01, 4, 1, &handle) == doctest::Approx(4 + 2 * (3 - 1) / 0.01));
   CHECK(handle.velocity == 1);
   CHECK(handle.gap == 0.05);
-  Handle outside = {9, 1};  // a profile with less play took over
+  Loose outside = {9, 1};  // a profile with less play took over
   CHECK(MoveHandle({0.1, 2}, 0.01, 4, 1, &outside) == doctest::Approx(4));
   CHECK(outside.gap == 0.05);
 }

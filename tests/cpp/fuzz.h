@@ -108,7 +108,8 @@ inline std::string WriteEffect(Random& random, int kind) {
     case 6:
       return "gravity_offset sin=" + Number(random) + " cos=" + Number(random);
     case 7:
-      return "backlash play=" + Positive(random) + " inertia=" + Positive(random);
+      return "backlash play=" + Positive(random) + " inertia=" + Positive(random) +
+             (Below(random, 2) ? " side=motor share=" + part : "");
     case 8:
       return "added_inertia inertia=" + Positive(random);
     default:

@@ -237,6 +237,21 @@ TEST_CASE("mj_forward does not move the handle") {
   CHECK(part.Push(4, 0.2) == other.Push(4, 0.2));
 }
 
+TEST_CASE("within the play the part is light, then it shares its momentum with the load") {
+  for (const int integrator : {mjINT_EULER, mjINT_IMPLICITFAST}) {
+    CAPTURE(integrator);
+    // the part of 0.4 crosses half of the play in sqrt(play m / F) = 0.1 s
+    Simulation part({"backlash play=0.1 inertia=0.6 side=motor share=0.9"});
+    part.m->opt.integrator = integrator;
+    CHECK(part.Push(4, 0.096) == doctest::Approx(0.96));
+    CHECK(part.Push(4, 0.104) == doctest::Approx(0.8).epsilon(1e-6));
+    CHECK(part.d->plugin_state[1] == -0.05);
+    CHECK(part.d->plugin_state[2] == 0);
+    CHECK(part.Push(-4, 0.05) == doctest::Approx(0.3));  // draws back, and the load goes on
+    CHECK(part.d->plugin_state[2] == doctest::Approx(0.5));
+  }
+}
+
 TEST_CASE("a copy goes on as its original") {
   const Simulation original(kEverything), copy(kEverything);
   Shake(original, original.d.get(), 0, 200);
@@ -269,7 +284,10 @@ TEST_CASE("two threads that share a model agree") {
 
 TEST_CASE("backlash can be replaced, but neither added nor removed") {
   Simulation with({"backlash play=0.1 inertia=0.4"}), without({});
-  CHECK(with.Replace("backlash play=0.05 inertia=0.2") == "");
+  for (const char* const side : {" side=motor", ""}) {
+    with.Push(1, 0.5);
+    CHECK(with.Replace((std::string("backlash play=0.05 inertia=0.2") + side).c_str()) == "");
+  }
   CHECK(without.Replace("added_inertia inertia=1e-9") ==
         "joint 'part' has armature 0, less than its effect \"added_inertia\" of 1e-09; write "
         "armature=\"1e-09\" on the joint");
@@ -290,6 +308,9 @@ TEST_CASE("effects that the joint cannot have are refused") {
       slide.Replace("backlash play=1 inertia=0.6") ==
       "joint 'part' has inertia 1, and the handle of its effect \"backlash\" 0.6; at most half is "
       "possible");
+  CHECK(slide.Replace("backlash play=1 inertia=0.96 side=motor") ==
+        "joint 'part' has inertia 1, and the load of its effect \"backlash\" 0.96; at most 0.95 of "
+        "it is possible");
   slide.m->dof_frictionloss[0] = 0;
   CHECK(
       slide.Replace("presliding_friction stiffness=1") ==

@@ -66,14 +66,14 @@ class Asked:
 
 @dataclass(frozen=True)
 class Rough:
-    """A hypothesis fitted roughly, from one or two beginnings."""
+    """A hypothesis fitted roughly, from one or more beginnings."""
 
     hypothesis: Hypothesis
     fits: tuple[Fit, ...]
 
     @property
     def best(self) -> Fit:
-        """The better one."""
+        """The best one."""
         return min(self.fits, key=lambda fit: fit.loss)
 
 

@@ -141,10 +141,10 @@ def screened(judge: Judge, base: Base, begin: Begin, hypothesis: Hypothesis) -> 
 def rough(
     judge: Judge, base: Base, begun: Sequence[Begin], hypothesis: Hypothesis
 ) -> tuple[Fit, ...]:
-    """The hypothesis fitted roughly: from each begin, its most promising trial."""
+    """The hypothesis fitted roughly: from each begin, its most promising trials."""
     make, unknowns = joined(base, hypothesis)
 
-    def fitted(begin: Begin) -> Fit:
+    def fitted(begin: Begin) -> list[Fit]:
         trials = (
             np.concatenate([begin.fit.x, x]) for x in screened(judge, base, begin, hypothesis)
         )
@@ -152,9 +152,9 @@ def rough(
         near = [
             replace(fit, loss=judge.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in fits
         ]
-        return min(near, key=lambda f: f.loss)
+        return sorted(near, key=lambda f: f.loss)[: hypothesis.kept]
 
-    return tuple(map(fitted, begun))
+    return tuple(fit for begin in begun for fit in fitted(begin))
 
 
 def finished(judge: Judge, base: Base, hypothesis: Hypothesis, near: Sequence[Fit]) -> Guess:

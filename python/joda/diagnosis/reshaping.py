@@ -16,7 +16,6 @@ from joda.component import Component
 from joda.diagnosis.baseline import LEAST, as_it_is, usable, windows_for
 from joda.diagnosis.given import DOUBT, EFFECTS, Moved
 from joda.diagnosis.guessing import usual
-from joda.diagnosis.hypotheses.effects import HEAVIEST
 from joda.diagnosis.judge import BEND, Judge, Unknowns
 from joda.field import evaluate
 from joda.joints.parameters import Kind, Parameters
@@ -174,8 +173,8 @@ def refitted(
     if not judge.counts.any():
         return profile
     kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
-    handle = HEAVIEST * train.single.inertia
-    parameters = Parameters(checked(profile), kinds, free=free, handle=handle)
+    inertia = train.single.inertia
+    parameters = Parameters(checked(profile), kinds, free=free, inertia=inertia)
     n = len(parameters.start)
     if not n:
         return profile

@@ -75,6 +75,8 @@ PLAUSIBLE = 2.0
 deviation)."""
 AT_END = 0.02
 """Doubt of the place of an end that throws back, in normalised position."""
+CLEARLY = 2.0
+"""How many standard errors less an end of the range throws back that is another matter."""
 UNKNOWN_END = 3**-0.5
 """The same of the interval's other end, where the other end of the range tells nothing."""
 HARDLY = 0.005
@@ -234,17 +236,20 @@ def _fitted(asked: Asked, found: Guess) -> _Fitted:
 
 def _restitution(asked: Asked, found: Guess) -> Uncertainty:
     """By the scatter of the knocks; an end is where it is, but the other one may throw back too
-    where no knocks tell of it."""
+    where no knocks tell that it clearly does less."""
     windows, base, sides = asked.judge.windows, asked.base, ends_of(found.hypothesis)
     size = found.hypothesis.magnitude(found.x)
     error = mean_of(rebounds(windows, base, sides))[1]
     own = OWN_SHAPE[RESTITUTION] * size
-    low, high = (
-        AT_END
-        if len(sides) == 2 or side in sides or len(rebounds(windows, base, [side])) >= KNOCKS
-        else UNKNOWN_END
-        for side in (-1, 1)
-    )
+
+    def less(side: int) -> bool:
+        knocks = rebounds(windows, base, [side])
+        if len(knocks) < KNOCKS:
+            return False
+        other, doubt = mean_of(knocks)
+        return other + CLEARLY * doubt < size - CLEARLY * error
+
+    low, high = (AT_END if side in sides or less(side) else UNKNOWN_END for side in (-1, 1))
     return Uncertainty(float(np.hypot(error, own)), (low, high))
 
 

@@ -111,7 +111,7 @@ def diagnosed(
         if excess_of(longer) > NOTICED:
             again = rank(longer, exclude, told)
             anew = weigh(again, STRICTLY, wholly=True)
-            if anew.verdict != "adequate":
+            if anew.verdict != "adequate" and anew.excess[0] > NOTICED:
                 ranking, weighed = again, anew
     if weighed.verdict == "adequate" and (why := too_little(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))

@@ -9,6 +9,9 @@ from joda.component import Curve, Frozen, Points, numbers
 
 Direction = Literal["positive", "negative"]
 
+PLACES = ("direction", "end")
+"""Parameters that say where an effect acts."""
+
 
 def parameter(
     description: str, hinge: str, slide: str, typical: tuple[float, float], **bounds: Any
@@ -59,23 +62,21 @@ class Effect(Frozen):
         return tuple(k for k in cls.model_fields if k not in ("effect", *Curve.model_fields))
 
     def text(self) -> str:
-        """The effect as in the plugin's attribute; numbers that are the default are left out."""
+        """The effect as in the plugin's attribute; defaults but for the place are left out."""
         words = [self.effect]
         for key in self.parameters():
             value = getattr(self, key)
-            if isinstance(value, str):
-                words.append(f"{key}={value}")
-            elif value != type(self).model_fields[key].default:
-                words.append(f"{key}={numbers([value])}")
+            if key in PLACES or value != type(self).model_fields[key].default:
+                words.append(f"{key}={value if isinstance(value, str) else numbers([value])}")
         return " ".join(words)
 
     def described(self) -> str:
-        """Name and numbers for a person; those that are zero are left out."""
+        """Name and numbers for a person; what is zero or usual is left out."""
         values = ((key, getattr(self, key)) for key in self.parameters())
         words = [
             f"{key} {value if isinstance(value, str) else f'{value:.4g}'}"
             for key, value in values
-            if value not in (0, "both")
+            if value not in (0, "both", "load")
         ]
         return ", ".join([self.effect.replace("_", " "), *words])
 

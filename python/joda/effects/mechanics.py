@@ -46,20 +46,64 @@ class GravityOffset(Effect):
         return not (self.force if kind == "hinge" else self.sin or self.cos)
 
 
-class Backlash(Effect):
-    """Play between the handle, which is pushed, and the part that moves."""
+HEAVIEST = {"load": 0.45, "motor": 0.94}
+"""Inertia of what is beyond the play, by the side on which the joint is, in units of the joint's: a
+little less than what the plugin takes."""
 
-    DESCRIPTION = "What pushes the joint has play: a loose handle, gears, a slack linkage."
+
+class Backlash(Effect):
+    """Play between two parts, of which the joint's own is the one that is measured."""
+
+    DESCRIPTION = (
+        "What pushes the joint has play, or what the joint moves has: a loose handle, gears, a "
+        "slack linkage."
+    )
     LAW = (
-        "the applied force moves a handle of its own inertia, which takes the part along at the "
-        "ends of the play, without bounce"
+        "side load: the applied force moves a handle of its own inertia, which takes the part "
+        "along at the ends of the play; side motor: the part, on which the force acts, takes a "
+        "load along; both without bounce"
     )
     SOURCE = "Nordin and Gutman, Automatica 38 (2002) 1633"
-    SHOWS = "After each reversal of the force nothing happens for a moment, then a knock."
+    SHOWS = (
+        "Side load: after each reversal of the force nothing happens for a moment, then a knock. "
+        "Side motor: after each reversal the joint is light for a moment, then a knock slows it."
+    )
 
     effect: Literal["backlash"] = "backlash"
     play: float = parameter("whole width of the play", "rad", "m", (0.001, 0.1), gt=0)
-    inertia: float = parameter("of the handle", "kg·m²", "kg", (1e-4, 0.5), gt=0)
+    inertia: float = parameter(
+        "of the handle, besides the joint's; of the load, out of the joint's",
+        *("kg·m²", "kg", (1e-4, 0.5)),
+        gt=0,
+    )
+    side: Literal["load", "motor"] = Field(
+        default="load",
+        description="of the play on which the joint is: load: a handle is before it; motor: it is "
+        "pushed and measured itself, and a load is behind it",
+    )
+    share: float = parameter(
+        "of friction and damping, that acts on the load",
+        *("1", "1", (0.3, 0.95)),
+        default=0.0,
+        ge=0,
+        le=1,
+    )
+
+    @property
+    def handle(self) -> float:
+        """Inertia of a handle before the joint, kg·m² or kg; 0 for none."""
+        return self.inertia if self.side == "load" else 0.0
+
+    @property
+    def load(self) -> float:
+        """Inertia of a load behind the joint, kg·m² or kg; 0 for none."""
+        return self.inertia if self.side == "motor" else 0.0
+
+    @model_validator(mode="after")
+    def _behind(self) -> Self:
+        if self.share and self.side == "load":
+            raise ValueError("share is of what lies behind the play; give side motor")
+        return self
 
 
 class EndStopRestitution(Effect):

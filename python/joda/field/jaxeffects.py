@@ -76,10 +76,13 @@ class GravityOffset:
 @register
 @dataclass(frozen=True)
 class Backlash:
-    """Width of the play, rad; inertia of the handle, kg·m². Without inertia there is no handle."""
+    """Width of the play, rad; inertia of the handle before the joint or of the load behind it,
+    kg·m², 0 for none; share of friction and damping that acts on the load."""
 
     play: Array
-    inertia: Array
+    handle: Array
+    load: Array
+    share: Array
 
 
 @register
@@ -132,7 +135,7 @@ NEUTRAL: dict[str, dict[str, float]] = {
     "load_dependent_friction": {"coefficient": 0.0},
     "presliding_friction": {"stiffness": RIGID, "damping": 0.0, "breakaway": 1.0},
     "gravity_offset": {"sin": 0.0, "cos": 0.0, "force": 0.0},
-    "backlash": {"play": 0.0, "inertia": 0.0},
+    "backlash": {"play": 0.0, "handle": 0.0, "load": 0.0, "share": 0.0},
     "added_inertia": {"inertia": 0.0},
 }
 """Numbers with which an effect does nothing."""

@@ -4,6 +4,8 @@ For one joint: numbers in, numbers out. An effect that is None is not computed. 
 hinge; for a slide read N, m and kg.
 """
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 
@@ -29,8 +31,58 @@ LEAST_SHARE = 0.05
 """Part of it that is left in the row where it is far stiffer than the step resolves."""
 STILL = 1e-9
 """As kStill in cpp/effects.h."""
+HEAVIEST_LOAD = 0.95
+"""As kHeaviestLoad in cpp/effects.h."""
+NOTHING = 1e-30
+"""Less than any number that matters."""
 FADED = 6.0
 """ln (|v| / velocity)^exponent at which Stribeck's friction is gone: exp(-exp(6)) = 6e-176."""
+
+
+class Resistance(NamedTuple):
+    """Damping, N·m·s/rad; largest friction in positive and in negative motion, N·m."""
+
+    drag: Array
+    up: Array
+    down: Array
+
+    def part(self, share: Array | float) -> "Resistance":
+        """A share of it."""
+        return Resistance(share * self.drag, share * self.up, share * self.down)
+
+
+class Passage(NamedTuple):
+    """What a load behind a play makes of the joint's step.
+
+    Attributes:
+        side: of the joint, at which it moves the load: 1, -1, or 0 for none.
+        scale: of the known forces on the joint: where it moves alone, the inertia is too large.
+        resistance: of friction and damping.
+        force: besides: the load's blow, N·m.
+        g: the load's position minus the joint's before the step, rad.
+        w: velocity of the load after the step, by itself, rad/s.
+    """
+
+    side: Array
+    scale: Array
+    resistance: Array
+    force: Array
+    g: Array
+    w: Array
+
+
+def resistance(
+    own: Effects, drag: Array, dry: Array, s: Array, v: Array, load: Array
+) -> Resistance:
+    """Damping and friction.
+
+    Args:
+        own, s, v: as for `damping`.
+        drag, dry: of the channels, N·m·s/rad and N·m.
+        load: as for `friction`.
+    """
+    up, down = friction(own, s, v, load)
+    return Resistance(drag + damping(own, s, v), dry + up, dry + down)
 
 
 def damping(own: Effects, s: Array, v: Array) -> Array:
@@ -74,6 +126,7 @@ def friction_row(
     v: Array,
     inertia: Array,
     h: Array | float,
+    part: Array | float = 1.0,
 ) -> tuple[Array, Array]:
     """How stiff friction's row is, and what it adds to the damping (N·m·s/rad).
 
@@ -84,6 +137,7 @@ def friction_row(
         v: velocity before the step, rad/s.
         inertia: of the joint, kg·m².
         h: timestep, s.
+        part: of the bristles that is there.
 
     Returns:
         D of the row, kg·m², and the damping.
@@ -94,14 +148,14 @@ def friction_row(
     direction = jnp.where(jnp.abs(v) < STILL, 0, jnp.sign(v))
     r = jnp.clip(-held * direction / jnp.where(bound > 0, bound, 1), -1, 1)
     left = jnp.maximum(1 - _plastic(bristles.breakaway, r) * r, SLIPPING)
-    resolved = h * h * bristles.stiffness
+    resolved = jnp.maximum(h * h * (part * bristles.stiffness), NOTHING)
     # The row must also stop a part that turns back within the step. While it slips the bound gives
     # the law's force, so that all of the stiffness can be there; else what is too stiff for the
     # step keeps a share.
     in_row = jnp.maximum(left, LEAST_SHARE - inertia / resolved)
     in_row = jnp.where(left <= SLIPPING, 1, in_row)
     D = jnp.clip(resolved * in_row, IDLE_ROW * inertia, stiff)
-    return D, bristles.damping * left
+    return D, part * bristles.damping * left
 
 
 def gravity(offset: GravityOffset | None, q: Array) -> tuple[Array, Array]:
@@ -116,10 +170,10 @@ def gravity(offset: GravityOffset | None, q: Array) -> tuple[Array, Array]:
 def backlash(
     handle: Backlash | None, g: Array, w: Array, v: Array, force: Array, h: Array | float
 ) -> tuple[Array, Array, Array]:
-    """A step of the handle.
+    """A step of a handle before the joint.
 
     Args:
-        handle: None: the force acts on the part.
+        handle: None, or without inertia: the force acts on the part.
         g: the handle's position minus the part's, rad.
         w: its velocity, rad/s.
         v: velocity of the part before the step, rad/s.
@@ -133,10 +187,82 @@ def backlash(
         return force, g, w
     half = 0.5 * handle.play
     g = jnp.clip(g, -half, half)
-    inertia = jnp.where(handle.inertia > 0, handle.inertia, 1)
+    is_there = handle.handle > 0
+    inertia = jnp.where(is_there, handle.handle, 1)
     after = jnp.clip(g + h * (w + h * force / inertia - v), -half, half)
     speed = v + (after - g) / h
-    return force - handle.inertia * (speed - w) / h, after, speed
+    on_part = force - handle.handle * (speed - w) / h
+    return on_part, jnp.where(is_there, after, g), jnp.where(is_there, speed, w)
+
+
+def meet(
+    behind: Backlash | None,
+    g: Array,
+    w: Array,
+    v: Array,
+    inertia: Array,
+    force: Array,
+    own: Resistance,
+    spring: Array,
+    other: Resistance,
+    h: Array | float,
+) -> Passage:
+    """Whether the joint and the load behind it move together in a step.
+
+    They do if they overlapped after a step by themselves.
+
+    Args:
+        behind: None, or without a load: the joint moves as it is.
+        g: the load's position minus the joint's, rad.
+        w: its velocity minus the joint's, rad/s.
+        v: velocity of the joint before the step, rad/s.
+        inertia: of both, kg·m².
+        force: what is known to act on the joint, N·m.
+        own, other: resistance at the joint's velocity and at the load's.
+        spring: more damping of the joint alone, N·m·s/rad.
+        h: timestep, s.
+    """
+    still, one = jnp.zeros_like(v), jnp.ones_like(v)
+    if behind is None:
+        return Passage(still, one, one, still, still, still)
+    half, is_there = 0.5 * behind.play, behind.load > 0
+    part = jnp.maximum(inertia - behind.load, (1 - HEAVIEST_LOAD) * inertia)
+    load = jnp.where(is_there, behind.load, 1)
+    g = jnp.clip(g, -half, half)
+    after = _coast(load, still, other.part(behind.share), v + w, h)
+    alone = own.part(1 - behind.share)
+    alone = alone._replace(drag=alone.drag + spring)
+    ahead = g + h * (after - _coast(part, force, alone, v, h))
+    touches = (jnp.abs(ahead) >= half) | ~is_there
+    scale = jnp.where(touches, 1, inertia / part)
+    left = jnp.where(touches, 1, scale * (1 - behind.share))
+    blow = jnp.where(touches, behind.load * w / h, 0)
+    return Passage(jnp.where(touches, jnp.sign(ahead), 0), scale, left, blow, g, after)
+
+
+def settle(
+    behind: Backlash | None, passage: Passage, g: Array, w: Array, v: Array, h: Array | float
+) -> tuple[Array, Array]:
+    """The load after a step, at whose end the joint moves at v; g and w as for `meet`.
+
+    Where they met, it is left behind only if it is slower. Without a load both stay as they are.
+    """
+    if behind is None:
+        return g, w
+    half, is_there = 0.5 * behind.play, behind.load > 0
+    ahead = passage.w - v
+    stays = (passage.side * ahead >= 0) & (passage.side != 0)
+    after = jnp.clip(passage.g + h * ahead, -half, half)
+    after, ahead = jnp.where(stays, passage.side * half, after), jnp.where(stays, 0, ahead)
+    return jnp.where(is_there, after, g), jnp.where(is_there, ahead, w)
+
+
+def _coast(inertia: Array, force: Array, against: Resistance, v: Array, h: Array | float) -> Array:
+    """Velocity after a step of a mass by itself, which friction may stop."""
+    mass = inertia + h * against.drag
+    free = (inertia * v + h * force) / mass
+    up, down = jnp.maximum(free - h * against.up / mass, 0), free + h * against.down / mass
+    return jnp.where(free > 0, up, jnp.minimum(down, 0))
 
 
 def end_stop(

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from joda._context import Context
 from joda.component import Component
-from joda.effects import Effect
+from joda.effects import Backlash, Effect
+from joda.effects.mechanics import HEAVIEST
 from joda.joints.least_squares import Inequalities
 from joda.profile import CHANNELS, Profile, rounded
 
@@ -27,7 +28,7 @@ NARROWEST = 0.005
 
 SIGNED = ("sin", "cos", "force")
 """Numbers of effects that may have either sign."""
-LARGEST = {"breakaway": 1.0, "restitution": 0.95}
+LARGEST = {"breakaway": 1.0, "restitution": 0.95, "share": 0.99}
 LEAST_LEFT = 0.02
 """Least part of an effect's number that a fit may leave."""
 
@@ -83,7 +84,7 @@ class Parameters:
         keep_shape: bool = True,
         free: str | None = None,
         gravity: float = 1.0,
-        handle: float = np.inf,
+        inertia: float = np.inf,
     ) -> None:
         """Lists the numbers.
 
@@ -93,7 +94,7 @@ class Parameters:
             keep_shape: see `constraints`.
             free: label of components whose shapes are not kept all the same.
             gravity: the unit of a gravity offset, N·m or N, see `gravity_scale`.
-            handle: largest inertia of one that has play, kg·m² or kg.
+            inertia: of the joint, kg·m² or kg; what is beyond a play is part of it.
         """
         self.profile = profile
         slots: list[Slot] = []
@@ -113,7 +114,7 @@ class Parameters:
                     _interval(name, number, component, slots, start, rows)
         if "effects" in kinds:
             for number, effect in enumerate(profile.effects):
-                _effect(number, effect, handle, slots, start, rows)
+                _effect(number, effect, inertia, slots, start, rows)
         if "damping_ratio" in kinds:
             slots.append(Slot("damping_ratio"))
             start.append(0.0)
@@ -226,13 +227,15 @@ def _effect_scale(effect: Effect, key: str) -> float:
 def _effect(
     number: int,
     effect: Effect,
-    handle: float,
+    inertia: float,
     slots: list[Slot],
     start: list[float],
     rows: Rows,
 ) -> None:
     """An effect's numbers that are not zero, each in units of its own size."""
-    largest = LARGEST | ({"inertia": handle} if effect.effect == "backlash" else {})
+    largest = dict(LARGEST)
+    if isinstance(effect, Backlash):
+        largest["inertia"] = HEAVIEST[effect.side] * inertia
     for key in (*effect.parameters(), "y"):
         value = getattr(effect, key, None)
         if not isinstance(value, float | tuple) or not _effect_scale(effect, key):

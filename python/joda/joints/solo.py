@@ -79,8 +79,8 @@ class State:
         q: position, rad or m.
         v: velocity.
         held: friction force of the step before, N·m or N.
-        g: with backlash, position of the handle minus that of the part.
-        w: with backlash, velocity of the handle.
+        g: with backlash, position of the handle or the load minus that of the part.
+        w: with backlash, velocity of the handle, or of the load minus that of the part.
     """
 
     q: Array
@@ -196,16 +196,28 @@ def step(prepared: Prepared, state: State, force: Array, h: float) -> State:
     far = reach(v, spring, seen, 1 / span, h)
     near = jaxfield.max_descent(conservative, s - far, s + far)
     constant = stays_beyond(s, v, spring, seen, 1 / span, h)
-    drag = jaxfield.evaluate(damping, s)[0] + laws.damping(own, s, v)
-    drag = drag + h * implicit_stiffness(spring, near, descent, constant, seen, 1 / span, h)
+    stiffness = h * implicit_stiffness(spring, near, descent, constant, seen, 1 / span, h)
     weight = _weight(joint, q)
-    up, down = laws.friction(own, s, v, weight + force)
-    bound = jaxfield.evaluate(friction, s)[0] + 0.5 * (up + down)
+    channels = jaxfield.evaluate(damping, s)[0], jaxfield.evaluate(friction, s)[0]
+
+    def resistance(velocity: Array) -> laws.Resistance:
+        return laws.resistance(own, *channels, s, velocity, weight + force)
+
+    whole = resistance(v)
+    passage = laws.meet(
+        *(own.backlash, state.g, state.w, v, inertia, spring + weight + force, whole, stiffness),
+        resistance(v + state.w),
+        h,
+    )
+    drag, up, down = whole.part(passage.resistance)
+    bound = 0.5 * (up + down)
     held = jnp.clip(state.held, -bound, bound)
-    stiff, bristles = laws.friction_row(own.presliding_friction, held, bound, v, seen, h)
-    drag = drag + bristles
+    stiff, bristles = laws.friction_row(
+        own.presliding_friction, held, bound, v, seen, h, passage.resistance
+    )
+    drag = drag + passage.scale * stiffness + bristles
     pushed, g, w = laws.backlash(own.backlash, state.g, state.w, v, force, h)
-    drive = spring + 0.5 * (down - up) + weight + pushed
+    drive = passage.scale * (spring + weight + pushed) + passage.force + 0.5 * (down - up)
 
     # Optimality: mass * a = drive + friction(a) + limit(a); mass and drive hold the damping row.
     mass = inertia + h * drag
@@ -228,6 +240,7 @@ def step(prepared: Prepared, state: State, force: Array, h: float) -> State:
     pushes = (D > 0) & (sign * free - reference < 0)
     a = jnp.where(pushes, held_back, free)
     after = v + h * a
+    g, w = laws.settle(own.backlash, passage, g, w, after, h)
     return State(q + h * after, after, jnp.where(pushes, force_back, force_free), g, w)
 
 

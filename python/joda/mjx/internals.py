@@ -45,14 +45,23 @@ class Rows:
         )
 
 
-def pipeline(m: mjx.Model, d: mjx.Data, act: Callable[..., mjx.Data] | None) -> mjx.Data:
-    """`mjx.step`, with `act` where MuJoCo calls a plugin's compute."""
+Settle = Callable[[mjx.Data], mjx.Data]
+
+
+def pipeline(
+    m: mjx.Model, d: mjx.Data, act: Callable[..., tuple[mjx.Data, Settle]] | None
+) -> mjx.Data:
+    """`mjx.step`, with `act` where MuJoCo calls a plugin's compute.
+
+    What that returns besides the state is done where MuJoCo calls a plugin's advance.
+    """
     psi = d._impl.efc_force
     d = forward.fwd_position(m, d)
     d = sensor.sensor_pos(m, d)
     d = forward.fwd_velocity(m, d)
+    settle: Settle | None = None
     if act is not None:
-        d = act(m, d, psi)
+        d, settle = act(m, d, psi)
     d = sensor.sensor_vel(m, d)
     d = forward.fwd_actuation(m, d)
     d = forward.fwd_acceleration(m, d)
@@ -64,8 +73,10 @@ def pipeline(m: mjx.Model, d: mjx.Data, act: Callable[..., mjx.Data] | None) -> 
         d = d.tree_replace({"_impl.efc_force": efc_force})
         d = sensor.sensor_acc(m, d)
     if m.opt.integrator == mjx.IntegratorType.EULER:
-        return forward.euler(m, d)
-    return forward.implicit(m, d)
+        d = forward.euler(m, d)
+    else:
+        d = forward.implicit(m, d)
+    return settle(d) if settle else d
 
 
 @jax.custom_jvp

@@ -12,13 +12,13 @@ from joda.field.jaxeffects import Backlash, EndStops
 from joda.joints import laws
 from joda.joints.stiffness import IDLE_ROW, implicit_stiffness, reach, stays_beyond
 from joda.mjx.fields import Prepared
-from joda.mjx.internals import Rows
+from joda.mjx.internals import Rows, Settle
 from joda.profile import CHANNELS
 
 Array = jax.Array
 
 
-def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
+def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> tuple[mjx.Data, Settle]:
     """The plugin's compute: forces and rows of all joints, from the state before the step.
 
     Args:
@@ -26,11 +26,14 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
         d: the state, with its rows and passive forces made.
         psi: the forces of all rows in the step before.
         prepared: the fields.
+
+    Returns:
+        the state, and what moves loads behind plays once the step is taken.
     """
     off, bit = m.opt.disableflags, mjx.DisableBit
     spring, damper = not off & bit.SPRING, not off & bit.DAMPER
     if not (spring or damper):  # MuJoCo skips all passive forces then
-        return d
+        return d, lambda d: d
     index = {
         key: np.array([getattr(place, key) for place in prepared.places])
         for key in vars(prepared.places[0])
@@ -43,7 +46,7 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
     order = dict(zip(CHANNELS, prepared.orders, strict=True))
 
     force, descent = jax.vmap(laws.gravity)(own.gravity_offset, q)
-    near, drag, up = (jnp.zeros_like(v) for _ in range(3))
+    near, damping, dry = (jnp.zeros_like(v) for _ in range(3))
     if spring:
         stacks = prepared.conservative
         force = force + _each(stacks, order["conservative"], jaxfield.evaluate, s)[0]
@@ -52,23 +55,39 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
     constant = stays_beyond(s, v, force, inertia, per_range, h)
     stiffness = implicit_stiffness(force, near, descent, constant, inertia, per_range, h)
     if damper:
-        drag = _each(prepared.damping, order["damping"], jaxfield.evaluate, s)[0]
-        drag = drag + jax.vmap(laws.damping)(own, s, v)
-    drag, down = drag + h * stiffness, up
+        damping = _each(prepared.damping, order["damping"], jaxfield.evaluate, s)[0]
     if not off & bit.FRICTIONLOSS:
-        friction, _ = _each(prepared.friction, order["friction"], jaxfield.evaluate, s)
-        load = jnp.zeros_like(v)
-        if own.load_dependent_friction is not None:
-            load = _gravity(m, d, index["joint"]) + d.qfrc_applied[dof]
-        up, down = (friction + more for more in jax.vmap(laws.friction)(own, s, v, load))
+        dry, _ = _each(prepared.friction, order["friction"], jaxfield.evaluate, s)
+        dry = dry + m.dof_frictionloss[dof]
+    load = jnp.zeros_like(v)
+    if own.load_dependent_friction is not None or own.backlash is not None:
+        load = _gravity(m, d, index["joint"]) + d.qfrc_applied[dof]
+
+    def resistance(v: Array) -> laws.Resistance:
+        whole = jax.vmap(laws.resistance)(own, damping, dry, s, v, load)
+        if not damper:
+            whole = whole._replace(drag=damping)
+        if off & bit.FRICTIONLOSS:
+            whole = whole._replace(up=dry, down=dry)
+        return whole
+
+    g, w = _loose(m, d, own.backlash, len(dof))
+    whole, other = resistance(v), resistance(v + w)
+    meet = jax.vmap(laws.meet, in_axes=(*[0] * 9, None))
+    passage = meet(
+        own.backlash, g, w, v, m.dof_M0[dof], force + load, whole, h * stiffness, other, h
+    )
+    drag, up, down = jax.vmap(laws.Resistance.part)(whole, passage.resistance)
+    force, stiffness = passage.scale * force, passage.scale * stiffness
+    drag = drag + h * stiffness
 
     rows, at = Rows(d), np.flatnonzero(index["friction_row"] >= 0)
     row = index["friction_row"][at]
-    bound = 0.5 * (up + down)[at] + m.dof_frictionloss[dof[at]]
+    bound = 0.5 * (up + down)[at]
     last = jnp.clip(psi[row], -bound, bound)
     bristles = jax.tree.map(lambda x: x[at], own.presliding_friction)
-    stiff = jax.vmap(laws.friction_row, in_axes=(0, 0, 0, 0, 0, None))
-    D, slipping = stiff(bristles, last, bound, v[at], inertia[at], h)
+    stiff = jax.vmap(laws.friction_row, in_axes=(0, 0, 0, 0, 0, None, 0))
+    D, slipping = stiff(bristles, last, bound, v[at], inertia[at], h, passage.resistance[at])
     rows.set(row, D, bound, last, v[at] / h)
     if damper:
         drag = drag.at[at].add(slipping)
@@ -77,8 +96,8 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
 
     at = np.flatnonzero(index["damping_row"] >= 0)
     row, on = index["damping_row"][at], d.eq_active[index["equality"][at]] != 0
-    resistance = jnp.maximum(h * drag[at], IDLE_ROW * inertia[at])
-    rows.set(row, resistance, 0, 0, v[at] / h)
+    D = jnp.maximum(h * drag[at], IDLE_ROW * inertia[at])
+    rows.set(row, D, 0, 0, v[at] / h)
     held = jnp.zeros(len(dof), bool).at[at].set(on)
     if own.end_stop_restitution is not None:
         at = np.flatnonzero(index["limit_row"] >= 0)
@@ -91,8 +110,21 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> mjx.Data:
     stop, dry = inertia * jnp.abs(v) / h, jnp.where(v < 0, down, up)
     limited = jnp.minimum(dry + drag * jnp.abs(v) / (1 + h * drag / inertia), stop)
     force = force + shift - jnp.sign(v) * limited
-    d, pushed = _move_handles(m, rows.write(d), dof, own.backlash)
-    return d.replace(qfrc_passive=d.qfrc_passive.at[dof].add(force + pushed))
+    force = force + passage.force + (passage.scale - 1) * load
+    applied = d.qfrc_applied[dof]
+    push = jax.vmap(laws.backlash, in_axes=(0, 0, 0, 0, 0, None))
+    pushed, g, w = push(own.backlash, g, w, v, applied, h)
+    d = rows.write(d)
+    d = d.replace(qfrc_passive=d.qfrc_passive.at[dof].add(force + pushed - applied))
+    after = jax.vmap(laws.settle, in_axes=(0, 0, 0, 0, 0, None))
+
+    def settle(d: mjx.Data) -> mjx.Data:
+        if own.backlash is None:
+            return d
+        state = jnp.stack(after(own.backlash, passage, g, w, d.qvel[dof], h), axis=1).ravel()
+        return d.replace(userdata=d.userdata.at[m.nuserdata :].set(state))
+
+    return d, settle
 
 
 def _set_stops(
@@ -126,18 +158,12 @@ def _gravity(m: mjx.Model, d: mjx.Data, joint: Any) -> Array:
     return weight
 
 
-def _move_handles(
-    m: mjx.Model, d: mjx.Data, dof: Any, backlash: Backlash | None
-) -> tuple[mjx.Data, Array]:
-    """Steps the handles; what they push more than is applied to them, N·m or N."""
-    applied = d.qfrc_applied[dof]
+def _loose(m: mjx.Model, d: mjx.Data, backlash: Backlash | None, count: int) -> tuple[Array, Array]:
+    """Places and velocities of the joints' handles or loads; 0 where there are none."""
     if backlash is None:
-        return d, jnp.zeros_like(applied)
+        return jnp.zeros(count), jnp.zeros(count)
     g, w = d.userdata[m.nuserdata :].reshape(-1, 2).T
-    step = jax.vmap(laws.backlash, in_axes=(0, 0, 0, 0, 0, None))
-    force, g, w = step(backlash, g, w, d.qvel[dof], applied, m.opt.timestep)
-    state = jnp.stack([g, w], axis=1).ravel()
-    return d.replace(userdata=d.userdata.at[m.nuserdata :].set(state)), force - applied
+    return g, w
 
 
 def _each(

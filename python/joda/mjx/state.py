@@ -1,4 +1,4 @@
-"""The state of handles with play, which `mjx.Data` has no place for: in `userdata`."""
+"""The state of handles and loads with play, which `mjx.Data` has no place for: in `userdata`."""
 
 import jax.numpy as jnp
 from mujoco import mjx
@@ -8,7 +8,9 @@ from joda.mjx.fields import Fields, Prepared
 
 
 def put_state(m: mjx.Model, d: mjx.Data, fields: Fields | Prepared) -> mjx.Data:
-    """The data with the handles of joints with backlash in the middle of their play, at rest.
+    """The data with what is beyond the play of joints with backlash in the middle of it.
+
+    Handles are at rest there; loads move with their joint.
 
     Args:
         m: of `mjx.put_model`.
@@ -17,8 +19,8 @@ def put_state(m: mjx.Model, d: mjx.Data, fields: Fields | Prepared) -> mjx.Data:
 
     Returns:
         the data. If a joint has backlash, two numbers per joint of the fields, in their order, are
-        behind the model's own `userdata`: position of the handle minus that of the part (rad or m),
-        and velocity of the handle.
+        behind the model's own `userdata`: position of the handle or the load minus that of the part
+        (rad or m), and velocity of the handle, or of the load minus that of the part.
     """
     state = jnp.zeros(_size(fields), d.qpos.dtype)
     return d.replace(userdata=jnp.concatenate([d.userdata[: m.nuserdata], state]))

@@ -75,6 +75,7 @@ class Hypothesis:
         remains: part of the excess misfit that it may leave where it is the true one: more where
             only the rough shape of its curve is known.
         itself: whether it is, with these numbers, more than a simpler effect would be.
+        kept: how many rough fits are fitted to the end: several where the motion jumps in a number.
     """
 
     effect: str
@@ -89,6 +90,7 @@ class Hypothesis:
     rarity: float = 0.0
     remains: float = KNOWN_LAW
     itself: Callable[[Array], bool] = lambda x: True
+    kept: int = 1
 
     def placed(
         self, places: Sequence[Sequence[float]], strengths: Sequence[float] = (1.0,)

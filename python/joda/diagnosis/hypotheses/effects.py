@@ -37,6 +37,7 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
+from joda.effects.mechanics import HEAVIEST
 from joda.profile import Profile
 
 Way = Literal["positive", "negative"]
@@ -51,10 +52,10 @@ RAISED = 0.1
 """Part of its rise above its least value from which a free curve is told to act."""
 VARIED = 0.5
 """How much a curve varies at least that differs along the way, in units of its mean."""
+KEPT = 3
+"""Rough fits of a load behind a play that are fitted to the end: each knock may be or not."""
 TINY = 1e-12
 """As good as no force."""
-HEAVIEST = 0.45
-"""Inertia of a handle that has play, in units of the joint's; the plugin takes half of it."""
 
 
 def free_curves(units: Units) -> Iterator[Hypothesis]:
@@ -208,7 +209,7 @@ def _presliding(units: Units) -> Hypothesis:
 
 def _mechanics(units: Units) -> Iterator[Hypothesis]:
     """Effects of masses, tilt, play and end stops."""
-    F, M, span = units.force, units.inertia, units.span
+    F, M = units.force, units.inertia
     yield _effect(
         "added_inertia",
         [(1e-4, 5.0, 0.002, np.nan, 30.0)],
@@ -236,16 +237,48 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
             "N",
         )
     if units.forced:
-        yield _effect(
-            "backlash",
-            [(3e-3, 0.2, 0.002, np.nan, 0.5), (np.log(3e-3), np.log(HEAVIEST), 0.05)],
-            list(product((0.01, 0.03), (np.log(0.03), np.log(0.15)))),
-            lambda x: Backlash(play=span * float(x[0]), inertia=M * float(np.exp(x[1]))),
-            lambda x: span * float(x[0]),
-            "rad" if units.hinge else "m",
-        )
+        yield from _backlash(units)
     for end in ENDS:
         yield _restitution(end)
+
+
+def _backlash(units: Units) -> Iterator[Hypothesis]:
+    """Play before the joint, and behind it."""
+    M, span = units.inertia, units.span
+    play = (3e-3, 0.2, 0.002, np.nan, 0.5)
+
+    def size(x: Array) -> float:
+        return span * float(x[0])
+
+    def before(x: Array) -> Backlash:
+        return Backlash(play=size(x), inertia=M * float(np.exp(x[1])))
+
+    def behind(x: Array) -> Backlash:
+        inertia = M * float(np.exp(x[1]))
+        return Backlash(play=size(x), inertia=inertia, side="motor", share=float(x[2]))
+
+    unit = "rad" if units.hinge else "m"
+    yield _effect(
+        "backlash",
+        [play, (np.log(3e-3), np.log(HEAVIEST["load"]), 0.05)],
+        list(product((0.01, 0.03), (np.log(0.03), np.log(0.15)))),
+        before,
+        size,
+        unit,
+    )
+    load = _effect(
+        "backlash",
+        [
+            (3e-3, 0.2, 0.003, np.nan, 0.5),
+            (np.log(0.01), np.log(HEAVIEST["motor"]), 0.1),
+            (0.0, 0.98, 0.04),
+        ],
+        list(product((0.015, 0.05), (np.log(0.12), np.log(0.5)), (0.85,))),
+        behind,
+        size,
+        unit,
+    )
+    yield replace(load, kept=KEPT)
 
 
 def _restitution(end: End) -> Hypothesis:
