@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import Base, joined
 from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.hypotheses.base import FREE_CURVE
 from joda.diagnosis.judge import BEND, Fit, Judge, Linear
 from joda.profile import Profile
 
@@ -27,6 +28,8 @@ APART = 0.06
 """How much these must differ in one of their numbers."""
 OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
+NOTHING = 0.1
+"""Part of its step below which a strength is none."""
 MANY = 4000
 """Samples that count as many: from there on, what was fitted first is hardly in the way."""
 
@@ -57,7 +60,8 @@ class Guess:
         """Whether it is hardly there, no more than a simpler effect, or beyond the widest of its
         bounds: something else fits."""
         unknowns = self.hypothesis.unknowns
-        hardly = unknowns.low[0] > 0 and self.x[0] < 1.01 * unknowns.low[0]
+        least = 1.01 * unknowns.low[0] or NOTHING * unknowns.step[0]
+        hardly = self.hypothesis.remains != FREE_CURVE and least > 0 and self.x[0] < least
         return bool(hardly or unknowns.pressed(self.x) or not self.hypothesis.itself(self.x))
 
     def written(self, base: Base) -> Profile:

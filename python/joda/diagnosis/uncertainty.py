@@ -62,7 +62,8 @@ DEFINITION = 0.08
 TOLERATED = 0.02
 """Part of what an effect explains that another law of its shape may fail to."""
 HIDDEN = 0.5
-"""Part of the size that may hide in what is left, by the root of the share of the misfit left."""
+"""Part of the size that may hide in what is left of the misfit, by the root of its share for each
+part that is not left."""
 FARTHEST = 10.0
 """Largest doubt of what is there, or is extrapolated, in units of the magnitude: nothing is known
 of how large it is."""
@@ -134,7 +135,8 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
     data = from_data(fitted, TOLERATED * gain * (found.hypothesis.remains == KNOWN_SHAPE))
     magnitude, a, b = map(float, best)
     shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.remains])
-    part = shape + HIDDEN * float(np.sqrt(np.clip(left, 0.0, 1.0)))
+    left = float(np.clip(left, 0.0, 1.0))
+    part = min(shape + HIDDEN * left**0.5 / max(1.0 - left, 1 / FARTHEST), FARTHEST)
     seen, visited = _seen(asked, found)
     beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
     if from_afar := _at_bound(found) or (_pulls(found) and b - a > REACHING):

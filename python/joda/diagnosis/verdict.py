@@ -156,7 +156,8 @@ def _looked_again(
     if measured.runs:
         ranking = rank(asked(measured, _longer(first)), exclude, told)
         return ranking, weigh(ranking, STRICTLY, wholly=True)
-    left = first.guesses[0].fit.squares / np.maximum(judge.windows.count, 1)
+    best = first.guesses[0].fit if first.guesses else first.asked.fit
+    left = best.squares / np.maximum(judge.windows.count, 1)
     factor = max(float(np.sqrt(np.median(left[judge.counts]))), 1.0)
     rough = measured.with_curves([curve.noisier(factor) for curve in measured.curves])
     ranking = rank(asked(rough), exclude, told)

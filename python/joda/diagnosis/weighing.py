@@ -84,8 +84,13 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
     """
     judge, guesses = ranking.asked.judge, ranking.guesses
     samples = judge.samples
-    if not guesses or not samples:
+    if not samples:
         return Weighed("adequate", (), (0.0, ()))
+    loss = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
+    calm = _excess(loss, samples) < MUCH and not ranking.bouncy
+    without: Verdict = "adequate" if calm else "unexplained"
+    if not guesses:
+        return Weighed(without, (), (excess_of(ranking.asked), ()))
     first = guesses[0]
 
     own = _excess(levelled(judge, ranking.asked.fit, ranking.level), samples)
@@ -104,9 +109,7 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> We
     gain = ranking.asked.fit.loss - first.fit.loss - first.cost
     doubtful = likely[0] < HARDLY or ranking.bouncy
     if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and doubtful):
-        loss = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
-        calm = _excess(loss, samples) < MUCH and not ranking.bouncy
-        said: Verdict = "adequate" if calm else "unexplained"
+        said = without
     elif weights[0] <= strange:
         said = "unexplained"
     else:
