@@ -219,4 +219,4 @@ def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened(begun):
     assert hard.x[0] == pytest.approx(usual[0]) and not hard.vanished
     assert pressed.x[0] <= 2 * usual[0] and pressed.vanished
     assert usual[0] < wide.x[0] < widest[0] and not wide.vanished
-    assert wide.fit.loss < 0.5 * hard.fit.loss
+    assert wide.fit.loss < hard.fit.loss - 100
