@@ -15,7 +15,10 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    config.addinivalue_line("markers", "sweep(count): cases of this test in a session")
+    config.addinivalue_line(
+        "markers",
+        "sweep(count, group): cases of this test, or of all tests of a group, in a session",
+    )
     os.environ.setdefault(SEED, str(secrets.randbits(32)))  # the same in every worker
 
 
@@ -29,7 +32,8 @@ def pytest_collection_modifyitems(config, items):
     sweeps = defaultdict(list)
     for item in items:
         if mark := item.get_closest_marker("sweep"):
-            sweeps[item.nodeid.partition("[")[0], *mark.args].append(item)
+            count, *group = mark.args
+            sweeps[group[0] if group else item.nodeid.partition("[")[0], count].append(item)
     left = set()
     for (name, count), cases in sweeps.items():
         if len(cases) == len(items):  # they were asked for

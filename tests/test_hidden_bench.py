@@ -101,9 +101,11 @@ def test_a_curve_gets_as_many_control_points_as_the_data_support():
     """A template's five control points make no over-centre spring."""
     seed = secrets.randbits(31)
     print("seed", seed)
-    train, held_out = read(draw(seed, "bistable_mechanism"))
+    case = draw(seed, "bistable_mechanism")
+    train, held_out = read(case)
     mended = mend(*parted(train), "bistable_mechanism")
     parts = mended.profile.channels.conservative.components
-    assert mended.after.window < 0.3 * mended.before.window
-    assert error(held_out, mended.profile).window < 0.3 * error(held_out).window
+    assert mended.after.window < max(0.3 * mended.before.window, 1.5 * case.noise)
+    unseen = error(held_out, mended.profile).window
+    assert unseen < max(0.3 * error(held_out).window, 1.5 * case.noise)
     assert max(len(part.x) for part in parts) > 5

@@ -321,6 +321,7 @@ def gradient_problem():
     return parameters, positions
 
 
+@pytest.mark.sweep(1, "derivatives of mjx")
 def test_derivatives_are_central_differences():
     """By every number of every channel, the limits' damping ratio, inertia, mass and gravity."""
     parameters, positions = gradient_problem()
@@ -329,6 +330,7 @@ def test_derivatives_are_central_differences():
     assert (np.ptp(place, axis=0) > 0.8 * SPANS).all()
 
 
+@pytest.mark.sweep(1, "derivatives of mjx")
 def test_reverse_mode_is_central_differences():
     """Through the solver too, by the bound of the friction and the push that overcomes it."""
     rubbing = joints.component((0, 1), (0, 0.5, 1), (0.3, 0.5, 0.2))

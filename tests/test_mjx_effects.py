@@ -240,6 +240,7 @@ def test_the_example_of_the_docs(folder):
 # --- derivatives
 
 
+@pytest.mark.sweep(1, "derivatives of mjx")
 def test_derivatives_by_all_numbers_are_those_of_central_differences(folder):
     """Of the hinge; `test_solo_effects.py` has those of a slide."""
     scene = Scene(folder, "all")
