@@ -13,6 +13,7 @@ from joda.diagnosis.asking import RESTITUTION, asked
 from joda.diagnosis.ranking import rank
 from joda.diagnosis.uncertainty import FARTHEST, REACHING, SHAPE, from_data, uncertainty
 from joda.diagnosis.uncertainty import _fitted as fitted
+from joda.diagnosis.uncertainty import _gaps as gaps
 from joda.hidden import EFFECTS, draw
 
 
@@ -31,9 +32,10 @@ def test_the_true_size_and_place_lie_within_what_is_said():
     effects = dice(master, "reliable").choice(RELIABLE, 4, replace=False)
     off = []
     for number, effect in enumerate(map(str, effects)):
-        others = tuple(name for name in EFFECTS if name != effect)
-        job = replace(job_of(master, "cover", number), effect=effect, exclude=others, forced=True)
+        job = replace(job_of(master, "cover", number), effect=effect, forced=True)
         case = case_of(job)
+        effect = case.seal["effect"]  # on a part of the range it has a name of its own
+        others = tuple(name for name in EFFECTS if name != effect)
         row = vars(job) | said(read(case)[0].changed(runs=RUNS), others) | {"seal": case.seal}
         if row["named"]:
             off.append(pulls(row))
@@ -100,3 +102,9 @@ def test_what_is_left_and_what_nobody_visited_make_it_less_sure():
     # no run was below s = 0.16: how strong the magnet is at its end nobody knows
     assert abs(case.seal["magnitude"] - size) < 2 * none.magnitude
     assert begun.judge.windows.position.min() > case.truth.joint.lo + 0.15 * case.truth.joint.span
+
+
+def test_an_end_at_the_edge_of_what_was_visited_may_be_anywhere_beyond():
+    low, high = gaps((0.05, 0.65), (0.1, 0.66))
+    np.testing.assert_allclose((low, high), (0.1 / 3**0.5, 0.34 / 3**0.5))
+    assert gaps((0.3, 0.5), (0.1, 0.66)) == [0.0, 0.0]

@@ -78,6 +78,8 @@ AT_END = 0.02
 """Doubt of the place of an end that throws back, in normalised position."""
 CLEARLY = 2.0
 """How many standard errors less an end of the range throws back that is another matter."""
+EDGE = 0.03
+"""How far within what was visited an end must be to be clearly there, in normalised position."""
 UNKNOWN_END = 3**-0.5
 """The same of the interval's other end, where the other end of the range tells nothing."""
 HARDLY = 0.005
@@ -144,8 +146,9 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
     most = FARTHEST * magnitude if _there(found) else np.inf
     size = np.linalg.norm([min(data[0], most), part * magnitude, beyond * magnitude])
     width = max(DEFINITION, part, STRETCHED * beyond) * (b - a)
+    free = from_afar or found.hypothesis.ends == 2
     ends = tuple(
-        float(np.linalg.norm([spread, width * (from_afar or 0.0 < end < 1.0), gap]))
+        float(np.linalg.norm([spread, width * (free or 0.0 < end < 1.0), gap]))
         for end, spread, gap in zip((a, b), data[1:], _gaps((a, b), visited), strict=True)
     )
     return Uncertainty(float(size), (ends[0], ends[1]))
@@ -226,9 +229,14 @@ def _pulls(found: Guess) -> bool:
 
 
 def _gaps(interval: tuple[float, float], visited: tuple[float, float]) -> list[float]:
-    """How far the ends may be off as they are where no run was: uniform between there and here."""
+    """How far the ends may be off where no run was: one that is not clearly within what was visited
+    may be anywhere from there to the end of the range, uniformly."""
     low, high = visited
-    return [max(low - end, end - high, 0.0) / 3**0.5 for end in interval]
+    lows, highs = (
+        low * np.less(interval, low + EDGE),
+        (1 - high) * np.greater(interval, high - EDGE),
+    )
+    return [float(gap) / 3**0.5 for gap in lows + highs]
 
 
 def _fitted(asked: Asked, found: Guess) -> _Fitted:
