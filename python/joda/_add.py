@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -152,11 +153,11 @@ def sentences(added: Added) -> list[str]:
     if added.added:
         out = [f"Added {what}. On what was held out of the fit ({added.held_out}): {errors}."]
     else:
-        near = nearby(added.before, added.blocks)
+        near, error = nearby(added.before, added.blocks), added.before.window
+        missed = f"{near} {error:.3g} {added.unit}, " if isfinite(error) else ""
         out = [
-            f"Not added: {what}, as {added.reason} ({added.held_out}; {near} "
-            f"{added.before.window:.3g} {added.unit}, noise {added.noise_floor:.2g} {added.unit}). "
-            "Nothing was written."
+            f"Not added: {what}, as {added.reason} ({added.held_out}; {missed}"
+            f"noise {added.noise_floor:.2g} {added.unit}). Nothing was written."
         ]
     told = parting(added.after, added.noise_floor, added.blocks) if added.added else []
     return [*out, *told, *added.departures, *added.changes, *added.notes]

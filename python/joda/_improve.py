@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -170,7 +171,7 @@ def _rows(result: Improved) -> list[tuple[str, ...]]:
     """Effect and errors, the head first."""
     stairs = _errors(result)
     rows = [
-        tuple(f"{value:.3g} {result.unit}" for value in values)
+        tuple(f"{value:.3g} {result.unit}" if isfinite(value) else "unknown" for value in values)
         for values in zip(*stairs.values(), strict=True)
     ]
     names = map(_step, result.steps)

@@ -27,7 +27,7 @@ def strengths_off(ranking: Ranking) -> str:
         for (name, _), factor in zip(ranking.asked.base.places, ranking.asked.fit.x, strict=True)
         if abs(factor - 1) > OFF
     ]
-    return f" Its own numbers are somewhat off: {', '.join(factors)}." if factors else ""
+    return f" Its own numbers are off: {', '.join(factors)}." if factors else ""
 
 
 def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool) -> str:

@@ -52,8 +52,8 @@ DRIFTING = (
     "but whole runs are missed by up to {:.0f} times what noise, start and force explain."
 )
 WITH_THESE = (
-    " Whole runs are missed by up to {:.0f} times the noise as the model is, with these numbers "
-    "by no more than noise, start and force explain."
+    "No effect is missing, but as it stands the model misses whole runs by up to {:.0f} times the "
+    "noise.{} With these there is {} that an effect would explain."
 )
 WITHOUT = (
     " Whole runs are missed by up to {:.0f} times the noise all the same, but by no more than "
@@ -173,13 +173,13 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     """No effect shows in windows: the model is adequate, unless whole runs say otherwise."""
     if (left := worst(measured, ranking.asked)) > BEYOND:
         return _said(measured, "unexplained", DRIFTING.format(left), (), AGAIN)
-    off = strengths_off(ranking)
-    missed = worst_missed(measured)
-    astray = WITH_THESE if off else WITHOUT
-    summary = (
-        f"The model is adequate: nothing beyond the noise ({measured.floor:.2g} {measured.unit}) "
-        f"that an effect would explain.{off}{astray.format(missed) if missed > MULTIPLE else ''}"
-    )
+    off, missed = strengths_off(ranking), worst_missed(measured)
+    noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
+    if off and missed > MULTIPLE:
+        summary = WITH_THESE.format(missed, off, noise)
+    else:
+        summary = f"The model is adequate: {noise} that an effect would explain.{off}"
+        summary += WITHOUT.format(missed) if missed > MULTIPLE else ""
     return _said(measured, "adequate", summary, (), None)
 
 
