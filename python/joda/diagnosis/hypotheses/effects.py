@@ -212,7 +212,7 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
     F, M = units.force, units.inertia
     yield _effect(
         "added_inertia",
-        [(1e-4, 5.0, 0.002, np.nan, 30.0)],
+        [(1e-4, 5.0, 0.002, np.nan, 300.0)],
         [[0.1]],
         lambda x: AddedInertia(inertia=M * float(x[0])),
         lambda x: M * float(x[0]),
