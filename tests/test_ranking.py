@@ -205,8 +205,9 @@ def test_a_curve_is_level_where_no_run_has_been(begun, effect):
     assert part.y[-1] > part.y[0]
 
 
-def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened(begun):
+def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened():
     """Drag as an effect of which usually only a tenth of the true size is looked for."""
+    begun = asked(read(draw(84751434, EFFECT))[0].changed(runs=[0, 4]))
     every = [h for h in begun.hypotheses if h.effect == EFFECT]
     size = begun.tell(every[0]).x[0]
     usual, widest = (np.array([0.1, 10.0]) * size)[:, None]
