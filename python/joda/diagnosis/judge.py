@@ -205,6 +205,11 @@ class Judge:
         room = bend * np.maximum(self.windows.count, 1)
         return float(np.sum((room * np.log1p(squares / level / room))[self.counts]))
 
+    def overdispersion(self, squares: Array) -> float:
+        """Robust mean square residual, 1 at least."""
+        each = self.loss(squares) / max(self.samples, 1.0)
+        return max(each / (BEND * float(np.log1p(1 / BEND))), 1.0)
+
     def linear(
         self,
         make: Make,

@@ -28,7 +28,7 @@ from joda.diagnosis.hypotheses.base import (
     everywhere,
 )
 from joda.diagnosis.hypotheses.intervals import GRID
-from joda.diagnosis.judge import BEND, Judge, Make, Unknowns
+from joda.diagnosis.judge import Judge, Make, Unknowns
 from joda.diagnosis.knocks import KNOCKS, ends_of, mean_of, rebounds
 from joda.field import merge
 from joda.profile import CHANNELS, Profile
@@ -165,7 +165,7 @@ def from_data(fitted: _Fitted, tolerance: float = 0.0) -> Array:
     about = judge.linear(fitted.make, unknowns, x, fitted.found.fit.start)
     H, slopes = about.normals()
     prior = _prior(fitted)
-    worse = _overdispersion(fitted)
+    worse = judge.overdispersion(fitted.found.fit.squares)
     covariance = worse * np.linalg.pinv(H.sum(axis=0) + prior)
     rng = np.random.default_rng(0)
     normal = rng.multivariate_normal(x, covariance, DRAWS, method="svd")
@@ -261,13 +261,6 @@ def _restitution(asked: Asked, found: Guess) -> Uncertainty:
 
     low, high = (AT_END if side in sides or less(side) else UNKNOWN_END for side in (-1, 1))
     return Uncertainty(float(np.hypot(error, own)), (low, high))
-
-
-def _overdispersion(fitted: _Fitted) -> float:
-    """Robust mean square residual, 1 at least."""
-    judge = fitted.judge
-    loss = judge.loss(fitted.found.fit.squares)
-    return max(loss / max(judge.samples, 1.0) / (BEND * float(np.log1p(1 / BEND))), 1.0)
 
 
 def _bootstrap(

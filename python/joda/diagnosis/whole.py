@@ -1,12 +1,15 @@
 """Whole runs of a model with its own strengths fitted: how much they are missed by, and why."""
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.asking import Asked
-from joda.diagnosis.judge import BEND
+from joda.diagnosis.knocks import CLEAR
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
+from joda.measured.replay import Replayer
 from joda.measured.runs import Run
 
 Array = NDArray[np.float64]
@@ -15,8 +18,6 @@ BEYOND = 5.0
 """How many times what errors explain of it a model that is adequate may miss a whole run by."""
 DRAWS = 8
 """Strengths that are drawn, to tell how far their errors move a run."""
-CLEAR = 3.0
-"""How far off an end of its range a joint must be, in noises, not to be at it."""
 
 
 def worst(measured: Measured, asked: Asked) -> float:
@@ -30,9 +31,15 @@ def worst(measured: Measured, asked: Asked) -> float:
         measured: the joint and its runs.
         asked: the model fitted to them.
     """
-    drawn = [measured.changed(asked.base.written(x)).replayer for x in _strengths(asked)]
-    replayer, *others = drawn
-    out = 0.0
+
+    def with_(strengths: Array) -> Replayer:
+        return measured.changed(asked.base.written(strengths)).replayer
+
+    @cache  # only a run that is missed by much asks for them
+    def others() -> list[Replayer]:
+        return list(map(with_, _drawn(asked)))
+
+    replayer, out = with_(asked.fit.x), 0.0
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         part = _free(run, sigma, measured.profile.joint.range)
         if not (start := replayer.start(part, sigma)):
@@ -41,24 +48,23 @@ def worst(measured: Measured, asked: Asked) -> float:
         there = ~np.isnan(path)
         missed = rms(path[there] - part.position[there]) / sigma
         if missed > BEYOND:
-            moved = [other.whole(part, start)[there] - path[there] for other in others]
+            moved = [other.whole(part, start)[there] - path[there] for other in others()]
             apart = rms(np.concatenate(moved)) if moved else 0.0
             missed *= sigma / float(np.linalg.norm([sigma, replayer.scatter(part, start), apart]))
         out = max(out, missed)
     return out
 
 
-def _strengths(asked: Asked) -> list[Array]:
-    """The model's fitted strengths, and others within their errors; shape (k,) each."""
+def _drawn(asked: Asked) -> Array:
+    """Strengths within the errors of the fitted ones, shape (draws, k)."""
     judge, base, fit = asked.judge, asked.base, asked.fit
-    best = fit.x[: len(base.places)]
-    if not len(best):
-        return [best]
+    if not len(fit.x):
+        return np.zeros((0, 0))
     H = judge.linear(base.solo, base.unknowns, fit.x, fit.start).normal()[0]
-    noise = judge.loss(fit.squares) / max(judge.samples, 1.0) / (BEND * float(np.log1p(1 / BEND)))
-    covariance = max(noise, 1.0) * np.linalg.inv(H + np.diag(base.unknowns.doubt**-2.0))
-    drawn = np.random.default_rng(0).multivariate_normal(best, covariance, DRAWS, method="svd")
-    return [best, *np.clip(drawn, base.unknowns.low, base.unknowns.high)]
+    noise = judge.overdispersion(fit.squares)
+    covariance = noise * np.linalg.inv(H + np.diag(base.unknowns.doubt**-2.0))
+    drawn = np.random.default_rng(0).multivariate_normal(fit.x, covariance, DRAWS, method="svd")
+    return np.clip(drawn, base.unknowns.low, base.unknowns.high)
 
 
 def _free(run: Run, sigma: float, span: tuple[float, float]) -> Run:
