@@ -24,7 +24,9 @@ LAWS = {
 """What the joint has besides: force (N·m) over normalised position and direction of travel."""
 
 
-def gauged(folder: Path, law, ways=(1, -1), noise=0.02, uneven=0.0) -> Measured:
+def gauged(
+    folder: Path, law, ways=(1, -1), noise=0.02, uneven=0.0, samples=150, apart=0.0
+) -> Measured:
     """The model with a curve of a joint that has a further force, in folder/model.xml, curve.csv.
 
     Args:
@@ -33,12 +35,15 @@ def gauged(folder: Path, law, ways=(1, -1), noise=0.02, uneven=0.0) -> Measured:
         ways: in which the joint is moved, one after the other.
         noise: of the gauge, N·m.
         uneven: amplitude of a force that differs from one stroke to the next, N·m.
+        samples: of each way.
+        apart: how far the places of the ways may differ, in distances of one way's samples.
     """
     seed = secrets.randbits(32)
     print("seed", seed)
     rng = np.random.default_rng(seed)
-    there = np.linspace(0.02, 0.98 * SPAN, 150)
-    q = np.concatenate([there[::way] for way in ways])
+    there = np.linspace(0.02, 0.98 * SPAN, samples)
+    away = apart * (there[1] - there[0])
+    q = np.concatenate([np.sort(there + rng.uniform(-away, away, samples))[::way] for way in ways])
     d = np.repeat(ways, len(there))
     force = FRICTION * d - law(q / SPAN, d) + rng.normal(0, noise, len(q))
     for number in range(3, 12):

@@ -13,6 +13,7 @@ from joda.diagnosis.plausible import EXCESS, Needs, implausible, unseen_place
 from joda.effects import StribeckFriction
 from joda.measured.reading import read_measured
 from joda.measured.visited import unvisited, unvisited_part, visited_share
+from joda.profile import Channels
 
 
 @pytest.mark.parametrize(
@@ -64,6 +65,20 @@ def test_a_force_that_nothing_needs_is_refused(measured):
         )
         profile = measured.profile.with_component("conservative", part)
         assert bool(implausible(Needs(measured), profile, "detent_internal")) == refused
+
+
+def test_a_joint_without_resistance_that_moves_by_itself_is_refused(measured):
+    friction = measured.profile.channels.friction
+    assert friction.components
+    bare = measured.profile.model_copy(
+        update={"channels": Channels(conservative=measured.profile.channels.conservative)}
+    )
+    free = measured.with_runs(
+        [replace(run, forced=False) for run in measured.runs], range(len(measured.runs))
+    )
+    assert not implausible(Needs(measured), bare)  # what moves it is recorded
+    assert "something may have moved the joint" in implausible(Needs(free), bare)
+    assert not implausible(Needs(free), measured.profile)
 
 
 def test_where_no_run_was_is_told_in_closed_form(measured):

@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from gauging import LAWS, gauged
 
+from joda import compare
 from joda.diagnosis.findings import Diagnosis
 from joda.diagnosis.verdict import diagnosed
+from joda.measured.comparison import Comparison, sentences
 
 
 def said(folder: Path, law, **kind) -> Diagnosis:
@@ -51,3 +54,48 @@ def test_uneven_friction_does_not_decide_what_is_named(tmp_path):
     likely = {first.effect, *first.indistinguishable_from}
     assert likely & {"magnetic_return_to_low_end", "spring_loaded_snap_detent_to_low_end"}, found
     assert found.next_experiment == "Measure the way back too, as slowly."
+
+
+def clicks(per_click: float, samples: int):
+    """A force that goes up and down once in so many samples."""
+    return lambda s, d: np.sin(2 * np.pi * s * samples / per_click + 1.0)
+
+
+def compared(folder: Path, law, **kind) -> Comparison:
+    measured = gauged(folder, law, **kind)
+    return compare(folder / "model.xml", "door", [folder / measured.curves[0].curve.name])
+
+
+@pytest.mark.parametrize("per_click", [2.3, 3.0, 4.0])
+@pytest.mark.parametrize("apart", [0.0, 0.3])
+def test_clicks_as_narrow_as_the_samples_are_no_noise(tmp_path, per_click, apart):
+    kind = {"noise": 0.01, "samples": 60, "apart": apart}
+    found = compared(tmp_path, clicks(per_click, 60), **kind)
+    assert found.curves_adequacy == "beyond_noise"
+    assert "no fault of the model" not in " ".join(sentences(found))
+    assert not [place for place in found.failing_force if place.by == "direction"]
+    told = said(tmp_path, clicks(per_click, 60), **kind)
+    assert told.verdict == "unexplained"
+    assert "leaves less than" not in told.summary
+
+
+def test_what_changes_from_sample_to_sample_clears_nothing(tmp_path):
+    """Measured one way only, and either way at other places."""
+    for kind in ({"ways": (1,)}, {"apart": 0.5}):
+        found = compared(tmp_path, clicks(2.05, 40), noise=0.01, samples=40, **kind)
+        assert found.curves_adequacy != "within_noise", kind
+        told = said(tmp_path, clicks(2.05, 40), noise=0.01, samples=40, **kind)
+        assert told.verdict != "adequate", kind
+
+
+@pytest.mark.parametrize("samples", [15, 40, 150])
+def test_curves_of_a_true_model_are_cleared(tmp_path, samples):
+    found = [compared(tmp_path, lambda s, d: 0 * s, samples=samples) for _ in range(20)]
+    assert sum(one.curves_adequacy == "within_noise" for one in found) >= 17
+    assert any("no fault of the model" in " ".join(sentences(one)) for one in found)
+
+
+def test_a_place_with_few_samples_is_beyond_the_noise(tmp_path):
+    narrow = 0.6 / 24
+    found = compared(tmp_path, lambda s, d: 0.5 * (abs(s - 0.5) < narrow), noise=0.01, samples=24)
+    assert found.curves_adequacy == "beyond_noise"

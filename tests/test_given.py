@@ -166,6 +166,15 @@ def test_a_number_that_the_runs_contradict_is_told(tmp_path, rng):
     assert f"native friction {FRICTION:g} → 0.01" in mended.departs.changed
 
 
+def test_an_effect_gets_no_credit_for_numbers_that_were_wrong(tmp_path, rng):
+    """The model's friction is three times too large, and nothing is missing."""
+    measured = thrown(tmp_path, rng, 3, drag=1e-6, friction=FRICTION / 3)
+    for effect in ("added_inertia", "quadratic_damping"):
+        mended = mend(*parted(measured), effect)
+        assert mended.effect is None
+        assert "without it" in mended.reason or mended.departs.parts == ()
+
+
 @pytest.mark.parametrize("near", [(0.55, 0.75), (0.05, 0.25)])
 def test_an_effect_that_acts_elsewhere_than_diagnosed_is_told(tmp_path, rng, near):
     x, y = (0, 0.25, 0.5, 0.75, 1), (0, 1.0, 0, -1.0, 0)

@@ -3,6 +3,7 @@
 Every share is measured on fresh random runs; the seed is printed where a test fails.
 """
 
+import re
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain
@@ -387,7 +388,8 @@ def the_one(run, found: Context, kind: str):
 def test_a_shift_is_told_by_how_much_at_least(rng):
     found, run = swinging(rng)
     told = the_one(replace(run, position=run.position + 1.0), found, "zero")
-    assert "shifted by -0.85" in told.sentence
+    shift = float(re.search(r"shifted by (-[0-9.]+)", told.sentence)[1])
+    assert shift == pytest.approx(-0.85, abs=0.001)
     assert "the range 0 to 1.5 rad" in told.sentence
 
 
@@ -528,3 +530,17 @@ def test_real_runs_raise_nothing_fatal(folder):
         edge = 0.05 * np.ptp(run.position)
         found = bare(kind, (run.position.min() - edge, run.position.max() + edge), inertia)
         assert not suspicions(run, found)
+
+
+def test_a_joint_that_gains_speed_by_itself_was_driven(rng):
+    found, run = swinging(rng)
+    grows = replace(run, position=0.75 + (run.position - 0.75) * (0.4 + 0.15 * run.time))
+    told = the_one(grows, found, "driven").sentence
+    assert "no force is recorded: something drove it" in told
+    fast, slow = map(float, re.findall(r"at ([0-9.]+) rad/s", told))
+    assert fast > 1.25 * slow
+    for fades in (1.0, 1.0 - 0.2 * run.time, 1.0 - 0.29 * run.time):
+        calm = replace(run, position=0.75 + (run.position - 0.75) * fades)
+        assert not [one for one in suspicions(calm, found) if one.kind == "driven"]
+    pushed = replace(grows, force=0 * run.time, forced=True)
+    assert not [one for one in suspicions(pushed, found) if one.kind == "driven"]

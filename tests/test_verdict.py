@@ -29,6 +29,7 @@ DETENT = Finding(
     held_out_error_after=0.001,
     indistinguishable_from=(),
 )
+FLOOR = 0.001
 SEAL = {"effect": "detent_internal", "interval": [0.31, 0.5], "direction": "both"}
 SEAL |= {"magnitude": 2.05, "unit": "N·m"}
 
@@ -49,20 +50,28 @@ def weighed(*likely, verdict="missing_effect"):
 )
 def test_missing_is_said_only_of_what_is_likely_and_helps(probability, after, head):
     one = replace(DETENT, probability=probability, held_out_error_after=after)
-    assert summarised(one, weighed(probability), one_way=False, bouncy=False).startswith(head)
+    assert summarised(one, weighed(probability), FLOOR, one_way=False, bouncy=False).startswith(
+        head
+    )
+
+
+def test_what_is_below_the_noise_is_a_guess():
+    said = summarised(DETENT, weighed(0.9), 0.02, one_way=False, bouncy=False)
+    assert said.startswith("Best guess: a click-stop") and "record faster" in said
 
 
 def test_two_that_cannot_be_told_apart_are_likely_together():
     one = replace(DETENT, probability=0.4, indistinguishable_from=("gravity_offset",))
-    said = summarised(one, weighed(0.4, 0.35, 0.1), one_way=False, bouncy=False)
+    said = summarised(one, weighed(0.4, 0.35, 0.1), FLOOR, one_way=False, bouncy=False)
     assert said.startswith("Missing is a click-stop (detent) or another pull of gravity")
-    said = summarised(one, weighed(0.3, 0.15, 0.1), one_way=False, bouncy=False)
+    said = summarised(one, weighed(0.3, 0.15, 0.1), FLOOR, one_way=False, bouncy=False)
     assert said.startswith("Best guess:")
 
 
 def test_what_no_effect_explains_is_a_guess():
     one = weighed(0.2, verdict="unexplained")
-    assert summarised(DETENT, one, one_way=False, bouncy=False).startswith("Best guess: a click")
+    said = summarised(DETENT, one, FLOOR, one_way=False, bouncy=False)
+    assert said.startswith("Best guess: a click")
 
 
 @pytest.mark.parametrize(
@@ -102,7 +111,7 @@ def diagnosis(*effects):
 
 def comparison(whole, windows):
     return Comparison(
-        "door", "rad", (), whole, windows, 1e-3, None, (), 0.1, (), (), (), contacts=()
+        "door", "rad", (), whole, windows, 1e-3, None, (), 0.1, (), None, (), (), contacts=()
     )
 
 

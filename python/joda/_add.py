@@ -18,10 +18,12 @@ from joda.diagnosis.outcome import (
     scene_files,
     told_errors,
 )
-from joda.diagnosis.phrases import named
+from joda.diagnosis.phrases import extrapolated, named
+from joda.diagnosis.share import places
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together
+from joda.measured.visited import unvisited_part
 from joda.pictures.changes import changes
 from joda.pictures.style import png
 
@@ -123,16 +125,20 @@ def add(
         mended = mend(train, held, name, direction, near, progress)
     notes: list[str] = []
     if mended.effect:
+        there = places(mended.profile, name, measured.profile)[0]
+        if away := extrapolated(unvisited_part(measured, there)).strip():
+            notes.append(away)
         progress("drawing")
-        files, notes = scene_files(Path(model), mended.profile, target, composed)
+        files, more = scene_files(Path(model), mended.profile, target, composed)
+        notes += more
         write_together(files | {picture: png(mended_picture(held, mended.profile))})
-    there = mended.effect is not None
+    added = mended.effect is not None
     return Added(
-        scene=target if there else None,
-        composed=composed if there else None,
-        picture=picture if there else None,
+        scene=target if added else None,
+        composed=composed if added else None,
+        picture=picture if added else None,
         effect=name,
-        added=there,
+        added=added,
         reason=mended.reason,
         before=mended.before,
         after=mended.after,
@@ -169,7 +175,7 @@ def _chosen(
     """Name, direction and place of the effect to add; None for what the diagnosis does not say."""
     found = {one["effect"]: one for one in reversed(told["effects"])}
     if effect is None:
-        if told.get("verdict") == "adequate" or not found:
+        if told.get("verdict") in ("adequate", "unexplained") or not found:
             verdict = told.get("verdict", "no effect")
             raise JodaError(
                 f"{path}: names no effect to add (verdict: {verdict}); choose one with --effect."

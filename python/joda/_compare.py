@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from joda.files import check_target, write_together
 from joda.measured.adequacy import Adequacy, adequacy
 from joda.measured.comparison import Comparison, sentences
-from joda.measured.curves import curve_error, failing_force
+from joda.measured.curves import curve_error, curves_verdict, failing_force
 from joda.measured.errors import Errors, errors, known
 from joda.measured.failing import LENGTHS, Failing, where, window_rows
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
@@ -69,6 +69,7 @@ def compare(
     places, length = _failing(measured, found, short, judged)
     described = measured.profile.joint
     note = timestep_note(measured, found.window) if found.runs else None
+    forces = tuple(failing_force(measured.curves, described))
     comparison = Comparison(
         joint=described.name,
         unit=described.unit,
@@ -80,7 +81,8 @@ def compare(
         failing=tuple(places),
         failing_window=length,
         curves=tuple(curve_error(curve, described) for curve in measured.curves),
-        failing_force=tuple(failing_force(measured.curves, described)),
+        curves_adequacy=curves_verdict(measured.curves, forces) if measured.curves else None,
+        failing_force=forces,
         notes=(
             *(note for note in measured.notes if note != measured.barred),
             *left_out(measured.runs, LENGTHS[0]),

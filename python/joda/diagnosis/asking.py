@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from joda._templates import templates
 from joda.diagnosis.baseline import Base, base_of, single_for, units_of, usable, windows_for
@@ -12,6 +13,8 @@ from joda.diagnosis.judge import Fit, Judge
 from joda.diagnosis.knocks import knock_guess
 from joda.joints.single import Single
 from joda.measured.reading import Measured
+
+Array = NDArray[np.float64]
 
 RESTITUTION = "end_stop_restitution"
 """Effect that only knocks tell of."""
@@ -77,16 +80,24 @@ class Rough:
         return min(self.fits, key=lambda fit: fit.loss)
 
 
-def asked(measured: Measured, length: float | None = None) -> Asked:
-    """Fits the model's own strengths in windows of some length (s); None: by the joint's pace."""
+def asked(measured: Measured, length: float | None = None, near: Array | None = None) -> Asked:
+    """Fits the model's own strengths.
+
+    Args:
+        measured: the joint and its runs.
+        length: of the windows, s; None: by the joint's pace.
+        near: factors of the strengths with which a fit begins besides, as shorter windows told
+            them: in longer ones a model that is far off is fitted less easily.
+    """
     windows = windows_for(measured, length)
     judge = Judge(windows, usable(windows))
     base = base_of(measured.profile, single_for(measured, windows.h), windows.h)
     ones = np.ones(len(base.places))
     given = replace(judge.started(base.solo(ones)), x=ones)
-    fits = [
-        judge.fit(base.solo, base.unknowns, ones, start) for start in (windows.start, given.start)
-    ]
+    begun = [(ones, windows.start), (ones, given.start)]
+    if near is not None:
+        begun.append((near, judge.started(base.solo(near)).start))
+    fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in begun]
     fit = judge.refit(base.solo, base.unknowns, min(fits, key=lambda f: f.loss))
     every = hypotheses(units_of(windows, measured), templates(), measured.profile)
     return Asked(judge, base, measured.single, fit, begins(judge, base, given, fit), tuple(every))

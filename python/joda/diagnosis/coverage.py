@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import usable, windows_for
+from joda.measured.curves import TOO_LOUD, too_loud
 from joda.measured.gauge import Gauged
 from joda.measured.reading import Measured
 from joda.measured.slow import one_way, ways
@@ -46,3 +47,9 @@ def too_little(measured: Measured) -> str:
             f"The joint moves in {moving} windows of {windows.length:.2g} s; {WINDOWS} are needed."
         )
     return ""
+
+
+def too_noisy(measured: Measured) -> str:
+    """Why curves that show nothing beyond their noise clear nothing; nothing if they do."""
+    loud = not measured.runs and any(map(too_loud, measured.curves))
+    return f"{TOO_LOUD[0].upper()}{TOO_LOUD[1:]}" if loud else ""

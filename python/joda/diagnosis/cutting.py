@@ -22,8 +22,9 @@ FEWEST = 12
 """Samples that a window has at least."""
 MOST = 160
 """Samples of a window that count at most; of more, every second or third does."""
-STEPS = 300
-"""Steps that a window has at least."""
+STEPS, KNOCKING = 120, 300
+"""Steps that a window has at least; and where the joint comes to an end of its range, as the stop
+acts within a few of them."""
 STOP = 0.004
 """How near an end of the range, in normalised position, counts as touching it."""
 HOP = 0.25
@@ -58,7 +59,8 @@ def windows_of(
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
-    h = _step(timestep, length, usual) if fine else timestep
+    fewest = KNOCKING if _touches(runs, sigmas, span, lo) else STEPS
+    h = _step(timestep, length, usual, fewest) if fine else timestep
     parts: list[tuple[NDArray[Any], ...]] = []
     samples: list[tuple[NDArray[Any], ...]] = []
     step, count = 0, 0
@@ -114,18 +116,28 @@ def windows_of(
     )
 
 
-def _step(timestep: float, length: float, usual: float) -> float:
+def _step(timestep: float, length: float, usual: float, fewest: int) -> float:
     """A part or a multiple of the scene's timestep (s) that is short for windows of some length.
 
     Args:
         timestep: the scene's, s.
         length: of the windows, s.
         usual: length of windows by the joint's pace, s; only for its sake are steps longer.
+        fewest: steps of a window.
     """
-    wanted = min(length / STEPS, max(timestep, usual / STEPS))
+    wanted = min(length / fewest, max(timestep, usual / fewest))
     if wanted < timestep:
         return float(timestep / np.ceil(timestep / wanted))
     return float(timestep * np.floor(wanted / timestep + 1e-9))
+
+
+def _touches(runs: Sequence[Run], sigmas: Sequence[float], span: float, lo: float) -> bool:
+    """Whether a run comes to an end of the range."""
+    for run, sigma in zip(runs, sigmas, strict=True):
+        away = min(run.position.min() - lo, lo + span - run.position.max())
+        if away < STOP * span + 3 * sigma:
+            return True
+    return False
 
 
 def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from joda.diagnosis.asking import asked
+from joda.diagnosis.asking import Asked, asked
 from joda.diagnosis.better import FALLEN, worse
 from joda.diagnosis.given import FAITHFUL, SHARED, Departures, departures, restored
 from joda.diagnosis.hypotheses import Hypothesis
@@ -29,6 +29,10 @@ LIKELIER = 2 * float(np.log(20))
 """How much less that loss, twice a negative log-likelihood, must be at least: a model that was not
 fitted to data makes them 20 times likelier than the true one does in one of 20 cases at most."""
 NO_LESS = "it does not lower the error on what was held out of the fit"
+OWN = (
+    "the model's own numbers, fitted without it, do as well on what was held out; joda refine fits "
+    "them"
+)
 NO_MORE = 1.1
 """Error before, in units of the noise, up to which what was held out tells nothing."""
 NOTHING_LEFT = (
@@ -118,7 +122,8 @@ def mend(
     given = given or train.profile
     trials = Trials(train, held)
     with threadpool_limits(1, BLAS):
-        starts = _starts(train, effect, direction, near)
+        begun = asked(train)
+        starts = _starts(begun, effect, direction, near)
         tried = [one for start in starts for one in trials.reshaped(start, effect, told)]
         loss = trials.unseen.loss(train.profile)
 
@@ -159,6 +164,13 @@ def mend(
         if other and not _clearly(first.unseen, other.unseen):
             first, after = other, error_then
             departs = departures(given, first.profile, effect, near)
+    if departs.parts:
+        told("the model's own numbers without the effect")
+        own = checked(begun.base.written(begun.fit.x))
+        with threadpool_limits(1, BLAS):
+            without = min(one.unseen for one in trials.reshaped(own, effect, told))
+        if not _clearly(first.unseen, without):
+            return Mended(train.profile, None, before, before, OWN)
     return Mended(first.profile, effect, before, after, departs=departs)
 
 
@@ -176,10 +188,9 @@ def _clearly(loss: float, than: float) -> bool:
 
 
 def _starts(
-    train: Measured, effect: str, direction: str | None, near: tuple[float, float] | None
+    begun: Asked, effect: str, direction: str | None, near: tuple[float, float] | None
 ) -> list[Profile]:
     """The profile with the effect at its most likely place, and if that is elsewhere, near one."""
-    begun = asked(train)
     every = [h for h in begun.hypotheses if h.effect == effect]
     tried = [h for h in every if direction in (None, h.direction)] or every
     guesses = [found for h in tried if (found := begun.tell(h))]

@@ -99,13 +99,13 @@ def explained(
     name = named(effect)
     return (
         f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} "
-        f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}: {shows}. {_extrapolated(unvisited)}"
+        f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}: {shows}. {extrapolated(unvisited)}"
         f"With it, windows held out of the fit are missed by {after:.2g} "
         f"instead of {before:.2g} {error_unit} (noise {noise:.2g} {error_unit})."
     )
 
 
-def _extrapolated(unvisited: tuple[tuple[float, float], ...]) -> str:
+def extrapolated(unvisited: tuple[tuple[float, float], ...]) -> str:
     """That it is not known where no run has been, as a sentence; nothing if all was visited, but
     for what is too narrow to be told."""
     ends = [(f"{a:.2f}", f"{b:.2f}") for a, b in unvisited]

@@ -17,6 +17,7 @@ from joda.effects import (
 )
 from joda.effects.base import CurveEffect
 from joda.field import merge
+from joda.joints.resistance import damping, friction_bounds
 from joda.measured import smoothing
 from joda.measured.reading import Measured
 from joda.measured.visited import visited_share
@@ -27,6 +28,8 @@ Interval = tuple[float, float]
 
 EXCESS = 10.0
 """How many times what the runs can need an effect's force may be at most."""
+RESISTED = 0.2
+"""Least part of the model's resistance that is left to a joint that no recorded force moves."""
 VISITED = 0.25
 """Least part of an effect's interval that runs must have visited."""
 GRID = 201
@@ -43,6 +46,11 @@ def implausible(needs: "Needs | None", profile: Profile, effect: str | None = No
     """
     if needs is None:
         return None
+    if needs.unresisted(profile):
+        return (
+            "it works only in a joint with next to no friction and damping, much less than the "
+            "model has, and no force is recorded: something may have moved the joint"
+        )
     force = needs.exerted(divided(profile, effect)[0] if effect else profile)
     if force <= EXCESS * needs.force:
         return None
@@ -74,6 +82,8 @@ class Needs:
         force: what the runs can need: inertia times acceleration, the recorded force, gravity, and
             what the model has already; N·m or N.
         visited: from where to where runs have been, in normalised position.
+        resistance: of the model, at half the speed; N·m or N.
+        forced: whether a force is recorded in any run.
     """
 
     def __init__(self, measured: Measured) -> None:
@@ -89,6 +99,8 @@ class Needs:
         gravity = max(map(abs, measured.context.gravity_force))
         inertia = measured.single.inertia * self.acceleration
         self.force = inertia + applied + gravity + self.exerted(measured.profile)
+        self.resistance = self._resisted(measured.profile)
+        self.forced = any(run.forced for run in measured.runs)
 
     def exerted(self, profile: Profile) -> float:
         """Largest force of a profile where and as fast as runs went, N·m or N."""
@@ -100,6 +112,17 @@ class Needs:
                 most = float(np.abs(merge(channel)(grid)[0]).max())
                 total += most * (self.speed if name == "damping" else 1.0)
         return total + self._of(profile.effects)
+
+    def unresisted(self, profile: Profile) -> bool:
+        """Whether a fit has taken nearly all resistance from a joint that moves by itself."""
+        return not self.forced and self._resisted(profile) < RESISTED * self.resistance
+
+    def _resisted(self, profile: Profile) -> float:
+        """Friction and damping where runs went, at half their speed, in the mean; N·m or N."""
+        s, v = np.linspace(*self.visited, GRID), self.speed / 2
+        friction = np.concatenate(friction_bounds(profile, s, v))
+        drag = np.concatenate([damping(profile, s, v), damping(profile, s, -v)])
+        return float(friction.mean() + v * drag.mean())
 
     def _of(self, effects: Sequence[AnyEffect]) -> float:
         total = 0.0

@@ -1,14 +1,16 @@
 """The verdict as a sentence."""
 
 from joda.diagnosis import phrases
+from joda.diagnosis.baseline import Base
 from joda.diagnosis.findings import Finding
+from joda.diagnosis.guessing import Array, Guess
 from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.weighing import MUCH, Weighed
 
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
-OFF = 0.05
-"""By how much a strength must be off to be worth a word."""
+OFF, FAR_OFF = 0.05, 0.3
+"""By how much a strength must be off to be worth a word; and where something else is missing."""
 EVEN = 0.5
 """Probability above which an answer is more likely than not."""
 SAME = (
@@ -16,25 +18,52 @@ SAME = (
     "the same"
 )
 BOUNCY = "The ends of the range throw the joint back more than the model's: not explained."
+BLIND = (
+    " What the model misses is less than what was taken for noise, part of which may be what the "
+    "joint does between two samples: record faster."
+)
 SUREST = 0.99
 """Highest probability that is said."""
 
 
 def strengths_off(ranking: Ranking) -> str:
     """Which of the model's own strengths are off, as a further sentence."""
-    factors = [
-        f"{name} \N{MULTIPLICATION SIGN} {factor:.2f}"
-        for (name, _), factor in zip(ranking.asked.base.places, ranking.asked.fit.x, strict=True)
-        if abs(factor - 1) > OFF
-    ]
-    return f" Its own numbers are off: {', '.join(factors)}." if factors else ""
+    factors = _factors(ranking.asked.base, ranking.asked.fit.x, OFF)
+    return f" Its own numbers are off: {factors}." if factors else ""
 
 
-def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool) -> str:
-    """The verdict in a sentence, where something is missing; bouncy: the ends, as in `Ranking`.
+def strengths_beside(base: Base, guess: Guess) -> str:
+    """Which of them are far off with an effect, as a further sentence."""
+    factors = _factors(base, guess.fit.x[: len(base.places)], FAR_OFF)
+    return f" The model's own numbers are off besides: {factors}." if factors else ""
+
+
+def _factors(base: Base, x: Array, least: float) -> str:
+    return ", ".join(
+        f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.2f}"
+        for place, factor in zip(base.places, x, strict=True)
+        if abs(factor - 1) > least
+    )
+
+
+def _label(base: Base, place: tuple[str, int]) -> str:
+    """A component's own name, or its channel's."""
+    channel, number = place
+    return getattr(base.profile.channels, channel).components[number].label or channel
+
+
+def summarised(first: Finding, weighed: Weighed, floor: float, one_way: bool, bouncy: bool) -> str:
+    """The verdict in a sentence, where something is missing.
 
     "Missing is" is said only of an answer that is more likely than not, and with which the error on
-    windows held out of the fit falls.
+    windows held out of the fit falls from more than the noise.
+
+    Args:
+        first: the likeliest effect.
+        weighed: the ranking's probabilities.
+        floor: noise of the measurement, in the unit of the errors held out.
+        one_way: whether the joint was moved in one direction only.
+        bouncy: of the ends, as in `Ranking`.
     """
     name = phrases.named(first.effect)
     others = " or ".join(map(phrases.named, first.indistinguishable_from))
@@ -48,14 +77,14 @@ def summarised(first: Finding, weighed: Weighed, one_way: bool, bouncy: bool) ->
             f"Something is missing that no known effect explains. Best guess: {name} ({likely}); "
             "but with it windows held out of the fit are missed as much."
         )
+    blind = first.held_out_error_before < floor
+    probability = _sum(first, weighed) if others else first.probability
+    head = "Missing is" if probability > EVEN and not blind else "Best guess:"
+    more = BLIND if blind else ""
     if others:
         why = SAME if one_way else ": these data cannot tell which"
-        return f"{_head(_sum(first, weighed))} {either}{why}."
-    return f"{_head(first.probability)} {name} ({likely})."
-
-
-def _head(probability: float) -> str:
-    return "Missing is" if probability > EVEN else "Best guess:"
+        return f"{head} {either}{why}.{more}"
+    return f"{head} {name} ({likely}).{more}"
 
 
 def _sum(first: Finding, weighed: Weighed) -> float:

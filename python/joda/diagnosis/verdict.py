@@ -7,14 +7,15 @@ import numpy as np
 
 from joda.diagnosis.asking import asked
 from joda.diagnosis.baseline import joined, usable, windows_for
-from joda.diagnosis.coverage import moved_one_way, too_little
+from joda.diagnosis.coverage import moved_one_way, too_little, too_noisy
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.phrases import explained
+from joda.diagnosis.plausible import unseen_place
 from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
 from joda.diagnosis.ranking import Ranking, Told, rank
 from joda.diagnosis.rivals import indistinguishable
-from joda.diagnosis.summary import BOUNCY, strengths_off, summarised
+from joda.diagnosis.summary import BOUNCY, strengths_beside, strengths_off, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, excess_of, weigh
 from joda.diagnosis.whole import BEYOND, worst
@@ -27,8 +28,7 @@ from joda.profile import Profile
 LONGER, LONGEST = 9.0, 1.5
 """How much longer the windows of a second look are, and at most how long, s."""
 NOTICED = 0.1
-"""Excess per sample of the model in longer windows from which effects are sought there too,
-although there was none in shorter ones."""
+"""Excess per sample of the model in a second look from which that tells of effects."""
 SLOWEST = 0.02
 """Part of the range per second that a motion is proposed at, at the least."""
 STRICTLY, LOOSELY = 0.7, 3.0
@@ -61,6 +61,10 @@ WITHOUT = (
 )
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
+OUT_THERE = (
+    "Something is missing that acts from s = {:.2f} on, where no run was or hardly any: what it is "
+    "these data cannot tell, an obstacle, another end of the range, a latch."
+)
 NO_EFFECT = "Something is missing that no known effect explains."
 
 
@@ -104,16 +108,17 @@ def diagnosed(
     puzzling = ranking if weighed.verdict == "unexplained" and measured.runs else None
     if weighed.verdict == "unexplained":
         again, anew = _looked_again(measured, ranking, strictness, exclude, told)
-        if anew.verdict == "missing_effect" or anew.share < weighed.share:
+        better = anew.verdict == "missing_effect" or anew.share < weighed.share
+        if better and anew.excess[0] > NOTICED:  # else nothing shows there to be explained
             ranking, weighed = again, anew
     elif weighed.verdict == "adequate" and measured.runs:
-        longer = asked(measured, _longer(ranking))
+        longer = asked(measured, _longer(ranking), ranking.asked.fit.x)
         if excess_of(longer) > NOTICED:
             again = rank(longer, exclude, told)
             anew = weigh(again, STRICTLY, wholly=True)
             if anew.verdict != "adequate" and anew.excess[0] > NOTICED:
                 ranking, weighed = again, anew
-    if weighed.verdict == "adequate" and (why := too_little(measured)):
+    if weighed.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if weighed.verdict == "adequate":
         return Diagnosed(_calm(measured, ranking))
@@ -132,12 +137,18 @@ def diagnosed(
         why = BOUNCY if ranking.bouncy else NO_EFFECT
         said = _said(measured, "unexplained", why, (), experiment)
         return Diagnosed(said, puzzling=puzzling)
+    if unseen_place(measured, every[sized[0]].interval):
+        a, b = every[sized[0]].interval
+        edge = a if a > 0.0 else b
+        said = _said(measured, "unexplained", OUT_THERE.format(edge), (), experiment)
+        return Diagnosed(said, puzzling=puzzling)
     findings = tuple(every[k] for k in sized)
     profile = ranking.guesses[sized[0]].written(ranking.asked.base)
     first = findings[0]
     helps = first.held_out_error_after < first.held_out_error_before
     verdict = weighed.verdict if helps else "unexplained"
-    summary = summarised(first, weighed, one_way, ranking.bouncy)
+    summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy)
+    summary += strengths_beside(ranking.asked.base, ranking.guesses[sized[0]])
     likely = tuple(one for one in findings if one.probability >= WORTH_NAMING)
     said = _said(measured, verdict, summary, likely, experiment)
     return Diagnosed(said, profile if likely else None, findings, puzzling)
@@ -154,7 +165,7 @@ def _looked_again(
     """
     judge = first.asked.judge
     if measured.runs:
-        ranking = rank(asked(measured, _longer(first)), exclude, told)
+        ranking = rank(asked(measured, _longer(first), first.asked.fit.x), exclude, told)
         return ranking, weigh(ranking, STRICTLY, wholly=True)
     best = first.guesses[0].fit if first.guesses else first.asked.fit
     left = best.squares / np.maximum(judge.windows.count, 1)

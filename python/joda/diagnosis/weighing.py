@@ -60,9 +60,10 @@ class Weighed:
 
     @property
     def share(self) -> float:
-        """Part of the model's excess that the first guess leaves."""
+        """Part of the model's excess that the first guess leaves; all where that is too little to
+        be told from what every guess leaves."""
         own, left = self.excess
-        return left[0] / max(own, LITTLE) if left else 1.0
+        return left[0] / own if left and own > LITTLE else 1.0
 
 
 def excess_of(asked: Asked) -> float:

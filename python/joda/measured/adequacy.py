@@ -131,19 +131,20 @@ def residual_pattern(rows: Array) -> float | None:
     if len(rows) < WINDOWS:
         return None
     sign = rows[:, FORCE] > 0
-    values = [_sign_test(sign[way]) for way in (rows[:, 2] > 0, rows[:, 2] < 0)]
+    values = [sign_test(sign[way]) for way in (rows[:, 2] > 0, rows[:, 2] < 0)]
     values += [
-        _runs_test(sign[np.argsort(key, kind="stable")])
+        runs_test(sign[np.argsort(key, kind="stable")])
         for key in (np.arange(len(rows)), rows[:, 0], rows[:, 1])
     ]
     return float(min(1.0, len(values) * min(values)))
 
 
-def _sign_test(sign: NDArray[np.bool_]) -> float:
+def sign_test(sign: NDArray[np.bool_]) -> float:
+    """Two-sided: as uneven a number of either sign by chance."""
     return float(binomtest(int(sign.sum()), len(sign)).pvalue) if len(sign) else 1.0
 
 
-def _runs_test(sign: NDArray[np.bool_]) -> float:
+def runs_test(sign: NDArray[np.bool_]) -> float:
     """One-sided, normal approximation: fewer runs of one sign than by chance."""
     n, a = len(sign), int(sign.sum())
     b = n - a

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from json import dumps
 
-from joda.measured.adequacy import MULTIPLE, Adequacy
+from joda.measured.adequacy import MULTIPLE, Adequacy, Adequate
 from joda.measured.curves import CurveError, FailingForce, told
 from joda.measured.errors import Missed, RunError
 from joda.measured.failing import Failing
@@ -28,6 +28,7 @@ class Comparison:
         failing: where it fails, the largest share first.
         failing_window: length of the windows that show it, s; 0: pieces of whole runs.
         curves: errors by quasi-static curve.
+        curves_adequacy: whether the curves show one; None without a curve.
         failing_force: where its quasi-static force fails, the largest share first.
         notes: what is suspicious about the data, a sentence each.
         contacts: of the scene that resist the joint where it was measured.
@@ -43,6 +44,7 @@ class Comparison:
     failing: tuple[Failing, ...]
     failing_window: float
     curves: tuple[CurveError, ...]
+    curves_adequacy: Adequate | None
     failing_force: tuple[FailingForce, ...]
     notes: tuple[str, ...]
     contacts: tuple[Contact, ...]
@@ -58,6 +60,7 @@ class Comparison:
             "failing": [vars(place) for place in self.failing],
             "failing_window": self.failing_window,
             "curves": [vars(curve) for curve in self.curves],
+            "curves_adequacy": self.curves_adequacy,
             "failing_force": [vars(place) for place in self.failing_force],
             "notes": list(self.notes),
             "contacts": [vars(contact) for contact in self.contacts],
@@ -67,7 +70,7 @@ class Comparison:
 
 def sentences(comparison: Comparison) -> list[str]:
     """The comparison for a person: how far off, where most."""
-    curves = told(comparison.curves, comparison.failing_force)
+    curves = told(comparison.curves, comparison.failing_force, comparison.curves_adequacy)
     return (_of_runs(comparison) if comparison.runs else []) + curves
 
 

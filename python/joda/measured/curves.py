@@ -5,15 +5,29 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from joda.measured.adequacy import CHANCE, Adequate, runs_test, sign_test
 from joda.measured.gauge import Gauged
-from joda.measured.places import BINS, places
+from joda.measured.places import BINS, places, significant
 from joda.profile import Joint
 
 SAID = 0.1
 """What is less than this share of the larger one is not said."""
 MOST = 6
 """Most places that are told."""
+AGREE = 0.5
+"""Least mean error of a direction, in units of its RMS, that is the direction's: what changes its
+sign is the place's."""
+LOUD = 0.3
+"""Noise, in units of the measured force's RMS, from which a curve gives no all-clear."""
+TOO_LOUD = (
+    "what the force does from sample to sample is much of all that it does, whether that is noise "
+    "or the joint's own; measure each place on the way there and on the way back, or at places "
+    "nearer together."
+)
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -85,11 +99,14 @@ def failing_force(curves: Sequence[Gauged], joint: Joint) -> list[FailingForce]:
     ):
         for interval, inside in places(edges, values, found, apart=by == "direction"):
             means = [excess[inside & (way == d)].mean() for d in (1, -1) if d in way[inside]]
+            error = float(np.sqrt(np.mean(excess[inside] ** 2)))
+            if by == "direction" and max(map(abs, means)) < AGREE * error:
+                continue
             out.append(
                 FailingForce(
                     by=by,  # type: ignore[arg-type]
                     interval=interval,
-                    error=float(np.sqrt(np.mean(excess[inside] ** 2))),
+                    error=error,
                     force=float(np.mean(means)),
                     friction=float(means[1] - means[0]) / 2 if len(means) == 2 else None,
                     share=float(beyond[inside].sum() / beyond.sum()),
@@ -99,7 +116,44 @@ def failing_force(curves: Sequence[Gauged], joint: Joint) -> list[FailingForce]:
     return sorted(out, key=lambda place: -place.share)
 
 
-def told(errors: Sequence[CurveError], failing: Sequence[FailingForce]) -> list[str]:
+def curves_verdict(curves: Sequence[Gauged], failing: Sequence[FailingForce]) -> Adequate:
+    """Whether the model's quasi-static force is within the noise: in size, and without a pattern.
+
+    Noise that is a good part of the force may be what changes from sample to sample instead: then
+    nothing is cleared.
+    """
+    rows = [np.stack([np.ones(len(z)), np.ones(len(z)), z**2], axis=1) for z in map(_z, curves)]
+    beyond = failing or any(map(significant, rows))
+    if beyond or any(_pattern(curve) < CHANCE for curve in curves):
+        return "beyond_noise"
+    return "not_enough_data" if any(map(too_loud, curves)) else "within_noise"
+
+
+def too_loud(curve: Gauged) -> bool:
+    """Whether a curve's noise, or what changes from sample to sample, is much of its force."""
+    return curve.sigma > LOUD * float(np.sqrt(np.mean(curve.curve.force**2)))
+
+
+def _z(curve: Gauged) -> Array:
+    return curve.excess / curve.cautious
+
+
+def _pattern(curve: Gauged) -> float:
+    """Probability of signs of the excess along the way as uneven as these, were the model true."""
+    known = curve.direction != 0
+    position, way = curve.curve.position[known], curve.direction[known]
+    excess = curve.excess
+    tests: list[float] = []
+    for one in (1, -1):
+        there = np.flatnonzero((way == one) & (excess != 0.0))
+        sign = excess[there[np.argsort(position[there], kind="stable")]] > 0
+        tests += [runs_test(sign), sign_test(sign)]
+    return min(1.0, len(tests) * min(tests))
+
+
+def told(
+    errors: Sequence[CurveError], failing: Sequence[FailingForce], verdict: Adequate | None
+) -> list[str]:
     """The curves for a person: how far off the model's force is, where most."""
     if not errors:
         return []
@@ -109,8 +163,12 @@ def told(errors: Sequence[CurveError], failing: Sequence[FailingForce]) -> list[
         f"the measured one, whose noise is {error.noise_floor_force:.2g} {unit}."
         for error in errors
     ]
-    if not failing:
+    if verdict == "within_noise":
         out.append("No force beyond the noise: the curves show no fault of the model.")
+    elif verdict == "not_enough_data":
+        out.append(f"Not enough to tell whether the model is right: {TOO_LOUD}")
+    elif not failing:
+        out.append("Small, but not noise: the signs or the size of the force's error are not.")
     return out + [_told(place, unit) for place in failing[:MOST]]
 
 
@@ -120,6 +178,9 @@ def _told(place: FailingForce, unit: str) -> str:
     if place.by == "direction":
         where = "while moving towards " + ("+q" if b > 0 else "\N{MINUS SIGN}q")
     least = SAID * max(abs(place.force), abs(friction))
+    share = f"By {place.by}: {100 * place.share:.0f} % of the force's error is {where}, where"
+    if max(abs(place.force), abs(friction)) < AGREE * place.error:
+        return f"{share} the model is off by {place.error:.2g} {unit} RMS, with either sign."
     what = []
     if abs(place.force) >= least:
         much = "much" if place.force > 0 else "little"
@@ -127,7 +188,4 @@ def _told(place: FailingForce, unit: str) -> str:
     if place.friction is not None and abs(friction) >= least:
         much = "much" if friction > 0 else "little"
         what.append(f"has {abs(friction):.2g} {unit} too {much} friction")
-    return (
-        f"By {place.by}: {100 * place.share:.0f} % of the force's error is {where}, where the "
-        f"model {' and '.join(what)}."
-    )
+    return f"{share} the model {' and '.join(what)}."

@@ -31,6 +31,8 @@ SLOW = 0.8
 """Noise of at least so many usual steps between samples blurs a turn."""
 LEAST = 5
 """Fewest samples in one direction that tell the noise."""
+SAME = 0.1
+"""Distance of two samples that are at the same place, in usual distances of one way's samples."""
 CAUTION = 2.0
 """How far the noise may be underestimated: one plus this, divided by the root of the samples."""
 
@@ -149,10 +151,12 @@ def position_noise(position: Array) -> float:
 
 
 def force_noise(position: Array, force: Array, direction: Array) -> float:
-    """Noise of the force, N·m or N, from its differences over position in either direction.
+    """Noise of the force, N·m or N, from its differences over position.
 
-    The smaller one of what second and fourth differences tell: curves' corners are in more fourth
-    differences, what bends all along is in second ones.
+    The smallest one of three: what second and what fourth differences in either direction tell, as
+    curves' corners are in more fourth differences, and what bends all along is in second ones; and
+    what second differences of the way there minus the way back tell, at the same places, where any
+    force by position cancels, however much it changes from sample to sample.
 
     Args:
         position: rad or m, shape (n,).
@@ -173,7 +177,29 @@ def force_noise(position: Array, force: Array, direction: Array) -> float:
             noises = np.array([_second_differences(x, y), smoothing.noise(x, y)])
             squares, samples = squares + len(there) * noises**2, samples + len(there)
     white = float(np.sqrt(squares.min() / max(samples, 1)))
+    white = min(white, _between_ways(position, force, direction))
     return max(white, smoothing.resolution(force) / 12**0.5)
+
+
+def _between_ways(position: Array, force: Array, direction: Array) -> float:
+    """Noise by the difference of both ways at the same places; infinite for fewer than 5 of them.
+
+    Places are the same within a part of the usual distance of one way's samples.
+    """
+    up, down = (
+        there[np.argsort(position[there], kind="stable")]
+        for there in (np.flatnonzero(direction == way) for way in (1, -1))
+    )
+    if min(len(up), len(down)) < LEAST:
+        return np.inf
+    usual = float(np.median(np.diff(position[up])))
+    at = np.clip(np.searchsorted(position[down], position[up]), 1, len(down) - 1)
+    at -= position[up] - position[down[at - 1]] < position[down[at]] - position[up]
+    same = np.abs(position[down[at]] - position[up]) <= SAME * usual
+    x = position[up[same]] + 1e-9 * usual * np.arange(same.sum())
+    if len(x) < LEAST or not usual > 0:
+        return np.inf
+    return _second_differences(x, force[up[same]] - force[down[at[same]]]) / 2**0.5
 
 
 def _second_differences(x: Array, y: Array) -> float:

@@ -10,6 +10,7 @@ from joda.measured.smoothing import resolution
 from joda.measured.suspicions.base import Kind, Suspicion, suspect
 from joda.measured.suspicions.clock import too_slow, wrong_clock
 from joda.measured.suspicions.columns import counted, unread
+from joda.measured.suspicions.energy import driven
 from joda.measured.suspicions.force import balance_of_curve, balance_of_run, too_large, wrong_sign
 from joda.measured.suspicions.position import coarse, hardly_moved, noise, placed
 from joda.measured.suspicions.timing import gapped, repeated, slowly_sampled, uneven
@@ -54,6 +55,7 @@ def suspicions(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
             "slow_sampling": slowly_sampled(run, position, step, unit),
             "velocity": wrong_velocity(run, position, unit),
             "force_sign": wrong_sign(balance_of_run(run, position, sigma, context)),
+            "driven": driven(run, position, sigma, unit),
         }
     else:
         sentences |= {"force_sign": wrong_sign(balance_of_curve(run, position))}

@@ -25,6 +25,7 @@ Kind = Literal[
     "slow_sampling",
     "velocity",
     "force_sign",
+    "driven",
 ]
 
 FATAL = {"short", "clock", "degrees", "millimetres", "ticks", "sign", "zero", "force_size"}
