@@ -66,6 +66,7 @@ def compared(folder: Path, law, **kind) -> Comparison:
     return compare(folder / "model.xml", "door", [folder / measured.curves[0].curve.name])
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("per_click", [2.3, 3.0, 4.0])
 @pytest.mark.parametrize("apart", [0.0, 0.3])
 def test_clicks_as_narrow_as_the_samples_are_no_noise(tmp_path, per_click, apart):

@@ -178,6 +178,7 @@ def test_an_effect_gets_no_credit_for_numbers_that_were_wrong(tmp_path, rng):
         assert mended.reason == OWN
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("near", [(0.55, 0.75), (0.05, 0.25)])
 def test_an_effect_that_acts_elsewhere_than_diagnosed_is_told(tmp_path, rng, near):
     x, y = (0, 0.25, 0.5, 0.75, 1), (0, 1.0, 0, -1.0, 0)

@@ -66,6 +66,7 @@ def ends_named(found):
     return [one.interval for one in found.effects if one.effect == RESTITUTION]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("low", "high", "place"),
     [(0.1, 0.6, (0.98, 1.0)), (0.5, 0.1, (0.0, 0.02)), (0.4, 0.45, (0.0, 1.0)), (0.1, 0.1, None)],

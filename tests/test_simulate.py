@@ -187,6 +187,7 @@ def test_a_scene_begins_at_home(slide):
     assert run.position == pytest.approx(0.3, abs=1e-6)
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     "what",
     [
@@ -262,6 +263,7 @@ def test_the_command_writes_and_tells(microwave, tmp_path):
     assert (told["csv"], told["unit"], told["seconds"]) == ("run.csv", "rad", pytest.approx(3.0))
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("alone", "says"),
     [
@@ -280,6 +282,7 @@ def test_an_interaction_may_stand_alone(microwave, tmp_path, alone, says, last):
     assert says in result.stdout
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -69,6 +69,7 @@ def test_a_joint_that_never_moves_is_held_out_all_the_same(tmp_path, rng):
     assert "moves" not in held_out(measured, held)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("count", [1, 3])
 def test_an_effect_of_a_joint_that_comes_to_rest_is_added(tmp_path, rng, count):
     drag = rng.uniform(0.01, 0.03)

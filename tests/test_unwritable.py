@@ -116,6 +116,7 @@ ALL_OR_NONE = [
 ]
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("command", ALL_OR_NONE)
 def test_there_is_room_for_some_of_the_files_only(command, forked, tmp_path):
     fill(tmp_path)
