@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.windows import Array, Windows, rows_of
 from joda.joints.single import Single
-from joda.measured.gauge import static_force
+from joda.measured.gauge import gravity, held_force
 from joda.measured.reading import Measured
 from joda.profile import Profile
 
@@ -56,6 +56,7 @@ def curve_windows(measured: Measured) -> CurveWindows:
     at, force, direction, doubt, window, run = (np.concatenate(x) for x in zip(*parts, strict=True))
     rows = rows_of(window, count)
     n, most = len(force), rows.shape[1]
+    weight = gravity(measured.context, at)
     spread = np.where(rows >= 0, doubt[rows], np.inf)
     return CurveWindows(
         h=measured.timestep,
@@ -73,5 +74,5 @@ def curve_windows(measured: Measured) -> CurveWindows:
         whitener=np.einsum("mi,ij->mij", 1 / spread, np.eye(most)),
         knocks=np.zeros(count, bool),
         rests=np.zeros(count, bool),
-        model=lambda profile: static_force(profile, measured.context, at, direction),
+        model=lambda profile: held_force(profile, weight, at, direction),
     )

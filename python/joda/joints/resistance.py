@@ -1,4 +1,4 @@
-"""Friction and damping of a profile with its effects, in NumPy: the reference for pictures."""
+"""Friction and damping of a profile with its effects, for pictures and quasi-static curves."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
-from joda.field.reference import evaluate
+from joda.field import merge
 from joda.profile import Channel, Profile
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ def friction_bounds(
         two arrays of shape (n,), N·m or N; the friction force is between minus the first and the
         second.
     """
-    both = evaluate(profile.channels.friction, s)[0]
+    both = merge(profile.channels.friction)(s)[0]
     sides = {"positive": np.zeros_like(both), "negative": np.zeros_like(both)}
     for effect in profile.effects:
         if isinstance(effect, StribeckFriction):
@@ -57,7 +57,7 @@ def damping(profile: Profile, s: ArrayLike, v: float) -> Array:
     Returns:
         shape (n,), N·m·s/rad or N·s/m.
     """
-    out = evaluate(profile.channels.damping, s)[0]
+    out = merge(profile.channels.damping)(s)[0]
     direction = "positive" if v > 0 else "negative"
     for effect in profile.effects:
         if isinstance(effect, DirectionDependentDamping) and effect.direction == direction:
@@ -69,4 +69,4 @@ def damping(profile: Profile, s: ArrayLike, v: float) -> Array:
 
 def _curve(curve: Curve, s: ArrayLike) -> Array:
     component = Component(interval=curve.interval, x=curve.x, y=curve.y)
-    return evaluate(Channel(components=(component,)), s)[0]
+    return merge(Channel(components=(component,)))(s)[0]

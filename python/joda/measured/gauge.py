@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from joda._context import Context
 from joda.effects import GravityOffset, LoadDependentFriction
 from joda.errors import JodaError
-from joda.field.reference import evaluate
+from joda.field import merge
 from joda.joints.resistance import friction_bounds
 from joda.joints.rig import gravity_factors
 from joda.measured import smoothing
@@ -115,10 +115,14 @@ def static_force(
     Raises:
         JodaError: friction grows with the load as fast as the load or faster.
     """
+    return held_force(profile, gravity(context, position), position, direction)
+
+
+def held_force(profile: Profile, weight: Array, position: Array, direction: Array | float) -> Array:
+    """The same where gravity's force (N·m or N, shape (n,)) is known: for many profiles."""
     lo, hi = profile.joint.range
-    s = (position - lo) / (hi - lo)
-    weight, growth = _gravity(context, position), 0.0
-    own = evaluate(profile.channels.conservative, s)[0]
+    s, growth = (position - lo) / (hi - lo), 0.0
+    own = merge(profile.channels.conservative)(s)[0]
     for effect in profile.effects:
         if isinstance(effect, GravityOffset):
             own = own + effect.sin * np.sin(position) + effect.cos * np.cos(position) + effect.force
@@ -136,8 +140,8 @@ def static_force(
     return np.asarray(load - weight)
 
 
-def _gravity(context: Context, position: Array) -> Array:
-    """Gravity's force, as on the rig; N·m or N."""
+def gravity(context: Context, position: Array) -> Array:
+    """Gravity's force at positions (rad or m), as on the rig; N·m or N, shape (n,)."""
     if context.joint.type == "slide":
         return np.full(len(position), context.gravity_force[0])
     cos, sin = gravity_factors(context)
