@@ -146,5 +146,6 @@ def _reason(run: Run, whole: float, windows: Sequence[Window]) -> str | None:
     if not np.isfinite(whole):
         return "its force is unknown from near its beginning, so only windows of it are replayed"
     if not windows:
-        return "no window of 0.4 s has enough samples of known force"
+        known_force = " of known force" if run.forced else ""
+        return f"no window of 0.4 s has enough samples{known_force}"
     return None
