@@ -59,7 +59,7 @@ def windows_of(
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
-    fewest = KNOCKING if _touches(runs, sigmas, span, lo) else STEPS
+    fewest = KNOCKING if _knocking(runs, sigmas, span, lo) else STEPS
     h = _step(timestep, length, usual, fewest) if fine else timestep
     parts: list[tuple[NDArray[Any], ...]] = []
     samples: list[tuple[NDArray[Any], ...]] = []
@@ -131,13 +131,14 @@ def _step(timestep: float, length: float, usual: float, fewest: int) -> float:
     return float(timestep * np.floor(wanted / timestep + 1e-9))
 
 
-def _touches(runs: Sequence[Run], sigmas: Sequence[float], span: float, lo: float) -> bool:
-    """Whether a run comes to an end of the range."""
-    for run, sigma in zip(runs, sigmas, strict=True):
-        away = min(run.position.min() - lo, lo + span - run.position.max())
-        if away < STOP * span + 3 * sigma:
-            return True
-    return False
+def _knocking(runs: Sequence[Run], sigmas: Sequence[float], span: float, lo: float) -> bool:
+    """Whether the joint comes to an end of its range in any run."""
+    return any(
+        _knock((run.position[piece] - lo) / span, np.full(len(run.time[piece]), sigma / span))
+        is not None
+        for run, sigma in zip(runs, sigmas, strict=True)
+        for piece in known(run)
+    )
 
 
 def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
