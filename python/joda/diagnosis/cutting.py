@@ -22,9 +22,8 @@ FEWEST = 12
 """Samples that a window has at least."""
 MOST = 160
 """Samples of a window that count at most; of more, every second or third does."""
-STEPS, KNOCKING = 120, 300
-"""Steps that a window has at least; and where the joint comes to an end of its range, as the stop
-acts within a few of them."""
+STEPS = 300
+"""Steps that a window has at least."""
 STOP = 0.004
 """How near an end of the range, in normalised position, counts as touching it."""
 HOP = 0.25
@@ -59,8 +58,7 @@ def windows_of(
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
-    fewest = KNOCKING if _knocking(runs, sigmas, span, lo) else STEPS
-    h = _step(timestep, length, usual, fewest) if fine else timestep
+    h = _step(timestep, length, usual) if fine else timestep
     parts: list[tuple[NDArray[Any], ...]] = []
     samples: list[tuple[NDArray[Any], ...]] = []
     step, count = 0, 0
@@ -116,29 +114,18 @@ def windows_of(
     )
 
 
-def _step(timestep: float, length: float, usual: float, fewest: int) -> float:
+def _step(timestep: float, length: float, usual: float) -> float:
     """A part or a multiple of the scene's timestep (s) that is short for windows of some length.
 
     Args:
         timestep: the scene's, s.
         length: of the windows, s.
         usual: length of windows by the joint's pace, s; only for its sake are steps longer.
-        fewest: steps of a window.
     """
-    wanted = min(length / fewest, max(timestep, usual / fewest))
+    wanted = min(length / STEPS, max(timestep, usual / STEPS))
     if wanted < timestep:
         return float(timestep / np.ceil(timestep / wanted))
     return float(timestep * np.floor(wanted / timestep + 1e-9))
-
-
-def _knocking(runs: Sequence[Run], sigmas: Sequence[float], span: float, lo: float) -> bool:
-    """Whether the joint comes to an end of its range in any run."""
-    return any(
-        _knock((run.position[piece] - lo) / span, np.full(len(run.time[piece]), sigma / span))
-        is not None
-        for run, sigma in zip(runs, sigmas, strict=True)
-        for piece in known(run)
-    )
 
 
 def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
