@@ -426,3 +426,24 @@ def test_the_command_takes_curves(tmp_path, rng, files):
     assert "data:image/png;base64," in page
     assert "<td>gauge.csv</td>" in page
     assert ("<td>run0.csv</td>" in page) == ("run0" in files)
+
+
+def test_what_is_read_is_never_overwritten(tmp_path, seed):
+    scene, (run, *_) = scene_of(door(), tmp_path), runs_of(door(), tmp_path, seed, 1)
+    before = run.read_bytes(), scene.read_bytes()
+    for name, kind in ((run, "json"), (scene, "report"), (run, "picture")):
+        with pytest.raises(JodaError, match=f"{name.name}: is read here"):
+            compare(scene, "joint", [run], force=True, **{kind: name})
+    one = tmp_path / "out.json"
+    with pytest.raises(JodaError, match="is the name of two files"):
+        compare(scene, "joint", [run], json=one, report=one)
+    assert not one.exists() and before == (run.read_bytes(), scene.read_bytes())
+
+
+def test_a_copy_is_no_further_measurement(tmp_path, seed):
+    scene, (run, *_) = scene_of(door(), tmp_path), runs_of(door(), tmp_path, seed, 1)
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(run.read_bytes())
+    found = compare(scene, "joint", [run, copy])
+    assert [one.file for one in found.runs] == [run.name]
+    assert any("copy.csv: holds the same as" in note for note in found.notes)

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gauging import LAWS, gauged
+from gauging import FRICTION, LAWS, SCENE, gauged
 
-from joda import compare
+from joda import compare, diagnose
 from joda.diagnosis.findings import Diagnosis
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.comparison import Comparison, sentences
@@ -100,3 +100,40 @@ def test_a_place_with_few_samples_is_beyond_the_noise(tmp_path):
     narrow = 0.6 / 24
     found = compared(tmp_path, lambda s, d: 0.5 * (abs(s - 0.5) < narrow), noise=0.01, samples=24)
     assert found.curves_adequacy == "beyond_noise"
+
+
+def test_a_coarse_gauge_clears_nothing_below_its_steps(tmp_path):
+    """A gauge in steps of 0.5 N·m on a bump of 0.22."""
+    gauged(tmp_path, lambda s, d: 0 * s)
+    q = np.concatenate([np.linspace(0.05, 1.45, 100), np.linspace(1.45, 0.05, 100)])
+    way = np.repeat([1.0, -1.0], 100)
+    force = np.round((FRICTION * way + 0.22 * np.exp(-(((q - 0.8) / 0.1) ** 2))) / 0.5) * 0.5
+    force += np.where(way > 0, 0.5, -0.5) * (force == 0)  # it reads ±0.5 everywhere
+    rows = "\n".join(f"{a:.4f},{b:.3f}" for a, b in zip(q, force, strict=True))
+    (tmp_path / "coarse.csv").write_text(f"position,force\n{rows}\n")
+    scene = SCENE.replace(f'frictionloss="{FRICTION}"', 'frictionloss="0.5"')
+    (tmp_path / "model.xml").write_text(scene)
+    line = tmp_path / "model.xml", "door", [tmp_path / "coarse.csv"]
+    found = compare(*line)
+    assert found.curves[0].noise_floor_force > 0.14
+    assert found.curves_adequacy == "not_enough_data"
+    assert diagnose(*line).verdict == "insufficient_data"
+
+
+@pytest.mark.parametrize("wobbles", ["friction", "force"])
+def test_what_either_way_tells_again_is_the_joints(tmp_path, wobbles):
+    """3.3 samples a click, a third of the friction: as friction or as a force by position."""
+
+    def law(s, d):
+        return 0.07 * np.sin(2 * np.pi * s * 75 / 3.3) * (d if wobbles == "friction" else 1.0)
+
+    found = compared(tmp_path, law, noise=0.008, samples=75)
+    assert found.curves_adequacy == "beyond_noise"
+    assert found.curves[0].noise_floor_force < 0.02
+
+
+def test_a_force_in_grams_is_doubted(tmp_path):
+    measured = gauged(tmp_path, lambda s, d: -14 * d)
+    assert any("in another unit" in note for note in measured.notes)
+    told = diagnosed(measured).diagnosis
+    assert told.summary.startswith("Best guess") and "see to its unit first" in told.summary

@@ -110,7 +110,7 @@ def add(
             effect.
     """
     target = Path(output)
-    composed, picture = beside(target, force)
+    composed, picture = beside(target, force, [*runs, diagnosis])
     told = read_diagnosis(Path(diagnosis))
     name, direction, near = _chosen(told, Path(diagnosis), effect)
     measured = read_runs(model, joint, runs, passive)

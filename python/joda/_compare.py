@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.files import check_target, write_together
+from joda.files import check_targets, write_together
 from joda.measured.adequacy import Adequacy, adequacy
 from joda.measured.comparison import Comparison, sentences
 from joda.measured.curves import curve_error, curves_verdict, failing_force
@@ -60,8 +60,7 @@ def compare(
         JodaError: a file cannot be read, or what it holds cannot be of this joint as it stands.
     """
     targets = [Path(path) for path in (json, report, picture) if path]
-    for path in targets:
-        check_target(path, force)
+    check_targets(targets, force, [model, *runs])
     measured = read_measured(model, joint, runs, passive)
     found = errors(measured, explained=True, begin=progress)
     short = window_rows(measured)

@@ -9,7 +9,7 @@ from joda.diagnosis.outcome import read_runs
 from joda.diagnosis.phrases import NAMES, named
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
-from joda.files import check_target, write_together
+from joda.files import check_targets, write_together
 from joda.measured.maps import draw_maps, draw_models, draw_runs, replayed
 from joda.measured.reading import Measured
 from joda.pictures.page import page, paragraph, table
@@ -54,9 +54,8 @@ def diagnose(
         JodaError: a file cannot be read, what it holds cannot be of this joint as it stands, or
             there is no such effect.
     """
-    for path in (json, report, picture):
-        if path:
-            check_target(Path(path), force)
+    targets = [Path(path) for path in (json, report, picture) if path]
+    check_targets(targets, force, [model, *runs])
     for name in exclude:
         check_effect(name)
     measured = read_runs(model, joint, runs, passive)

@@ -12,7 +12,7 @@ from joda.diagnosis.improving import Step, improved
 from joda.diagnosis.outcome import beside, draw_mended, nearby, read_runs, scene_files, wholes
 from joda.diagnosis.phrases import named
 from joda.diagnosis.split import held_out, in_blocks, parted
-from joda.files import check_target, write_together
+from joda.files import write_together
 from joda.measured.maps import draw_maps, draw_models, replayed
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited
@@ -92,9 +92,7 @@ def improve(
         JodaError: a file cannot be read or written, or cannot be of this joint as it stands.
     """
     target = Path(output)
-    composed, picture = beside(target, force)
-    if report:
-        check_target(Path(report), force)
+    composed, picture = beside(target, force, runs, report)
     measured = read_runs(model, joint, runs, passive)
     steps, why = improved(measured, progress)
     progress("drawing")

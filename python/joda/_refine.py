@@ -14,7 +14,7 @@ from joda._context import Context, context
 from joda.diagnosis.plausible import Needs, implausible
 from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
-from joda.files import check_target, write_together
+from joda.files import check_targets, write_together
 from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
 from joda.measured.driven import read_logs
 from joda.measured.excerpts import excerpts
@@ -128,8 +128,7 @@ def refine(
     beside = {
         kind: target.with_suffix(f".{kind}") for kind in ("composed.json", "png", "history.json")
     }
-    for path in (target, *beside.values()):
-        check_target(path, force)
+    check_targets([target, *beside.values()], force, runs)
     if unknown := set(fit) - set(KINDS):
         raise JodaError(f"fit: '{sorted(unknown)[0]}' is none of {', '.join(KINDS)}.")
     if not runs:

@@ -3,7 +3,7 @@
 import os
 import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from io import BytesIO, TextIOWrapper
 from itertools import count
 from pathlib import Path
@@ -87,6 +87,26 @@ def check_target(path: Path, force: bool) -> None:
         tempfile.TemporaryFile(dir=path.parent).close()
     except OSError as error:
         raise _unwritable(path, error) from None
+
+
+def check_targets(paths: Iterable[Path], force: bool, inputs: Iterable[str | Path] = ()) -> None:
+    """Raises JodaError if one of several files cannot be made, two have one name, or one is read.
+
+    Args:
+        paths: to be written.
+        force: whether what exists may be overwritten.
+        inputs: files that are read meanwhile: these never are.
+    """
+    read = {Path(path).resolve() for path in inputs}
+    seen: set[Path] = set()
+    for path in paths:
+        place = path.resolve()
+        if place in read:
+            raise JodaError(f"{path}: is read here; choose another name for what is written.")
+        if place in seen:
+            raise JodaError(f"{path}: is the name of two files to write; give each its own.")
+        seen.add(place)
+        check_target(path, force)
 
 
 def occupied(folder: Path) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from joda._attach import attached
 from joda.diagnosis.mending import Error
-from joda.files import check_target
+from joda.files import check_targets
 from joda.measured.excerpts import excerpts
 from joda.measured.maps import draw_models, draw_runs, shade
 from joda.measured.reading import Measured, read_measured
@@ -45,11 +45,17 @@ def read_runs(
     return replace(measured.with_runs(parts, of), notes=(*measured.notes, *ignored, *cut))
 
 
-def beside(scene: Path, force: bool) -> tuple[Path, Path]:
-    """The profile's and the picture's file beside a scene; raises JodaError if one exists."""
+def beside(
+    scene: Path, force: bool, inputs: Sequence[str | Path], report: str | Path | None = None
+) -> tuple[Path, Path]:
+    """The profile's and the picture's file beside a scene.
+
+    Raises:
+        JodaError: one of them, or of the report, exists, is read (`inputs`) or cannot be made.
+    """
     composed, picture = scene.with_suffix(".composed.json"), scene.with_suffix(".png")
-    for path in (scene, composed, picture):
-        check_target(path, force)
+    more = [Path(report)] if report else []
+    check_targets([scene, composed, picture, *more], force, inputs)
     return composed, picture
 
 

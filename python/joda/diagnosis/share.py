@@ -10,10 +10,10 @@ Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 LEVELS = (0.2, 0.1, 0.05)
-"""Parts of its rise above its least value from which an effect acts: of most; of a free curve; of
-a magnet, whose pull runs out slowly."""
-EVEN = 1e-9
-"""What part of its size a curve rises at least that is not the same all over the range."""
+"""Parts of its size from which an effect acts: of most; of a free curve; of a magnet, whose pull
+runs out slowly."""
+EVEN = 1e-12
+"""N·m, N, or these per velocity, up to which there is nothing, or no rise."""
 GRID = 401
 """Positions at which that is looked for."""
 
@@ -46,7 +46,8 @@ def _some(profile: Profile, effect: str, given: Profile | None, *, own: bool) ->
 
 
 def places(profile: Profile, effect: str, given: Profile | None = None) -> list[Interval]:
-    """Where a profile's effect acts, in normalised position, by each of the levels.
+    """Where a profile's effect acts, in normalised position, by each of the levels: of its force,
+    and of how far that rises above its least value.
 
     All over the range if it is a law.
 
@@ -60,16 +61,15 @@ def places(profile: Profile, effect: str, given: Profile | None = None) -> list[
         channel = getattr(own.channels, name)
         if channel.components:
             value = np.abs(merge(channel)(np.linspace(0, 1, GRID))[0])
-            return [_felt(value, level) for level in LEVELS]
+            return [_felt(own, level) for own in (value, value - value.min()) for level in LEVELS]
     return [(0.0, 1.0)]
 
 
 def _felt(value: Array, level: float) -> Interval:
-    """Where values over the range rise above the least of them."""
-    rise = value - value.min()
-    if rise.max() <= EVEN * value.max():
+    """Where values over the range are at least that part of the largest."""
+    if value.max() <= EVEN:
         return 0.0, 1.0
-    there = np.flatnonzero(rise >= level * rise.max())
+    there = np.flatnonzero(value >= level * value.max())
     return float(there[0]) / (GRID - 1), float(there[-1]) / (GRID - 1)
 
 

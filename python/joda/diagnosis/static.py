@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.windows import Array, Windows, rows_of
+from joda.errors import JodaError
 from joda.joints.single import Single
 from joda.measured.gauge import gravity, held_force
 from joda.measured.reading import Measured
@@ -57,6 +58,14 @@ def curve_windows(measured: Measured) -> CurveWindows:
     rows = rows_of(window, count)
     n, most = len(force), rows.shape[1]
     weight = gravity(measured.context, at)
+
+    def model(profile: Profile) -> Array:
+        """The force that slowly moves the joint; NaN where friction holds against any force."""
+        try:
+            return held_force(profile, weight, at, direction)
+        except JodaError:
+            return np.full(n, np.nan)
+
     spread = np.where(rows >= 0, doubt[rows], np.inf)
     return CurveWindows(
         h=measured.timestep,
@@ -74,5 +83,5 @@ def curve_windows(measured: Measured) -> CurveWindows:
         whitener=np.einsum("mi,ij->mij", 1 / spread, np.eye(most)),
         knocks=np.zeros(count, bool),
         rests=np.zeros(count, bool),
-        model=lambda profile: held_force(profile, weight, at, direction),
+        model=model,
     )

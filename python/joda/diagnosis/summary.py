@@ -1,14 +1,20 @@
 """The verdict as a sentence."""
 
+import numpy as np
+
 from joda.diagnosis import phrases
 from joda.diagnosis.baseline import Base
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.guessing import Array, Guess
 from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.weighing import MUCH, Weighed
+from joda.measured.gauge import OTHER_UNIT
+from joda.measured.reading import Measured
 
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
+ALIKE = 0.12
+"""By how much factors may differ that are one."""
 OFF, FAR_OFF = 0.05, 0.3
 """By how much a strength must be off to be worth a word; and where something else is missing."""
 EVEN = 0.5
@@ -38,6 +44,31 @@ def strengths_beside(base: Base, guess: Guess) -> str:
     return f" The model's own numbers are off besides: {factors}." if factors else ""
 
 
+def one_factor(base: Base, guess: Guess) -> str:
+    """That more inertia and all the model's strengths are one factor, as a further sentence: then
+    it may be that of the recorded force. Nothing if that is not so."""
+    if guess.hypothesis.effect != "added_inertia" or not base.places:
+        return ""
+    inertia = 1 + guess.hypothesis.magnitude(guess.x) / base.single.inertia
+    factors = np.array([inertia, *guess.fit.x[: len(base.places)]])
+    mean = float(factors.mean())
+    if mean < 1 + ALIKE or np.abs(factors / mean - 1).max() > ALIKE:
+        return ""
+    return (
+        f" But inertia and all of the model's own numbers are too small by one factor, about "
+        f"{mean:.2g}: the recorded force may be so many times too large (its unit, a lever arm), "
+        "and nothing be missing."
+    )
+
+
+def other_unit(measured: Measured) -> str:
+    """That the force of a curve may be in another unit, as a further sentence; nothing if not."""
+    times = max((curve.times_the_model for curve in measured.curves), default=0.0)
+    if measured.runs or times < OTHER_UNIT:
+        return ""
+    return f" But the measured force is up to {times:.0f} times the model's: see to its unit first."
+
+
 def _factors(base: Base, x: Array, least: float) -> str:
     return ", ".join(
         f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.2f}"
@@ -52,7 +83,14 @@ def _label(base: Base, place: tuple[str, int]) -> str:
     return getattr(base.profile.channels, channel).components[number].label or channel
 
 
-def summarised(first: Finding, weighed: Weighed, floor: float, one_way: bool, bouncy: bool) -> str:
+def summarised(
+    first: Finding,
+    weighed: Weighed,
+    floor: float,
+    one_way: bool,
+    bouncy: bool,
+    scaled: str = "",
+) -> str:
     """The verdict in a sentence, where something is missing.
 
     "Missing is" is said only of an answer that is more likely than not, and with which the error on
@@ -64,6 +102,7 @@ def summarised(first: Finding, weighed: Weighed, floor: float, one_way: bool, bo
         floor: noise of the measurement, in the unit of the errors held out.
         one_way: whether the joint was moved in one direction only.
         bouncy: of the ends, as in `Ranking`.
+        scaled: of `one_factor` or `other_unit`: then it is a guess.
     """
     name = phrases.named(first.effect)
     others = " or ".join(map(phrases.named, first.indistinguishable_from))
@@ -79,7 +118,7 @@ def summarised(first: Finding, weighed: Weighed, floor: float, one_way: bool, bo
         )
     blind = first.held_out_error_before < floor
     probability = _sum(first, weighed) if others else first.probability
-    head = "Missing is" if probability > EVEN and not blind else "Best guess:"
+    head = "Best guess:" if blind or scaled or probability <= EVEN else "Missing is"
     more = BLIND if blind else ""
     if others:
         why = SAME if one_way else ": these data cannot tell which"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joda.diagnosis.asking import asked
+from joda.diagnosis.asking import Asked, asked
 from joda.diagnosis.baseline import joined, usable, windows_for
 from joda.diagnosis.coverage import moved_one_way, too_little, too_noisy
 from joda.diagnosis.findings import Diagnosis, Finding
@@ -15,11 +15,19 @@ from joda.diagnosis.plausible import unseen_place
 from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
 from joda.diagnosis.ranking import Ranking, Told, rank
 from joda.diagnosis.rivals import indistinguishable
-from joda.diagnosis.summary import BOUNCY, strengths_beside, strengths_off, summarised
+from joda.diagnosis.summary import (
+    BOUNCY,
+    one_factor,
+    other_unit,
+    strengths_beside,
+    strengths_off,
+    summarised,
+)
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, excess_of, weigh
 from joda.diagnosis.whole import BEYOND, worst
 from joda.measured.adequacy import MULTIPLE
+from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import worst_missed
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
@@ -41,11 +49,19 @@ RECORD_MORE = (
     "the force if it can be measured, for some 20 s in all."
 )
 GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in both directions."
+GAUGE_AGAIN = (
+    "Measure the same again, and at places nearer together: what comes again is the joint's, what "
+    "does not is the hand's or the gauge's."
+)
 GAUGE_BACK = "Measure the way back too, as slowly."
 AGAIN = (
     "Repeat one slow motion three times, to and fro, then the same fast: what differs between "
     "repeats depends on time or on what was before, what differs with speed is a resistance, what "
     "does neither is a force over position."
+)
+UNEVEN = (
+    "Something is missing that no known effect explains: the force's error is small, but more than "
+    "noise, or with a pattern that noise has not; a hand that trembles makes one too."
 )
 DRIFTING = (
     "Something is missing that no known effect explains: windows show nothing beyond the noise, "
@@ -147,8 +163,10 @@ def diagnosed(
     first = findings[0]
     helps = first.held_out_error_after < first.held_out_error_before
     verdict = weighed.verdict if helps else "unexplained"
-    summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy)
-    summary += strengths_beside(ranking.asked.base, ranking.guesses[sized[0]])
+    base, guess = ranking.asked.base, ranking.guesses[sized[0]]
+    scaled = one_factor(base, guess) or other_unit(measured)
+    summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy, scaled)
+    summary += scaled or strengths_beside(base, guess)
     likely = tuple(one for one in findings if one.probability >= WORTH_NAMING)
     said = _said(measured, verdict, summary, likely, experiment)
     return Diagnosed(said, profile if likely else None, findings, puzzling)
@@ -181,7 +199,9 @@ def _longer(first: Ranking) -> float:
 
 
 def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
-    """No effect shows in windows: the model is adequate, unless whole runs say otherwise."""
+    """No effect shows in windows: the model is adequate, unless whole runs or curves deny it."""
+    if not measured.runs and _uneven(measured, ranking.asked):
+        return _said(measured, "unexplained", UNEVEN, (), GAUGE_AGAIN)
     if (left := worst(measured, ranking.asked)) > BEYOND:
         return _said(measured, "unexplained", DRIFTING.format(left), (), AGAIN)
     off, missed = strengths_off(ranking), worst_missed(measured)
@@ -192,6 +212,14 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
         summary = f"The model is adequate: {noise} that an effect would explain.{off}"
         summary += WITHOUT.format(missed) if missed > MULTIPLE else ""
     return _said(measured, "adequate", summary, (), None)
+
+
+def _uneven(measured: Measured, begun: Asked) -> bool:
+    """Whether curves are beyond their noise also with the model's own strengths as fitted."""
+    fitted = begun.base.written(begun.fit.x)
+    curves = [curve.against(fitted, measured.context) for curve in measured.curves]
+    failing = failing_force(curves, measured.profile.joint)
+    return curves_verdict(curves, failing) == "beyond_noise"
 
 
 def _said(

@@ -19,8 +19,10 @@ MOST = 6
 AGREE = 0.5
 """Least mean error of a direction, in units of its RMS, that is the direction's: what changes its
 sign is the place's."""
-LOUD = 0.3
+LOUD = 0.15
 """Noise, in units of the measured force's RMS, from which a curve gives no all-clear."""
+WILD = 6.0
+"""Error of a single sample, in units of the noise, that no noise makes."""
 TOO_LOUD = (
     "what the force does from sample to sample is much of all that it does, whether that is noise "
     "or the joint's own; measure each place on the way there and on the way back, or at places "
@@ -123,7 +125,7 @@ def curves_verdict(curves: Sequence[Gauged], failing: Sequence[FailingForce]) ->
     nothing is cleared.
     """
     rows = [np.stack([np.ones(len(z)), np.ones(len(z)), z**2], axis=1) for z in map(_z, curves)]
-    beyond = failing or any(map(significant, rows))
+    beyond = failing or any(significant(row) or row[:, 2].max() > WILD**2 for row in rows)
     if beyond or any(_pattern(curve) < CHANCE for curve in curves):
         return "beyond_noise"
     return "not_enough_data" if any(map(too_loud, curves)) else "within_noise"
@@ -164,11 +166,17 @@ def told(
         for error in errors
     ]
     if verdict == "within_noise":
-        out.append("No force beyond the noise: the curves show no fault of the model.")
+        out.append(
+            "No force beyond the noise: where and as densely as they were measured, the curves "
+            "show no fault of the model that is larger."
+        )
     elif verdict == "not_enough_data":
         out.append(f"Not enough to tell whether the model is right: {TOO_LOUD}")
     elif not failing:
-        out.append("Small, but not noise: the signs or the size of the force's error are not.")
+        out.append(
+            "Small, but not noise: the force's error is larger than noise makes it, or its signs "
+            "have a pattern that noise makes in fewer than 1 of 200 cases."
+        )
     return out + [_told(place, unit) for place in failing[:MOST]]
 
 

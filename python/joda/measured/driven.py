@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from joda.errors import JodaError
 from joda.measured.runs import QuasiStatic, Run, read_measurement
@@ -30,7 +31,8 @@ def read_logs(
             a column that is not supported yet, or in none.
     """
     acting = actuators_on(model, joint)
-    read, notes = [], []
+    read: list[Run | QuasiStatic] = []
+    notes: list[str] = []
     for path in map(Path, paths):
         notes += _unused(model, joint, path, acting, passive)
         one = read_measurement(path)
@@ -39,8 +41,25 @@ def read_logs(
                 f"{path}: {_driven(model, joint, acting)}, and the run has no column 'force'; "
                 "record the force on the joint, or say with --passive that the actuator was off."
             )
+        if first := next((other for other in read if _copies(one, other)), None):
+            notes.append(
+                f"{path.name}: holds the same as {first.name}, and is left out: a copy is no "
+                "further measurement."
+            )
+            continue
         read.append(one)
     return read, notes
+
+
+def _copies(one: Run | QuasiStatic, other: Run | QuasiStatic) -> bool:
+    """Whether two measurements are the same, number by number."""
+    if isinstance(one, Run) and isinstance(other, Run) and not np.array_equal(one.time, other.time):
+        return False
+    return (
+        type(one) is type(other)
+        and np.array_equal(one.position, other.position)
+        and np.array_equal(one.force, other.force, equal_nan=True)
+    )
 
 
 def _unused(

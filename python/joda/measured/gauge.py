@@ -33,6 +33,8 @@ LEAST = 5
 """Fewest samples in one direction that tell the noise."""
 SAME = 0.1
 """Distance of two samples that are at the same place, in usual distances of one way's samples."""
+OTHER_UNIT = 20.0
+"""How many times the model's largest force the measured one is that may be in another unit."""
 CAUTION = 2.0
 """How far the noise may be underestimated: one plus this, divided by the root of the samples."""
 
@@ -87,6 +89,12 @@ class Gauged:
         """Force towards +q that the model has too much where the direction is known, N·m or N."""
         known = self.direction != 0
         return np.asarray(self.curve.force[known] - self.force[known])
+
+    @property
+    def times_the_model(self) -> float:
+        """The largest measured force, in units of the model's; 0 where the model has none."""
+        own = float(np.nanmax(np.abs(self.force)))
+        return float(np.abs(self.curve.force).max()) / own if own > 0 else 0.0
 
     @property
     def cautious(self) -> Array:
@@ -157,10 +165,10 @@ def position_noise(position: Array) -> float:
 def force_noise(position: Array, force: Array, direction: Array) -> float:
     """Noise of the force, N·m or N, from its differences over position.
 
-    The smallest one of three: what second and what fourth differences in either direction tell, as
+    The smallest one that second and fourth differences tell: of the force in either direction, as
     curves' corners are in more fourth differences, and what bends all along is in second ones; and
-    what second differences of the way there minus the way back tell, at the same places, where any
-    force by position cancels, however much it changes from sample to sample.
+    of the way there minus and plus the way back, at the same places, where a force by position or
+    friction cancels however much it changes from sample to sample.
 
     Args:
         position: rad or m, shape (n,).
@@ -186,7 +194,8 @@ def force_noise(position: Array, force: Array, direction: Array) -> float:
 
 
 def _between_ways(position: Array, force: Array, direction: Array) -> float:
-    """Noise by the difference of both ways at the same places; infinite for fewer than 5 of them.
+    """Noise by the difference or the sum of both ways at the same places, which friction or a force
+    by position are not in; infinite for fewer than 5 places.
 
     Places are the same within a part of the usual distance of one way's samples.
     """
@@ -203,7 +212,8 @@ def _between_ways(position: Array, force: Array, direction: Array) -> float:
     x = position[up[same]] + 1e-9 * usual * np.arange(same.sum())
     if len(x) < LEAST or not usual > 0:
         return np.inf
-    return _second_differences(x, force[up[same]] - force[down[at[same]]]) / 2**0.5
+    there, back = force[up[same]], force[down[at[same]]]
+    return min(_second_differences(x, y) for y in (there - back, there + back)) / 2**0.5
 
 
 def _second_differences(x: Array, y: Array) -> float:
@@ -293,5 +303,11 @@ def gauged(curve: QuasiStatic, profile: Profile, context: Context) -> tuple[Gaug
     noise = force_noise(position, curve.force, direction)
     sigma = max(noise, 1e-6 * float(np.abs(curve.force).max()))
     empty = np.zeros(len(position))
-    alone = Gauged(curve, direction, blur, empty, sigma, empty)
-    return alone.against(profile, context), notes
+    found = Gauged(curve, direction, blur, empty, sigma, empty).against(profile, context)
+    if found.times_the_model > OTHER_UNIT:
+        arm = ", times the gauge's lever arm" if unit == "N·m" else ""
+        notes.append(
+            f"{curve.name}: the measured force is up to {found.times_the_model:.0f} times the "
+            f"model's; is it in another unit (grams, m{unit})? It must be in {unit}{arm}."
+        )
+    return found, notes

@@ -25,6 +25,8 @@ CLEAR_MOTION = 10.0
 """Displacement, in noises, that tells a speed."""
 LEAST = 7
 """Fewest samples in a window."""
+COARSE = 8
+"""Samples for each step between values from which a signal of few values is quantised."""
 REST = 2.0
 """Errors within which a velocity counts as zero."""
 SOON = 0.8
@@ -155,8 +157,8 @@ def resolution(position: Array) -> float:
     values = np.unique(position)
     steps = np.diff(values)
     steps = steps[steps > 1e-6 * (values[-1] - values[0])]  # smaller ones are rounding
-    if len(steps) < 3:
-        return 0.0
+    if len(steps) < 3:  # many samples of two or three values are coarse steps
+        return float(steps.min()) if len(steps) and len(position) > COARSE * len(steps) else 0.0
     for parts in range(1, 7):  # the smallest difference that occurs may be a few steps
         step = steps.min() / parts
         near = steps[steps < 10 * step * parts]
