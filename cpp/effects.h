@@ -64,7 +64,7 @@ struct Effects {
   const char* needs_row = "";  // an effect that needs the friction row, "": none of them does
 
   bool IsAsymmetric() const {
-    return asymmetry.positive.coefficients().size() || asymmetry.negative.coefficients().size();
+    return !asymmetry.positive.Empty() || !asymmetry.negative.Empty();
   }
 };
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco
 
 from joda.errors import JodaError
-from joda.plugin import PLUGIN
+from joda.plugin import PLUGIN, set_texts
 from joda.profile import ATTRIBUTES, Profile
 from joda.scenes.model import describe_joint, find_joint, load
 
@@ -117,12 +117,7 @@ def set_profile(
     Raises:
         JodaError: the joint does not exist or carries no profile.
     """
-    import joda._core as core
-
     number = joint if isinstance(joint, int) else find_joint(model, joint)
     attributes = profile.attributes()
     texts = [attributes.get(key, "") for key in ATTRIBUTES if key != "range"]
-    try:
-        core.set_profile(model._address, data._address, number, *profile.joint.range, texts)
-    except ValueError as error:
-        raise JodaError(str(error)) from None
+    set_texts(model._address, data._address, number, profile.joint.range, texts)
