@@ -1,12 +1,37 @@
 """One joint with a profile, as small as MuJoCo allows: the physics tests' common ground."""
 
+from importlib.util import find_spec
+from operator import attrgetter
+
 import mujoco
 import numpy as np
+import pytest
 
 from joda.scenes.scene import INERT
 
 SOLVERS = ("Newton", "CG", "PGS")
 EULER_LIKE = ("Euler", "implicit", "implicitfast")
+
+
+def has(name: str) -> bool:
+    """Whether this MuJoCo has the function, constant or module."""
+    try:
+        attrgetter(name)(mujoco)
+    except AttributeError:
+        return find_spec(f"mujoco.{name}") is not None if "." not in name else False
+    return True
+
+
+def needs(*names: str) -> pytest.MarkDecorator:
+    """Skips a test where MuJoCo lacks one of them."""
+    missing = [name for name in names if not has(name)]
+    return pytest.mark.skipif(
+        bool(missing), reason=f"MuJoCo {mujoco.__version__} has no {' and no '.join(missing)}"
+    )
+
+
+DISCRETE = "mjtIntegrator.mjINT_DISCRETE"
+SLEEP = "mjtEnableBit.mjENBL_SLEEP"
 
 
 def flat(value: float, a: float = 0, b: float = 1) -> str:

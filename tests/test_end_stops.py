@@ -5,7 +5,7 @@ import re
 import mujoco
 import numpy as np
 import pytest
-from joints import EULER_LIKE, SOLVERS, load, scene
+from joints import DISCRETE, EULER_LIKE, SOLVERS, load, needs, scene
 from mujoco import rollout
 from scenes import write
 from test_split_steps import by_state, in_a_copy, path_of, split, whole, with_forward
@@ -250,6 +250,7 @@ def test_only_the_scenes_end_is_made_firm(tmp_path, end, force):
     assert any(firm in n for n in attached(tmp_path, force=-force, inertia=1e-5)[1])
 
 
+@needs(DISCRETE)
 def test_attach_says_that_the_discrete_integrator_has_no_place_for_it(tmp_path):
     one = EndStopRestitution(restitution=LOW, end="low")
     said = 'one end alone does nothing with integrator="discrete"'

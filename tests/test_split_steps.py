@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from joints import flat
+from joints import DISCRETE, flat, needs
 from mujoco import rollout
 from test_corners import MASS, H, pushed, slide
 
@@ -83,7 +83,11 @@ def by_state(model, data, force):
         mujoco.mj_setState(model, target, state, STATE)
 
 
-@pytest.mark.parametrize("step", [split, with_forward, in_a_copy, by_state])
+STEPS = [split, with_forward, pytest.param(in_a_copy, marks=needs("mj_copyData")), by_state]
+"""Ways to take a step."""
+
+
+@pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @SIDES
 def test_however_a_step_is_taken_it_is_the_same(integrator, step, effects):
@@ -136,7 +140,9 @@ def _pushes(first, last):
     return wobble(H * np.arange(first, last))[None, :, None]
 
 
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "discrete"])
+@pytest.mark.parametrize(
+    "integrator", ["Euler", "implicitfast", pytest.param("discrete", marks=needs(DISCRETE))]
+)
 def test_a_force_set_between_the_halves_of_a_step_goes_through_the_play(integrator):
     """The part is moved by the first step's h^2 F / m and no more, until the handle meets it."""
     force, inertia, play = 4.0, 0.3, 0.1

@@ -40,6 +40,8 @@ FORCE = 1.3
 
 PLUGIN_CODE = f"""
 import mujoco
+if int(mujoco.__version__.partition(".")[0]) < 4:
+    import joda
 model = mujoco.MjModel.from_xml_string('''<mujoco>
   <extension><plugin plugin="{PLUGIN}"><instance name="p">
     <config key="conservative" value="0 1 | 0 1 | 1 2"/></instance></plugin></extension>

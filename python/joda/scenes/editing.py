@@ -14,6 +14,7 @@ from joda.errors import JodaError
 from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
+from joda.scenes.engine import is_discrete, polynomial
 from joda.scenes.limits import firm_limit, limit_parameters
 from joda.scenes.mjcf import Element, MjcfError, Source, quoted
 from joda.scenes.model import joint_name, joint_type, write_out
@@ -102,7 +103,7 @@ class EditedScene:
         if "solimplimit" not in changes:
             changes |= self._bearing(joint, profile, changes)
         changes |= self._inertia(joint, profile)
-        if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
+        if is_discrete(self.model):
             changes |= self._discrete(joint)
         if not self.names[joint]:
             changes["name"] = self._new_name(joint)
@@ -187,8 +188,8 @@ class EditedScene:
         """What becomes of the joint's own damping, stiffness and frictionloss."""
         m, dof = self.model, self.model.jnt_dofadr[joint]
         values = {
-            "damping": [m.dof_damping[dof], *m.dof_dampingpoly[dof]],
-            "stiffness": [m.jnt_stiffness[joint], *m.jnt_stiffnesspoly[joint]],
+            "damping": polynomial(m, "dof_damping", dof),
+            "stiffness": polynomial(m, "jnt_stiffness", joint),
             "frictionloss": [m.dof_frictionloss[dof]],
         }
         present = {name: v for name, v in values.items() if any(v) and v != [float(TRACE)]}

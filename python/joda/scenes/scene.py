@@ -15,6 +15,9 @@ TRACE = "1e-12"
 DAMPING_ROW = "joda_damping_"
 """Begins the name of the equality constraint whose row carries a joint's damping."""
 
+MOST_JOINTS = 6
+"""Hinges and slides that one body of MuJoCo can have."""
+
 INERT = 'active="true" solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
 """Makes that constraint do nothing until the plugin sets its row."""
 
@@ -36,15 +39,24 @@ def find_instance(
     reference = spec.bodies[body].plugin
     if not reference.active:
         return None
-    if reference.plugin_name == PLUGIN:
-        name, config = "", reference.config
-    else:
-        declared = {p.name: p.config for p in spec.plugins if p.plugin_name == PLUGIN}
-        if reference.name not in declared:
-            return None
-        name, config = reference.name, declared[reference.name]
+    inside = reference.plugin_name == PLUGIN
+    if not inside and reference.name not in {
+        plugin.name for plugin in spec.plugins if plugin.plugin_name == PLUGIN
+    }:
+        return None
     alone = model.body_jntnum[body] == 1
-    return name, {k.removeprefix("0.") if alone else k: text for k, text in config.items() if text}
+    config = _attributes(model, int(model.body_plugin[body]))
+    return "" if inside else reference.name, {
+        key.removeprefix("0.") if alone else key: text for key, text in config.items() if text
+    }
+
+
+def _attributes(model: mujoco.MjModel, instance: int) -> dict[str, str]:
+    """All attributes of an instance of the plugin, in the order in which it declares them."""
+    fronts = ["", *(f"{place}." for place in range(MOST_JOINTS))]
+    texts = bytes(model.plugin_attr[model.plugin_attradr[instance] :]).split(b"\0")
+    names = [front + name for front in fronts for name in ATTRIBUTES]
+    return {name: text.decode() for name, text in zip(names, texts, strict=False)}
 
 
 def prefix(model: mujoco.MjModel, joint: int) -> str:

@@ -1,0 +1,30 @@
+"""MuJoCo from 3.3 to 4.0: what one version has and another has not, under one name."""
+
+import mujoco
+import numpy as np
+
+
+def is_discrete(model: mujoco.MjModel) -> bool:
+    """Whether the integrator is "discrete", which MuJoCo has from 3.13 on."""
+    name = mujoco.mjtIntegrator(model.opt.integrator).name
+    return bool(name == "mjINT_DISCRETE")
+
+
+def polynomial(model: mujoco.MjModel, field: str, index: int) -> list[float]:
+    """A strength of the model and those of its higher powers, which older MuJoCo has not.
+
+    Args:
+        model: any model.
+        field: "dof_damping" or "jnt_stiffness".
+        index: the degree of freedom, or the joint.
+    """
+    higher = getattr(model, f"{field}poly", None)
+    return [getattr(model, field)[index], *(() if higher is None else higher[index])]
+
+
+def inertia_at(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:
+    """Inertia of a degree of freedom, all others held, after mj_fwdPosition (kg·m² or kg)."""
+    unit, column = np.zeros(model.nv), np.zeros(model.nv)
+    unit[dof] = 1
+    mujoco.mj_mulM(model, data, column, unit)
+    return float(column[dof])
