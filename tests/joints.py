@@ -1,7 +1,7 @@
 """One joint with a profile, as small as MuJoCo allows: the physics tests' common ground."""
 
-from importlib.util import find_spec
 from operator import attrgetter
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -18,7 +18,7 @@ def has(name: str) -> bool:
     try:
         attrgetter(name)(mujoco)
     except AttributeError:
-        return find_spec(f"mujoco.{name}") is not None if "." not in name else False
+        return (Path(mujoco.__file__).parent / f"{name}.py").is_file()
     return True
 
 
@@ -31,6 +31,8 @@ def needs(*names: str) -> pytest.MarkDecorator:
 
 
 DISCRETE = "mjtIntegrator.mjINT_DISCRETE"
+SPRING = "mjtDisableBit.mjDSBL_SPRING"
+"""Before it there is one flag for springs and dampers."""
 SLEEP = "mjtEnableBit.mjENBL_SLEEP"
 
 

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from joints import DISCRETE, flat, needs
+from joints import DISCRETE, SPRING, flat, has, needs
 from mujoco import rollout
 from test_corners import MASS, H, pushed, slide
 
@@ -85,6 +85,8 @@ def by_state(model, data, force):
 
 STEPS = [split, with_forward, pytest.param(in_a_copy, marks=needs("mj_copyData")), by_state]
 """Ways to take a step."""
+ROUNDING = 0 if has(SPRING) else 1e-12
+"""Before 3.3.6, MuJoCo's own friction too goes on a little differently after mj_forward."""
 
 
 @pytest.mark.parametrize("step", STEPS)
@@ -94,7 +96,7 @@ def test_however_a_step_is_taken_it_is_the_same(integrator, step, effects):
     model, _ = slide(effects, friction=0.5, integrator=integrator)
     expected = path_of(model, whole)
     assert np.ptp(expected[:, 0]) > 0.1
-    np.testing.assert_array_equal(path_of(model, step), expected)
+    np.testing.assert_allclose(path_of(model, step), expected, rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
