@@ -23,8 +23,8 @@ namespace joda {
 
 inline constexpr double kMinWidth = 1e-9;  // narrowest interval or gap between control points
 inline constexpr double kMaxValue = 1e15;  // largest |y|; no coefficient of a cubic can overflow
-inline constexpr size_t kMaxComponents = 200;     // of one channel
-inline constexpr size_t kMaxPoints = 2000;  // of one channel: its components' together
+inline constexpr size_t kMaxComponents = 200;  // of one channel
+inline constexpr size_t kMaxPoints = 2000;     // of one channel: its components' together
 
 namespace internal {
 

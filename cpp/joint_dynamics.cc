@@ -271,6 +271,12 @@ void JointDynamics::Register() {
 
 }  // namespace joda
 
+extern "C" int joda_slot() {
+  int slot = -1;
+  mjp_getPlugin("joda.joint_dynamics", &slot);
+  return slot;
+}
+
 extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
                                 const char* const texts[7], char* error, int error_size) {
   try {
@@ -279,9 +285,7 @@ extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double l
                                   " joints, none with id " + std::to_string(joint));
     }
     const int instance = m->body_plugin[m->jnt_bodyid[joint]];
-    int slot = -1;
-    mjp_getPlugin("joda.joint_dynamics", &slot);
-    if (instance < 0 || m->plugin[instance] != slot) {
+    if (instance < 0 || m->plugin[instance] != joda_slot()) {
       throw std::invalid_argument(
           "its body carries no joda.joint_dynamics; attach a profile first");
     }

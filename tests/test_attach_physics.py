@@ -141,7 +141,7 @@ def test_two_copies_in_a_parent_both_work(tmp_path):
     assert settles(m, names, 0.4) == pytest.approx(0, abs=5e-3)
     (tmp_path / "parent.xml").write_text(parent.to_xml())
     found = read_profiles(tmp_path / "parent.xml")
-    assert list(found.values()) == [profile(name, **LATCH) for name in names]
+    assert found == {name: profile(name, **LATCH) for name in names}
     assert settles(model_of(tmp_path / "parent.xml"), names, 0.4) == pytest.approx(0, abs=5e-3)
 
 

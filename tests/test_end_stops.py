@@ -98,7 +98,9 @@ def test_the_other_end_is_the_scenes_bit_for_bit(end, joint, solver, integrator)
     assert np.abs(back - knocking("", -forces, **options)).max() > 0.01
 
 
-@pytest.mark.parametrize("flag", ["", pytest.param('diagexact="enable"', marks=needs("mjtEnableBit.mjENBL_DIAGEXACT"))])
+@pytest.mark.parametrize(
+    "flag", ["", pytest.param('diagexact="enable"', marks=needs("mjtEnableBit.mjENBL_DIAGEXACT"))]
+)
 def test_one_for_each_end_is_as_one_for_both(flag):
     """Up to the six digits that the scene has of the one for both."""
     words = zip(("solreflimit", "solimplimit"), limit_parameters(0.6, 0.002), strict=True)

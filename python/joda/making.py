@@ -13,7 +13,7 @@ from pathlib import Path
 from joda.errors import JodaError
 from joda.files import cache_folder
 
-FLAGS = "-std=c++17 -O3 -DNDEBUG -fPIC -shared -fvisibility=hidden".split()
+FLAGS = ["-std=c++17", "-O3", "-DNDEBUG", "-fPIC", "-shared", "-fvisibility=hidden"]
 """As CMake's release has them."""
 COMPILERS = "c++", "g++", "clang++"
 

@@ -75,6 +75,13 @@ def _library(running: str) -> ctypes.CDLL:
         raise JodaError(f"{path}: cannot be loaded ({error}); reinstall joda with pip.") from None
 
 
+def slot() -> int:
+    """What `mjModel.plugin` has for the plugin's instances."""
+    import mujoco
+
+    return int(_library(mujoco.mj_versionString()).joda_slot())
+
+
 def set_texts(
     model: int, data: int, joint: int, limits: tuple[float, float], texts: Sequence[str]
 ) -> None:

@@ -126,8 +126,9 @@ Trial TryNumbers(Random& random) {
     const std::vector<double> numbers = ParseNumbers(out.text);
     const auto words = internal::Words(out.text);
     out.accepted = true;
-    out.good = numbers.size() == words.size() &&
-               std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
+    out.good =
+        numbers.size() == words.size() &&
+        std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
     for (size_t k = 0; out.good && k < words.size(); ++k) {
       out.good = numbers[k] == std::strtod(std::string(words[k]).c_str(), nullptr);
     }

@@ -148,7 +148,7 @@ class EditedScene:
         """Puts the profile into the instance of the joint's body."""
         body = int(self.model.jnt_bodyid[joint])
         if body not in self.instances:
-            found = find_instance(self.spec, self.model, body)
+            found = find_instance(self.model, body)
             if found is None and self.model.body_plugin[body] >= 0:
                 raise JodaError(
                     f"the body of joint '{joint_name(self.model, joint)}' carries another plugin "
@@ -265,7 +265,7 @@ class EditedScene:
     def _inertia(self, joint: int, profile: Profile) -> dict[str, str]:
         """The armature with the profile's added inertia, without that of the one it replaces."""
         name = joint_name(self.model, joint)
-        replaced = profiles_of(self.spec, self.model).get(name)
+        replaced = profiles_of(self.model).get(name)
         before, after = replaced.added_inertia if replaced else 0.0, profile.added_inertia
         if before == after:
             return {}

@@ -3,6 +3,9 @@
 import mujoco
 import numpy as np
 
+FORGETS_INSTANCES = tuple(map(int, mujoco.__version__.split(".")[:2])) < (3, 16)
+"""Whether a <replicate> makes MuJoCo forget the plugins' instances of all bodies behind it."""
+
 
 def is_discrete(model: mujoco.MjModel) -> bool:
     """Whether the integrator is "discrete", which MuJoCo has from 3.13 on."""
