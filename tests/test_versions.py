@@ -124,5 +124,3 @@ def test_a_package_that_uses_mujoco_resolves_beside_joda(package, tmp_path):
     chosen = dict(line.split("==") for line in told.splitlines() if "==" in line)
     assert re.sub(r"\[.*", "", package).replace("_", "-") in chosen
     assert (3, 3) <= tuple(map(int, chosen["mujoco"].split(".")[:2])) <= (4, 0)
-        "."
-    )
