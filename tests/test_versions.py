@@ -91,19 +91,22 @@ def test_the_plugins_physics(python):
 def test_what_a_version_lacks_is_refused_in_a_sentence(python, tmp_path):
     if python.version == "3.17.0":
         pytest.skip("it has all that joda needs")
-    scene, profile = tmp_path / "scene.xml", tmp_path / "composed.json"
-    scene.write_text(
-        '<mujoco><option integrator="discrete"/><worldbody><body><joint name="knob"/>'
-        '<geom size=".1"/></body></worldbody></mujoco>'
+    knob = '<body><joint name="knob"/><geom size=".1"/></body>'
+    many = '<replicate count="2" offset="1 0 0"><geom size=".1"/></replicate>'
+    discrete, behind = tmp_path / "discrete.xml", tmp_path / "behind.xml"
+    discrete.write_text(
+        f'<mujoco><option integrator="discrete"/><worldbody>{knob}</worldbody></mujoco>'
     )
+    behind.write_text(f"<mujoco><worldbody>{many}{knob}</worldbody></mujoco>")
+    profile = tmp_path / "composed.json"
     joint = {"name": "knob", "type": "hinge", "range": [0, 4.71], "unit": "rad"}
     rubbing = {"interval": [0, 1], "x": [0, 1], "y": [0.1, 0.1]}
     profile.write_text(
         json.dumps({"joint": joint, "channels": {"friction": {"components": [rubbing]}}})
     )
     for model, sentence in (
-        (scene, "MuJoCo cannot load it: invalid keyword: 'discrete'"),
-        (HERE.parent / "models" / "knob.xml", "forgets instances behind a <replicate>"),
+        (discrete, "MuJoCo cannot load it: invalid keyword: 'discrete'"),
+        (behind, "forgets instances behind a <replicate>"),
     ):
         result = python("-m", "joda", "attach", model, profile, "-o", tmp_path / "new.xml")
         assert result.returncode == 2

@@ -1,9 +1,14 @@
 """MuJoCo from 3.3 to 4.0: what one version has and another has not, under one name."""
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
-FORGETS_INSTANCES = tuple(map(int, mujoco.__version__.split(".")[:2])) < (3, 16)
+from joda.errors import JodaError
+
+VERSION = tuple(int(part) for part in mujoco.__version__.split(".")[:3])
+FORGETS_INSTANCES = VERSION < (3, 16)
 """Whether a <replicate> makes MuJoCo forget the plugins' instances of all bodies behind it."""
 
 
@@ -31,3 +36,27 @@ def inertia_at(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:
     unit[dof] = 1
     mujoco.mj_mulM(model, data, column, unit)
     return float(column[dof])
+
+
+def set_strength(joint: Any, field: str, value: float) -> None:
+    """Gives a joint of an MjSpec a linear strength; from 3.9 on it begins a polynomial.
+
+    Args:
+        joint: an MjsJoint.
+        field: "damping" or "stiffness".
+        value: N·m·s/rad or N·s/m; N·m/rad or N/m.
+    """
+    if np.ndim(getattr(joint, field)):
+        getattr(joint, field)[0] = value
+    else:
+        setattr(joint, field, value)
+
+
+def require(oldest: tuple[int, int, int], what: str) -> None:
+    """Raises JodaError if MuJoCo is older than what something needs."""
+    if oldest > VERSION:
+        needed = ".".join(map(str, oldest))
+        raise JodaError(
+            f"{what} needs MuJoCo {needed} or newer, and {mujoco.__version__} is installed; run: "
+            f"pip install 'mujoco>={needed}'"
+        )
