@@ -19,7 +19,10 @@ HERE = Path(__file__).parent
 VERSIONS = ("3.3.0", "3.3.7", "3.11.0", "3.17.0")
 """metaworld's, the last of 3.3, mjlab's, and newton's; in 4.0.0 all other tests run."""
 PHYSICS = ("physics", "plugin", "attach_physics", "engine", "effects_physics", "end_stops")
-LONG = "not ten_minutes and not knocking and not any_import_order and not any_timestep"
+LONG = (
+    "not ten_minutes and not knocking and not any_import_order and not any_timestep and "
+    "not converges_to_scipys and not (terminal_speed and 0.0001)"
+)
 """What takes half of the time, and has little to do with the version."""
 BESIDE = ("mjlab", "newton[sim]", "playground", "robosuite", "metaworld", "dm_control")
 UNREACHABLE = r"ConnectionError|NewConnection|Failed to fetch|No matching distribution|dns error"
