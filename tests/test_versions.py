@@ -111,6 +111,8 @@ def test_what_a_version_lacks_is_refused_in_a_sentence(python, tmp_path):
         (discrete, "MuJoCo cannot load it: invalid keyword: 'discrete'"),
         (behind, "forgets instances behind a <replicate>"),
     ):
+        if python.version == "3.3.0" and model == behind:
+            continue  # it does not forget them yet
         result = python("-m", "joda", "attach", model, profile, "-o", tmp_path / "new.xml")
         assert result.returncode == 2
         assert result.stderr.splitlines()[-1].count(sentence) == 1

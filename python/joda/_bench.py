@@ -195,7 +195,7 @@ def _bench_scene(path: Path, progress: Callable[[str], None]) -> list[Row]:
 
 def _without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> mujoco.MjModel:
     """The scene without the plugin, with native elements of the same mean strength or none."""
-    require((3, 3, 7), "joda bench of a scene")  # older ones delete nothing from a spec
+    require((3, 3, 4), "joda bench of a scene")  # older ones delete nothing from a spec
     spec = mujoco.MjSpec.from_file(str(path))
     for body in spec.bodies:
         body.plugin.active = False

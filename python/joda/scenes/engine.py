@@ -8,7 +8,7 @@ import numpy as np
 from joda.errors import JodaError
 
 VERSION = tuple(int(part) for part in mujoco.__version__.split(".")[:3])
-FORGETS_INSTANCES = VERSION < (3, 16)
+FORGETS_INSTANCES = (3, 3, 1) <= VERSION < (3, 16)
 """Whether a <replicate> makes MuJoCo forget the plugins' instances of all bodies behind it."""
 
 
