@@ -9,7 +9,6 @@
 #ifndef JODA_ATTRIBUTES_H_
 #define JODA_ATTRIBUTES_H_
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -24,8 +23,8 @@ namespace joda {
 
 inline constexpr double kMinWidth = 1e-9;  // narrowest interval or gap between control points
 inline constexpr double kMaxValue = 1e15;  // largest |y|; no coefficient of a cubic can overflow
-inline constexpr size_t kMaxComponents = 200;     // of one channel
-inline constexpr Eigen::Index kMaxPoints = 2000;  // of one channel: its components' together
+inline constexpr size_t kMaxComponents = 200;  // of one channel
+inline constexpr size_t kMaxPoints = 2000;     // of one channel: its components' together
 
 namespace internal {
 
@@ -65,7 +64,7 @@ inline std::string Quote(std::string_view text) {
 }  // namespace internal
 
 // Numbers separated by white space; throws for anything else, infinities and NaN included.
-inline Eigen::VectorXd ParseNumbers(std::string_view text) {
+inline std::vector<double> ParseNumbers(std::string_view text) {
   std::vector<double> out;
   for (const std::string_view word : internal::Words(text)) {
     double value;
@@ -76,7 +75,7 @@ inline Eigen::VectorXd ParseNumbers(std::string_view text) {
     }
     out.push_back(value);
   }
-  return Eigen::Map<Eigen::VectorXd>(out.data(), static_cast<Eigen::Index>(out.size()));
+  return out;
 }
 
 // Throws unless the component is one that can be evaluated; `nonnegative` for friction and damping.
@@ -95,16 +94,17 @@ inline void Validate(const Component& c, bool nonnegative) {
     fail("x has " + std::to_string(c.x.size()) + " numbers and y has " +
          std::to_string(c.y.size()) + "; they must be equally many");
   }
-  const Eigen::Index n = c.x.size();
+  const size_t n = c.x.size();
   if (c.x[0] != 0 || c.x[n - 1] != 1) fail("x must begin at 0 and end at 1");
-  for (Eigen::Index k = 0; k + 1 < n; ++k) {
+  for (size_t k = 0; k + 1 < n; ++k) {
     if (!((c.x[k + 1] - c.x[k]) * (c.b - c.a) >= kMinWidth)) {
       fail("x must increase, by at least 1e-9 of the joint's range");
     }
   }
-  if (!(c.y.cwiseAbs().maxCoeff() <= kMaxValue)) fail("y must lie between -1e15 and 1e15");
-  if (nonnegative && c.y.minCoeff() < 0)
-    fail("values of friction and damping must not be negative");
+  for (const double y : c.y) {
+    if (!(std::abs(y) <= kMaxValue)) fail("y must lie between -1e15 and 1e15");
+    if (nonnegative && y < 0) fail("values of friction and damping must not be negative");
+  }
 }
 
 // One component from its three parts; it has no label.
@@ -122,7 +122,7 @@ inline Component ParseComponent(std::string_view interval, std::string_view x, s
 // Throws if the components are more than one channel may have; merging them takes the longer the
 // more there are (docs/physics.md).
 inline void CheckSize(const std::vector<Component>& components) {
-  Eigen::Index points = 0;
+  size_t points = 0;
   for (const Component& c : components) points += c.x.size();
   const bool many = components.size() > kMaxComponents;
   if (!many && points <= kMaxPoints) return;

@@ -1,7 +1,4 @@
-// joda._core in Python: the field, a joint by itself, and the swap of a profile in an existing
-// mjData.
-#include <mujoco/mujoco.h>
-#include <pybind11/eigen.h>
+// joda._core in Python: the field, and a joint by itself. It does not know MuJoCo.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -16,7 +13,6 @@
 #include "attributes.h"
 #include "end_stop.h"
 #include "field.h"
-#include "joint_dynamics.h"
 #include "solo.h"
 
 namespace py = pybind11;
@@ -26,11 +22,20 @@ namespace {
 template <typename T>
 using Dense = py::array_t<T, py::array::c_style | py::array::forcecast>;
 
-using Texts = std::array<std::string, 7>;
+using Texts = std::array<std::string, joda::kTexts>;
 
-std::array<const char*, 7> Pointers(const Texts& texts) {
-  std::array<const char*, 7> out;
+std::array<const char*, joda::kTexts> Pointers(const Texts& texts) {
+  std::array<const char*, joda::kTexts> out;
   for (size_t i = 0; i < texts.size(); ++i) out[i] = texts[i].c_str();
+  return out;
+}
+
+py::array_t<double> Coefficients(const joda::PiecewiseCubic& channel) {
+  const auto& pieces = channel.coefficients();
+  py::array_t<double> out({py::ssize_t{4}, static_cast<py::ssize_t>(pieces.size())});
+  for (size_t k = 0; k < pieces.size(); ++k) {
+    for (size_t i = 0; i < 4; ++i) out.mutable_at(i, k) = pieces[k][i];
+  }
   return out;
 }
 
@@ -82,8 +87,7 @@ std::pair<Dense<double>, Dense<double>> Replay(const joda::Solo& solo, const Den
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
-  module.doc() =
-      "C++ core of JODA: channels of a profile, a joint by itself, and profiles inside mjData.";
+  module.doc() = "C++ core of JODA: channels of a profile, and a joint by itself.";
 
   py::class_<joda::PiecewiseCubic>(module, "Channel", R"(A channel of a profile, merged at load.
 
@@ -112,30 +116,17 @@ Raises:
           py::arg("s"), "Value and slope d/ds at normalised positions s, arrays of the shape of s.")
       .def("max_descent", py::overload_cast<>(&joda::PiecewiseCubic::MaxDescent, py::const_),
            "Largest stiffness max(-dF/ds, 0) anywhere on the channel.")
-      .def_property_readonly("knots", &joda::PiecewiseCubic::knots,
-                             "Breakpoints in s, shape (n + 1,).")
-      .def_property_readonly("coefficients", &joda::PiecewiseCubic::coefficients,
+      .def_property_readonly(
+          "knots",
+          [](const joda::PiecewiseCubic& channel) {
+            return py::array_t<double>(channel.knots().size(), channel.knots().data());
+          },
+          "Breakpoints in s, shape (n + 1,).")
+      .def_property_readonly("coefficients", &Coefficients,
                              "c0..c3 of each piece about its left knot, shape (4, n).");
 
   module.def("stop_damping", &joda::StopDamping, py::arg("restitution"),
              "Damping, times the timestep, of an end stop with this restitution, 0 <= it < 1.");
-
-  module.def(
-      "set_profile",
-      [](std::uintptr_t model, std::uintptr_t data, int joint, double lo, double hi,
-         const Texts& texts) {
-        char error[1024];
-        if (joda_set_profile(reinterpret_cast<const mjModel*>(model),
-                             reinterpret_cast<mjData*>(data), joint, lo, hi, Pointers(texts).data(),
-                             error, sizeof error)) {
-          throw py::value_error(error);
-        }
-      },
-      py::arg("model_address"), py::arg("data_address"), py::arg("joint"), py::arg("lo"),
-      py::arg("hi"), py::arg("texts"),
-      "Replaces the profile of a joint in one mjData; texts: channel and combine, three times, "
-      "then "
-      "the effects.");
 
   py::class_<joda::Solo>(module, "Solo",
                          R"(A joint by itself, stepped as MuJoCo does with the plugin.

@@ -1,24 +1,19 @@
 #include "config.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
-#include <memory>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
 #include "attributes.h"
+#include "engine.h"
 
 namespace joda {
 namespace {
 
 constexpr int kMaxJoints = 6;  // hinges and slides that one MuJoCo body can have
-
-// "range", then the texts of the channels and of the effects.
-constexpr std::array<const char*, 8> kKeys = {
-    "range",           "conservative",     "conservative_combine",
-    "friction",        "friction_combine", "damping",
-    "damping_combine", "effects"};
+constexpr const char* kRange = "range";
 
 const char* Value(const mjModel* m, int instance, const std::string& key) {
   const char* value = mj_getPluginConfig(m, instance, key.c_str());
@@ -26,7 +21,8 @@ const char* Value(const mjModel* m, int instance, const std::string& key) {
 }
 
 bool IsConfigured(const mjModel* m, int instance, const std::string& prefix) {
-  return std::any_of(kKeys.begin(), kKeys.end(),
+  return *Value(m, instance, prefix + kRange) ||
+         std::any_of(std::begin(kTextNames), std::end(kTextNames),
                      [&](const char* key) { return *Value(m, instance, prefix + key); });
 }
 
@@ -77,7 +73,8 @@ int FindJoint(const mjModel* m, int body, int place) {
 }
 
 // Joint positions at s = 0 and s = 1: the attribute, or else the joint's own limits.
-std::pair<double, double> ParseRange(const mjModel* m, int joint, const char* text) {
+std::pair<double, double> ParseRange(const mjModel* m, int joint, const std::string& key,
+                                     const char* text) try {
   const mjtNum* own = m->jnt_range + 2 * joint;
   if (!*text && own[0] < own[1]) return {own[0], own[1]};
   if (!*text) {
@@ -89,39 +86,8 @@ std::pair<double, double> ParseRange(const mjModel* m, int joint, const char* te
     throw std::invalid_argument("expected two increasing numbers, got " + internal::Quote(text));
   }
   return {range[0], range[1]};
-}
-
-// Adds the attribute's name to the errors of `parse`.
-template <typename Parse>
-auto Attribute(const std::string& key, const Parse& parse) {
-  try {
-    return parse();
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument("attribute \"" + key + "\": " + error.what());
-  }
-}
-
-// A channel from its two attributes, keys[0] the components and keys[1] sum or max.
-PiecewiseCubic ParseNamed(const std::string& prefix, const char* const* keys,
-                          const char* const* texts, bool nonnegative) {
-  const Combine combine = Attribute(prefix + keys[1], [&] { return ParseCombine(texts[1]); });
-  return Attribute(prefix + keys[0],
-                   [&] { return PiecewiseCubic(ParseChannel(texts[0], nonnegative), combine); });
-}
-
-// The effects in the text, null if it is blank.
-std::shared_ptr<const Effects> ParseShared(std::string_view text) {
-  if (internal::Trim(text).empty()) return nullptr;
-  return std::make_shared<const Effects>(ParseEffects(text));
-}
-
-// As nstate cannot report errors, what cannot be read counts as without effects.
-int CountStatesOf(const char* effects) {
-  try {
-    return CountStates(ParseShared(effects).get());
-  } catch (const std::invalid_argument&) {
-    return CountStates(static_cast<const Effects*>(nullptr));
-  }
+} catch (const std::invalid_argument& error) {
+  throw std::invalid_argument("attribute \"" + key + "\": " + error.what());
 }
 
 std::string Print(double value) {
@@ -135,7 +101,7 @@ void CheckFriction(const mjModel* m, int joint, const Profile& profile) {
   const std::string effect = profile.effects ? profile.effects->needs_row : "";
   std::string what;
   if (!effect.empty()) what = "the effect \"" + effect + "\"";
-  if (!profile.friction.coefficients().isZero(0)) what = "a friction channel";
+  if (!profile.friction.IsZero()) what = "a friction channel";
   if (has_row || what.empty()) return;
   throw std::invalid_argument(JointName(m, joint) + " has " + what +
                               " but no friction row in the solver; add "
@@ -182,7 +148,7 @@ void CheckInertia(const mjModel* m, int joint, const Effects& effects) {
 
 // Throws where the integrator, or noslip, gives the effect no place in which it would be right.
 void CheckIntegrator(const mjModel* m, int joint, const Effects& effects) {
-  const bool discrete = m->opt.integrator == mjINT_DISCRETE;
+  const bool discrete = IsDiscrete(m);
   const bool noslip = m->opt.noslip_iterations > 0;
   const auto fail = [&](const char* effect, const std::string& what) {
     throw std::invalid_argument(JointName(m, joint) + " has the effect \"" + effect + "\", " +
@@ -215,9 +181,10 @@ void CheckIntegrator(const mjModel* m, int joint, const Effects& effects) {
 
 const std::vector<std::string>& AttributeNames() {
   static const std::vector<std::string> names = [] {
-    std::vector<std::string> out(kKeys.begin(), kKeys.end());
-    for (int k = 0; k < kMaxJoints; ++k) {
-      for (const char* key : kKeys) out.push_back(std::to_string(k) + "." + key);
+    std::vector<std::string> out;
+    for (int place = -1; place < kMaxJoints; ++place) {
+      out.push_back(Prefix(place) + kRange);
+      for (const char* key : kTextNames) out.push_back(Prefix(place) + key);
     }
     return out;
   }();
@@ -225,18 +192,6 @@ const std::vector<std::string>& AttributeNames() {
 }
 
 std::string JointName(const mjModel* m, int joint) { return Name(m, mjOBJ_JOINT, joint, "joint"); }
-
-Profile ParseProfile(const std::string& prefix, double lo, double hi, const char* const texts[7]) {
-  const char* const* keys = kKeys.data() + 1;
-  Profile profile;
-  profile.lo = lo;
-  profile.per_range = 1 / (hi - lo);
-  profile.conservative = ParseNamed(prefix, keys, texts, false);
-  profile.friction = ParseNamed(prefix, keys + 2, texts + 2, true);
-  profile.damping = ParseNamed(prefix, keys + 4, texts + 4, true);
-  profile.effects = Attribute(prefix + keys[6], [&] { return ParseShared(texts[6]); });
-  return profile;
-}
 
 void CheckProfile(const mjModel* m, int joint, const Profile& profile) {
   CheckFriction(m, joint, profile);
@@ -246,14 +201,12 @@ void CheckProfile(const mjModel* m, int joint, const Profile& profile) {
   CheckIntegrator(m, joint, *profile.effects);
 }
 
-int CountStates(const Effects* effects) { return effects && effects->backlash.play > 0 ? 4 : 1; }
-
 int CountStates(const mjModel* m, int instance) {
   int count = 0;
   for (int place = -1; place < kMaxJoints; ++place) {
     const std::string prefix = Prefix(place);
     if (!IsConfigured(m, instance, prefix)) continue;
-    count += CountStatesOf(Value(m, instance, prefix + kKeys.back()));
+    count += CountStates(Value(m, instance, prefix + kTextNames[kTexts - 1]));
   }
   return count;
 }
@@ -269,11 +222,11 @@ std::vector<JointConfig> ReadConfig(const mjModel* m, int instance) {
       throw std::invalid_argument(JointName(m, joint) +
                                   " is configured twice, with and without \"0.\" in front");
     }
-    std::array<const char*, kKeys.size()> texts;
-    for (size_t i = 0; i < kKeys.size(); ++i) texts[i] = Value(m, instance, prefix + kKeys[i]);
-    const auto [lo, hi] =
-        Attribute(prefix + kKeys[0], [&] { return ParseRange(m, joint, texts[0]); });
-    out.push_back({joint, ParseProfile(prefix, lo, hi, texts.data() + 1)});
+    const std::string key = prefix + kRange;
+    const auto [lo, hi] = ParseRange(m, joint, key, Value(m, instance, key));
+    const char* texts[kTexts];
+    for (int i = 0; i < kTexts; ++i) texts[i] = Value(m, instance, prefix + kTextNames[i]);
+    out.push_back({joint, ParseProfile(prefix, lo, hi, texts)});
     CheckProfile(m, joint, out.back().profile);
   }
   return out;

@@ -9,24 +9,12 @@
 
 #include <mujoco/mujoco.h>
 
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "effects.h"
-#include "field.h"
+#include "profile.h"
 
 namespace joda {
-
-// The three channels of one joint, and its effects beyond them.
-struct Profile {
-  double lo = 0;                           // joint position at s = 0 (rad or m)
-  double per_range = 1;                    // ds/dq = 1 / (position at s = 1 - lo)
-  PiecewiseCubic conservative;             // N m or N
-  PiecewiseCubic friction;                 // N m or N
-  PiecewiseCubic damping;                  // N m s/rad or N s/m
-  std::shared_ptr<const Effects> effects;  // null: none
-};
 
 struct JointConfig {
   int joint;
@@ -36,19 +24,12 @@ struct JointConfig {
 // Every attribute that an instance may have, in all spellings.
 const std::vector<std::string>& AttributeNames();
 
-// How many numbers of the engine's state the effects (null: none) need.
-int CountStates(const Effects* effects);
-
-// The same for all joints of the instance; usable before the model is complete.
+// How many numbers of the engine's state all joints of the instance need; usable before the model
+// is complete.
 int CountStates(const mjModel* m, int instance);
 
 // The joints that the instance serves; throws std::invalid_argument, one sentence.
 std::vector<JointConfig> ReadConfig(const mjModel* m, int instance);
-
-// A profile from the seven texts: components and combine of conservative, friction and damping,
-// then the effects; `prefix` stands before the attributes' names in errors.
-MJAPI Profile ParseProfile(const std::string& prefix, double lo, double hi,
-                           const char* const texts[7]);
 
 // Throws if the profile cannot act on the joint as the model has it.
 void CheckProfile(const mjModel* m, int joint, const Profile& profile);

@@ -114,7 +114,7 @@ class EffectText {
   }
 
   void PlaceCurve(PiecewiseCubic* out, const std::string& direction) const {
-    if (out->coefficients().size()) Fail("there are two of it for the " + direction + " direction");
+    if (!out->Empty()) Fail("there are two of it for the " + direction + " direction");
     *out = Curve();
   }
 

@@ -63,9 +63,7 @@ struct Effects {
   double added_inertia = 0;    // that the joint's armature must hold (kg m^2)
   const char* needs_row = "";  // an effect that needs the friction row, "": none of them does
 
-  bool IsAsymmetric() const {
-    return asymmetry.positive.coefficients().size() || asymmetry.negative.coefficients().size();
-  }
+  bool IsAsymmetric() const { return !asymmetry.positive.Empty() || !asymmetry.negative.Empty(); }
 };
 
 // Throws std::invalid_argument, one sentence; the text is the one of the attribute "effects".

@@ -7,10 +7,10 @@
 #ifndef JODA_FIELD_H_
 #define JODA_FIELD_H_
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,9 +21,9 @@ namespace joda {
 
 struct Component {
   std::string label;
-  double a, b;        // interval in s, 0 <= a < b <= 1
-  Eigen::VectorXd x;  // control points in u = (s - a) / (b - a), from 0 to 1
-  Eigen::VectorXd y;  // values in physical units
+  double a, b;            // interval in s, 0 <= a < b <= 1
+  std::vector<double> x;  // control points in u = (s - a) / (b - a), from 0 to 1
+  std::vector<double> y;  // values in physical units
 };
 
 enum class Combine { kSum, kMax };
@@ -35,18 +35,24 @@ struct Sample {
 
 namespace internal {
 
-inline Sample Cubic(const Eigen::Vector4d& c, double t) {
+inline Sample Cubic(const Coefficients& c, double t) {
   return {((c[3] * t + c[2]) * t + c[1]) * t + c[0], (3 * c[3] * t + 2 * c[2]) * t + c[1]};
 }
 
+// p + factor q.
+inline Coefficients Plus(Coefficients p, const Coefficients& q, double factor) {
+  for (size_t i = 0; i < p.size(); ++i) p[i] += factor * q[i];
+  return p;
+}
+
 // The same cubic about the origin t0.
-inline Eigen::Vector4d Shift(const Eigen::Vector4d& c, double t0) {
+inline Coefficients Shift(const Coefficients& c, double t0) {
   const Sample at = Cubic(c, t0);
   return {at.value, at.slope, 3 * c[3] * t0 + c[2], c[3]};
 }
 
 // Interior zeros of c1 + 2 c2 t + 3 c3 t^2 on (0, w): the turning points of the cubic.
-inline std::vector<double> TurningPoints(const Eigen::Vector4d& c, double w) {
+inline std::vector<double> TurningPoints(const Coefficients& c, double w) {
   std::vector<double> out;
   const double qa = 3 * c[3], qb = 2 * c[2], qc = c[1];
   const double disc = qb * qb - 4 * qa * qc;
@@ -61,7 +67,7 @@ inline std::vector<double> TurningPoints(const Eigen::Vector4d& c, double w) {
 
 // Interior sign changes of the cubic on (0, w), to rounding: bisection between turning points. A
 // turning point at zero is among them, as the cubic may cross with a level tangent.
-inline std::vector<double> Roots(const Eigen::Vector4d& c, double w) {
+inline std::vector<double> Roots(const Coefficients& c, double w) {
   std::vector<double> ends = TurningPoints(c, w), out;
   ends.insert(ends.begin(), 0);
   ends.push_back(w);
@@ -82,25 +88,29 @@ inline std::vector<double> Roots(const Eigen::Vector4d& c, double w) {
 
 // One component's cubics in s: knots t (size n + 1) and coefficients about each left knot.
 struct Local {
-  Eigen::VectorXd t;
-  Eigen::Matrix4Xd c;
+  std::vector<double> t;
+  std::vector<Coefficients> c;
 
-  explicit Local(const Component& component) {
+  explicit Local(const Component& component)
+      : t(component.x), c(PchipCubics(component.x, component.y)) {
     const double w = component.b - component.a;
-    t = component.a + (w * component.x.array());
-    t[0] = component.a;
-    t[t.size() - 1] = component.b;
-    c = PchipCubics(component.x, component.y);
-    c = Eigen::Vector4d(1, 1 / w, 1 / (w * w), 1 / (w * w * w)).asDiagonal() * c;
+    for (double& knot : t) knot = component.a + w * knot;
+    t.front() = component.a;
+    t.back() = component.b;
+    for (Coefficients& cubic : c) {
+      cubic[1] *= 1 / w;
+      cubic[2] *= 1 / (w * w);
+      cubic[3] *= 1 / (w * w * w);
+    }
   }
 
-  bool Covers(double s) const { return t[0] <= s && s <= t[t.size() - 1]; }
+  bool Covers(double s) const { return t.front() <= s && s <= t.back(); }
 
   // The cubic around s (inside the interval), about the origin s0.
-  Eigen::Vector4d About(double s, double s0) const {
+  Coefficients About(double s, double s0) const {
     const auto right = std::upper_bound(t.begin(), t.end(), s);
-    const Eigen::Index k = std::min<Eigen::Index>(right - t.begin(), c.cols()) - 1;
-    return Shift(c.col(k), s0 - t[k]);
+    const size_t k = std::min<size_t>(right - t.begin(), c.size()) - 1;
+    return Shift(c[k], s0 - t[k]);
   }
 };
 
@@ -133,36 +143,29 @@ class PiecewiseCubic {
     breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
     if (breaks.empty()) return;
 
-    std::vector<double> knots;
-    std::vector<Eigen::Vector4d> cubics;
-    const auto add = [&](double left, const Eigen::Vector4d& c) {
-      knots.push_back(left);
-      cubics.push_back(c);
+    const auto add = [&](double left, const Coefficients& c) {
+      knots_.push_back(left);
+      c_.push_back(c);
     };
     for (size_t i = 0; i + 1 < breaks.size(); ++i) {
       AddPiece(locals, combine, breaks[i], breaks[i + 1], add);
     }
-    knots.push_back(breaks.back());
-
-    const Eigen::Index n = cubics.size();
-    knots_ = Eigen::Map<Eigen::VectorXd>(knots.data(), n + 1);
-    c_.resize(4, n);
-    for (Eigen::Index k = 0; k < n; ++k) c_.col(k) = cubics[k];
-    at_knots_.reserve(n + 1);
+    knots_.push_back(breaks.back());
+    at_knots_.reserve(knots_.size());
     FillBuckets();
-    for (const double s : knots) at_knots_.push_back(AtKnot(locals, combine, s));
-    for (Eigen::Index k = 0; k < n; ++k) max_descent_ = std::max(max_descent_, Descent(k));
+    for (const double s : knots_) at_knots_.push_back(AtKnot(locals, combine, s));
+    for (size_t k = 0; k < c_.size(); ++k) max_descent_ = std::max(max_descent_, Descent(k));
   }
 
   // Value and slope at s; s beyond [0, 1] is held at the end.
   Sample operator()(double s) const {
-    const Eigen::Index n = c_.cols();
+    const size_t n = c_.size();
     if (n == 0) return {};
     const bool beyond = s < 0 || s > 1;
     s = std::clamp(s, 0.0, 1.0);
     if (!(knots_[0] <= s && s <= knots_[n])) return {};  // also where s is not a number
-    const Eigen::Index k = Piece(s);
-    Sample out = s == knots_[k] ? at_knots_[k] : internal::Cubic(c_.col(k), s - knots_[k]);
+    const size_t k = Piece(s);
+    Sample out = s == knots_[k] ? at_knots_[k] : internal::Cubic(c_[k], s - knots_[k]);
     if (beyond) out.slope = 0;
     return out;
   }
@@ -172,43 +175,53 @@ class PiecewiseCubic {
 
   // The same over the pieces that touch [lo, hi].
   double MaxDescent(double lo, double hi) const {
-    const Eigen::Index n = c_.cols();
+    const size_t n = c_.size();
     double out = 0;
     if (n == 0 || hi < knots_[0] || lo > knots_[n]) return out;
-    for (Eigen::Index k = lo > knots_[0] ? std::min(Piece(lo), n - 1) : 0; k < n && knots_[k] <= hi;
+    for (size_t k = lo > knots_[0] ? std::min(Piece(lo), n - 1) : 0; k < n && knots_[k] <= hi;
          ++k) {
       out = std::max(out, Descent(k));
     }
     return out;
   }
 
-  const Eigen::VectorXd& knots() const { return knots_; }
-  const Eigen::Matrix4Xd& coefficients() const { return c_; }
+  // Whether no component is there.
+  bool Empty() const { return c_.empty(); }
+
+  // Whether it is zero everywhere.
+  bool IsZero() const {
+    return std::all_of(c_.begin(), c_.end(), [](const Coefficients& c) {
+      return std::all_of(c.begin(), c.end(), [](double x) { return x == 0; });
+    });
+  }
+
+  const std::vector<double>& knots() const { return knots_; }
+  const std::vector<Coefficients>& coefficients() const { return c_; }
 
  private:
   static constexpr size_t kBuckets = 32;
 
   // Index of the last knot at or before s, for s within the knots: from the bucket of s onwards.
-  Eigen::Index Piece(double s) const {
-    Eigen::Index k = buckets_[static_cast<size_t>(s * kBuckets)];
-    while (k < c_.cols() && knots_[k + 1] <= s) ++k;
+  size_t Piece(double s) const {
+    size_t k = buckets_[static_cast<size_t>(s * kBuckets)];
+    while (k < c_.size() && knots_[k + 1] <= s) ++k;
     return k;
   }
 
   // First guesses for Piece: the last knot at or before the left edge of each bucket of [0, 1].
   void FillBuckets() {
-    Eigen::Index k = 0;
+    size_t k = 0;
     for (size_t i = 0; i <= kBuckets; ++i) {
       const double s = static_cast<double>(i) / kBuckets;
-      while (k < c_.cols() && knots_[k + 1] <= s) ++k;
+      while (k < c_.size() && knots_[k + 1] <= s) ++k;
       buckets_[i] = static_cast<int>(k);
     }
   }
 
   // Largest -dF/ds on piece k (or 0): a parabola, so at an end or at its vertex.
-  double Descent(Eigen::Index k) const {
+  double Descent(size_t k) const {
     const double w = knots_[k + 1] - knots_[k];
-    const Eigen::Vector4d c = c_.col(k);
+    const Coefficients c = c_[k];
     double out = std::max({0.0, -c[1], -internal::Cubic(c, w).slope});
     const double vertex = -c[2] / (3 * c[3]);
     if (vertex > 0 && vertex < w) out = std::max(out, -internal::Cubic(c, vertex).slope);
@@ -228,20 +241,20 @@ class PiecewiseCubic {
   static void AddPiece(const std::vector<internal::Local>& locals, Combine combine, double left,
                        double right, const Add& add) {
     const double w = right - left, middle = left + 0.5 * w;
-    std::vector<Eigen::Vector4d> active;
+    std::vector<Coefficients> active;
     for (const auto& local : locals) {
       if (local.Covers(middle)) active.push_back(local.About(middle, left));
     }
     if (combine == Combine::kSum || active.size() < 2) {
-      Eigen::Vector4d sum = Eigen::Vector4d::Zero();
-      for (const auto& c : active) sum += c;
+      Coefficients sum = {};
+      for (const auto& c : active) sum = internal::Plus(sum, c, 1);
       add(left, sum);
       return;
     }
     std::vector<double> cuts = {0, w};
     for (size_t i = 0; i < active.size(); ++i) {
       for (size_t j = 0; j < i; ++j) {
-        const auto roots = internal::Roots(active[i] - active[j], w);
+        const auto roots = internal::Roots(internal::Plus(active[i], active[j], -1), w);
         cuts.insert(cuts.end(), roots.begin(), roots.end());
       }
     }
@@ -252,7 +265,7 @@ class PiecewiseCubic {
       if (!(to > from) || from <= last) continue;  // two crossings within rounding
       const double t = 0.5 * (cuts[k] + cuts[k + 1]);
       const auto top = std::max_element(
-          active.begin(), active.end(), [t](const Eigen::Vector4d& p, const Eigen::Vector4d& q) {
+          active.begin(), active.end(), [t](const Coefficients& p, const Coefficients& q) {
             return internal::Cubic(p, t).value < internal::Cubic(q, t).value;
           });
       add(from, internal::Shift(*top, cuts[k]));
@@ -260,8 +273,8 @@ class PiecewiseCubic {
     }
   }
 
-  Eigen::VectorXd knots_;  // n + 1, increasing
-  Eigen::Matrix4Xd c_;     // coefficients about the left knot of each piece
+  std::vector<double> knots_;    // n + 1, increasing
+  std::vector<Coefficients> c_;  // about the left knot of each of the n pieces
   std::array<int, kBuckets + 1> buckets_{};
   std::vector<Sample> at_knots_;  // exact values at the knots, where closed intervals may meet
   double max_descent_ = 0;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "config.h"
+#include "engine.h"
 #include "rows.h"
 #include "stiffness.h"
 
@@ -131,7 +132,7 @@ void JointDynamics::SetStops(const mjModel* m, const Step& step, mjData* d, cons
     const std::ptrdiff_t dense = static_cast<std::ptrdiff_t>(row) * m->nv + joint.dof;
     const mjtNum side = d->efc_J[step.sparse ? d->efc_J_rowadr[row] : dense];
     const std::optional<double>& damping = side > 0 ? stops.low : stops.high;
-    if (damping) SetStop(step, d, row, MakeStopRow(*damping, step.h, 1 / d->efc_diagA[row]));
+    if (damping) SetStop(step, d, row, MakeStopRow(*damping, step.h, 1 / RowMobility(d, row)));
   }
 }
 
@@ -148,7 +149,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
   const Step step(m);
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   for (Joint& joint : joints_) {
-    if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
+    if (IsAsleep(d, joint.body)) continue;
     const Profile& p = joint.profile;
     const Effects* effects = p.effects.get();
     const double h = step.h, inertia = 1 / m->dof_invweight0[joint.dof], v = d->qvel[joint.dof];
@@ -209,11 +210,11 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
 }
 
 void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
-  constexpr int kNoPassive = mjDSBL_SPRING | mjDSBL_DAMPER;  // both: Compute was not called
+  constexpr int kNoPassive = kNoSpring | kNoDamper;  // both: Compute was not called
   const bool computed = (m->opt.disableflags & kNoPassive) != kNoPassive;
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   for (const Joint& joint : joints_) {
-    if (d->body_awake[joint.body] == mjS_ASLEEP) continue;
+    if (IsAsleep(d, joint.body)) continue;
     const int row = FindFrictionRow(d, joint);
     state[joint.state] = row < 0 ? 0 : d->efc_force[row];
     const Effects* effects = joint.profile.effects.get();
@@ -270,6 +271,12 @@ void JointDynamics::Register() {
 
 }  // namespace joda
 
+extern "C" int joda_slot() {
+  int slot = -1;
+  mjp_getPlugin("joda.joint_dynamics", &slot);
+  return slot;
+}
+
 extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
                                 const char* const texts[7], char* error, int error_size) {
   try {
@@ -278,9 +285,7 @@ extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double l
                                   " joints, none with id " + std::to_string(joint));
     }
     const int instance = m->body_plugin[m->jnt_bodyid[joint]];
-    int slot = -1;
-    mjp_getPlugin("joda.joint_dynamics", &slot);
-    if (instance < 0 || m->plugin[instance] != slot) {
+    if (instance < 0 || m->plugin[instance] != joda_slot()) {
       throw std::invalid_argument(
           "its body carries no joda.joint_dynamics; attach a profile first");
     }

@@ -17,6 +17,12 @@
 #include "effects.h"
 #include "rows.h"
 
+#ifdef _WIN32
+#define JODA_API __declspec(dllexport)
+#else
+#define JODA_API __attribute__((visibility("default")))
+#endif
+
 namespace joda {
 
 class JointDynamics {
@@ -75,9 +81,13 @@ class JointDynamics {
 
 }  // namespace joda
 
+// The number under which MuJoCo has the plugin: that of its instances in mjModel.plugin.
+extern "C" JODA_API int joda_slot();
+
 // Replaces the profile of `joint` in `d` only; the texts are as in the attributes. Returns 0, or -1
 // with one sentence in `error`.
-extern "C" MJAPI int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo, double hi,
-                                      const char* const texts[7], char* error, int error_size);
+extern "C" JODA_API int joda_set_profile(const mjModel* m, mjData* d, int joint, double lo,
+                                         double hi, const char* const texts[7], char* error,
+                                         int error_size);
 
 #endif  // JODA_JOINT_DYNAMICS_H_

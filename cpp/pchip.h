@@ -5,10 +5,15 @@
 #ifndef JODA_PCHIP_H_
 #define JODA_PCHIP_H_
 
-#include <Eigen/Core>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 namespace joda {
+
+// c0..c3 of the cubic c0 + c1 t + c2 t^2 + c3 t^3.
+using Coefficients = std::array<double, 4>;
 
 namespace internal {
 
@@ -25,14 +30,17 @@ inline double EndSlope(double h0, double h1, double m0, double m1) {
 }  // namespace internal
 
 // Slopes dy/dx at the n >= 2 knots x (strictly increasing) with values y.
-inline Eigen::VectorXd PchipSlopes(const Eigen::VectorXd& x, const Eigen::VectorXd& y) {
-  const Eigen::Index n = x.size();
-  const Eigen::VectorXd h = x.tail(n - 1) - x.head(n - 1);
-  const Eigen::VectorXd m = (y.tail(n - 1) - y.head(n - 1)).cwiseQuotient(h);
-  if (n == 2) return Eigen::VectorXd::Constant(2, m[0]);
+inline std::vector<double> PchipSlopes(const std::vector<double>& x, const std::vector<double>& y) {
+  const size_t n = x.size();
+  std::vector<double> h(n - 1), m(n - 1);
+  for (size_t k = 0; k + 1 < n; ++k) {
+    h[k] = x[k + 1] - x[k];
+    m[k] = (y[k + 1] - y[k]) / h[k];
+  }
+  if (n == 2) return {m[0], m[0]};
 
-  Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
-  for (Eigen::Index k = 1; k < n - 1; ++k) {
+  std::vector<double> d(n, 0);
+  for (size_t k = 1; k < n - 1; ++k) {
     if (internal::Sign(m[k - 1]) * internal::Sign(m[k]) <= 0) continue;  // extremum or flat stays
     const double w1 = 2 * h[k] + h[k - 1];
     const double w2 = h[k] + 2 * h[k - 1];
@@ -43,15 +51,15 @@ inline Eigen::VectorXd PchipSlopes(const Eigen::VectorXd& x, const Eigen::Vector
   return d;
 }
 
-// Column k holds c0..c3 of the cubic c0 + c1 t + c2 t^2 + c3 t^3, t = x - x[k], on [x[k], x[k +
-// 1]].
-inline Eigen::Matrix4Xd PchipCubics(const Eigen::VectorXd& x, const Eigen::VectorXd& y) {
-  const Eigen::VectorXd d = PchipSlopes(x, y);
-  Eigen::Matrix4Xd c(4, x.size() - 1);
-  for (Eigen::Index k = 0; k < c.cols(); ++k) {
+// The cubic of each interval [x[k], x[k + 1]] in t = x - x[k].
+inline std::vector<Coefficients> PchipCubics(const std::vector<double>& x,
+                                             const std::vector<double>& y) {
+  const std::vector<double> d = PchipSlopes(x, y);
+  std::vector<Coefficients> c(x.size() - 1);
+  for (size_t k = 0; k < c.size(); ++k) {
     const double h = x[k + 1] - x[k];
     const double m = (y[k + 1] - y[k]) / h;
-    c.col(k) << y[k], d[k], (3 * m - 2 * d[k] - d[k + 1]) / h, (d[k] + d[k + 1] - 2 * m) / (h * h);
+    c[k] = {y[k], d[k], (3 * m - 2 * d[k] - d[k + 1]) / h, (d[k] + d[k + 1] - 2 * m) / (h * h)};
   }
   return c;
 }

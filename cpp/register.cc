@@ -4,15 +4,16 @@
 
 #include <cstdio>
 
+#include "engine.h"
 #include "joint_dynamics.h"
 
-mjPLUGIN_LIB_INIT(joda_joint_dynamics) {
+JODA_AT_LOAD {
   if (mj_version() != mjVERSION_HEADER) {
     std::fprintf(stderr,
-                 "joda: this plugin was built for MuJoCo %d.%d.%d and found %s; install the joda "
-                 "that matches your MuJoCo, or the MuJoCo that matches this joda\n",
-                 mjVERSION_HEADER / 1000000, mjVERSION_HEADER / 1000 % 1000,
-                 mjVERSION_HEADER % 1000, mj_versionString());
+                 "joda: this plugin was built for MuJoCo version code %d and found %d (%s); load "
+                 "the one of your MuJoCo, which python -c \"import joda; "
+                 "print(joda.plugin_path())\" names\n",
+                 mjVERSION_HEADER, mj_version(), mj_versionString());
     return;
   }
   joda::JointDynamics::Register();

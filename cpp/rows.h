@@ -8,6 +8,7 @@
 #include <cstddef>
 
 #include "end_stop.h"
+#include "engine.h"
 
 namespace joda {
 
@@ -37,12 +38,12 @@ struct Step {
   explicit Step(const mjModel* m)
       : h(m->opt.timestep),
         per_h(1 / h),
-        spring(!(m->opt.disableflags & mjDSBL_SPRING)),
-        damper(!(m->opt.disableflags & mjDSBL_DAMPER)),
+        spring(!(m->opt.disableflags & kNoSpring)),
+        damper(!(m->opt.disableflags & kNoDamper)),
         friction(!(m->opt.disableflags & mjDSBL_FRICTIONLOSS)),
         // the discrete integrator makes the rows anew behind the plugin, and noslip drops the
         // compliance of friction rows
-        keeps_rows(m->opt.integrator != mjINT_DISCRETE && m->opt.noslip_iterations == 0),
+        keeps_rows(!IsDiscrete(m) && m->opt.noslip_iterations == 0),
         dual(m->opt.solver == mjSOL_PGS || m->opt.noslip_iterations > 0),
         sparse(mj_isSparse(m)) {}
 };
@@ -62,11 +63,7 @@ inline void SetD(const Step& step, mjData* d, int row, double D) {
   }
   d->efc_D[row] = D;
   d->efc_R[row] = R;
-  if (d->nisland > 0) {
-    const int i = d->map_efc2iefc[row];
-    d->iefc_D[i] = D;
-    d->iefc_R[i] = R;
-  }
+  CopyToIsland(d, row);
 }
 
 // Sets the reference a = -damping v - stiffness (pos - margin), which the engine computes right
@@ -81,9 +78,8 @@ inline void SetReference(mjData* d, int row, double stiffness, double damping) {
 // Makes the row resist the velocity at the end of the step: force = offset - D (a + v / h), within
 // +-bound.
 inline void SetRow(const Step& step, mjData* d, int row, double D, double bound, double offset) {
-  SetD(step, d, row, D);
   d->efc_frictionloss[row] = bound;
-  if (d->nisland > 0) d->iefc_frictionloss[d->map_efc2iefc[row]] = bound;
+  SetD(step, d, row, D);
   d->efc_pos[row] = -offset * d->efc_R[row];
   SetReference(d, row, 1, step.per_h);
 }

@@ -1,7 +1,5 @@
 #include "solo.h"
 
-#include <mujoco/mujoco.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +9,9 @@
 
 namespace joda {
 namespace {
+
+// MuJoCo's mjMINIMP, mjMAXIMP and mjMINVAL.
+constexpr double kLeastImpedance = 0.0001, kMostImpedance = 0.9999, kLeastWidth = 1e-15;
 
 // Friction: force = offset - stiff a, within +-bound.
 struct Friction {
@@ -36,7 +37,7 @@ bool IsFinite(const Solo::State& state) {
 
 }  // namespace
 
-Solo::Solo(const Body& body, const char* const texts[7])
+Solo::Solo(const Body& body, const char* const texts[kTexts])
     : body_(body), profile_(ParseProfile("", body.range[0], body.range[1], texts)) {
   if (!(body_.range[0] < body_.range[1])) {
     throw std::invalid_argument("the range must be two increasing numbers");
@@ -45,7 +46,7 @@ Solo::Solo(const Body& body, const char* const texts[7])
   if (!(body_.inertia > 0)) throw std::invalid_argument("the inertia must be positive");
   if (!(body_.row_inertia > 0)) body_.row_inertia = body_.inertia;
   for (const int k : {0, 1, 3}) {
-    body_.solimp[k] = std::clamp<double>(body_.solimp[k], mjMINIMP, mjMAXIMP);
+    body_.solimp[k] = std::clamp(body_.solimp[k], kLeastImpedance, kMostImpedance);
   }
 }
 
@@ -164,7 +165,7 @@ Solo::Limit Solo::EndAt(double h, double q, double v) const {
 
 double Solo::Impedance(double depth) const {
   const auto [dmin, dmax, width, middle, exponent] = body_.solimp;
-  if (dmin == dmax || width <= mjMINVAL) return 0.5 * (dmin + dmax);
+  if (dmin == dmax || width <= kLeastWidth) return 0.5 * (dmin + dmax);
   const double x = std::min(depth / width, 1.0);
   const double power = std::max(exponent, 1.0);
   const auto raise = [power](double base) {

@@ -11,8 +11,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "config.h"
 #include "effects.h"
+#include "profile.h"
 
 namespace joda {
 
@@ -44,7 +44,7 @@ class Solo {
   };
 
   // Throws std::invalid_argument, one sentence; the texts are as in ParseProfile.
-  Solo(const Body& body, const char* const texts[7]);
+  Solo(const Body& body, const char* const texts[kTexts]);
 
   // One step of h under the applied force.
   void Advance(double h, double force, State* state) const;

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "config.h"
 #include "effects.h"
+#include "profile.h"
 
 namespace joda {
 

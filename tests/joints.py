@@ -1,12 +1,39 @@
 """One joint with a profile, as small as MuJoCo allows: the physics tests' common ground."""
 
+from operator import attrgetter
+from pathlib import Path
+
 import mujoco
 import numpy as np
+import pytest
 
 from joda.scenes.scene import INERT
 
 SOLVERS = ("Newton", "CG", "PGS")
 EULER_LIKE = ("Euler", "implicit", "implicitfast")
+
+
+def has(name: str) -> bool:
+    """Whether this MuJoCo has the function, constant or module."""
+    try:
+        attrgetter(name)(mujoco)
+    except AttributeError:
+        return (Path(mujoco.__file__).parent / f"{name}.py").is_file()
+    return True
+
+
+def needs(*names: str) -> pytest.MarkDecorator:
+    """Skips a test where MuJoCo lacks one of them."""
+    missing = [name for name in names if not has(name)]
+    return pytest.mark.skipif(
+        bool(missing), reason=f"MuJoCo {mujoco.__version__} has no {' and no '.join(missing)}"
+    )
+
+
+DISCRETE = "mjtIntegrator.mjINT_DISCRETE"
+SPRING = "mjtDisableBit.mjDSBL_SPRING"
+"""Before it there is one flag for springs and dampers."""
+SLEEP = "mjtEnableBit.mjENBL_SLEEP"
 
 
 def flat(value: float, a: float = 0, b: float = 1) -> str:

@@ -13,8 +13,10 @@ PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 
 LAYERS = [
     {"plain"},
-    {"errors", "_build", "_core", "component"},
-    {"files", "plugin", "effects"},
+    {"errors", "_core", "component"},
+    {"files", "effects"},
+    {"making"},
+    {"plugin"},
     {"profile", "_doctor"},
     {"field", "template", "proposal"},
     {"scenes"},

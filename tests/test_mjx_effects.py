@@ -216,7 +216,7 @@ def test_end_stops_among_other_rows_are_the_plugins():
     assert (path[:, place].min(0) < 0).all() and (path[:, place].max(0) > 1).all()
     m, d = mjx.put_model(model), mjx.make_data(model)
     d = d.replace(qpos=d.qpos.at[place].set(0.5))
-    fields = joda.mjx.put_fields(model, profiles_of(mujoco.MjSpec.from_string(STOPPED), model))
+    fields = joda.mjx.put_fields(model, profiles_of(model))
     step, found = jax.jit(joda.mjx.step, compiler_options=FAST), []
     for force in forces:
         d = step(m, d.replace(qfrc_applied=jnp.asarray(force)), fields)

@@ -58,13 +58,15 @@ def test_the_wheel_has_the_package_its_data_and_its_libraries(wheel):
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
     package = {name.removeprefix("python/") for name in files("python")}
     data = {f"joda/{name}" for name in files("templates", "prompts", "models")}
-    built = names - package - data
+    sources = {name for name in names if name.startswith("joda/cpp/")}
+    built = names - package - data - sources
     assert package | data <= names
     assert {name.partition(".")[0] for name in built} == {
-        "joda/_build",
         "joda/_core",
-        "joda/libjoda_plugin",
+        "joda/plugins/libjoda_plugin-4",
     }
+    assert {"joda/cpp/joint_dynamics.cc", "joda/cpp/engine.h"} < sources
+    assert not sources - {f"joda/{name}" for name in files("cpp")}
 
 
 def test_it_works_in_a_fresh_environment_and_leaves_nothing(wheel, tmp_path):
@@ -76,7 +78,7 @@ def test_it_works_in_a_fresh_environment_and_leaves_nothing(wheel, tmp_path):
     run(*pip, "install", "-q", "--no-deps", "--ignore-installed", wheel)
     code = "import mujoco, joda, sys; from joda import _doctor; print(_doctor._plugin()[0])"
     told = run(python, "-P", "-c", code)
-    assert f"{site / 'joda' / 'libjoda_plugin'}" in told
+    assert f"{site / 'joda' / 'plugins' / 'libjoda_plugin'}" in told
     assert "gives the right force" in told
     assert run(tmp_path / "venv" / "bin" / "joda", "--version").startswith("joda ")
     run(*pip, "uninstall", "-q", "-y", "joda")

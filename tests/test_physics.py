@@ -5,7 +5,7 @@ import itertools
 import mujoco
 import numpy as np
 import pytest
-from joints import EULER_LIKE, SOLVERS, component, flat, load, run, scene
+from joints import DISCRETE, EULER_LIKE, SOLVERS, component, flat, load, needs, run, scene
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
@@ -259,6 +259,7 @@ def test_beyond_the_range_the_force_of_the_end_is_held():
         assert data.qfrc_passive[0] == pytest.approx(force)
 
 
+@needs(DISCRETE)
 class TestDiscrete:
     """The discrete integrator makes the rows anew: documented limits, never unstable."""
 

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from joints import flat
+from joints import DISCRETE, SPRING, flat, has, needs
 from mujoco import rollout
 from test_corners import MASS, H, pushed, slide
 
@@ -83,14 +83,20 @@ def by_state(model, data, force):
         mujoco.mj_setState(model, target, state, STATE)
 
 
-@pytest.mark.parametrize("step", [split, with_forward, in_a_copy, by_state])
+STEPS = [split, with_forward, pytest.param(in_a_copy, marks=needs("mj_copyData")), by_state]
+"""Ways to take a step."""
+ROUNDING = 0 if has(SPRING) else 1e-12
+"""Before 3.3.6, MuJoCo's own friction too goes on a little differently after mj_forward."""
+
+
+@pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @SIDES
 def test_however_a_step_is_taken_it_is_the_same(integrator, step, effects):
     model, _ = slide(effects, friction=0.5, integrator=integrator)
     expected = path_of(model, whole)
     assert np.ptp(expected[:, 0]) > 0.1
-    np.testing.assert_array_equal(path_of(model, step), expected)
+    np.testing.assert_allclose(path_of(model, step), expected, rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
@@ -136,7 +142,9 @@ def _pushes(first, last):
     return wobble(H * np.arange(first, last))[None, :, None]
 
 
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "discrete"])
+@pytest.mark.parametrize(
+    "integrator", ["Euler", "implicitfast", pytest.param("discrete", marks=needs(DISCRETE))]
+)
 def test_a_force_set_between_the_halves_of_a_step_goes_through_the_play(integrator):
     """The part is moved by the first step's h^2 F / m and no more, until the handle meets it."""
     force, inertia, play = 4.0, 0.3, 0.1

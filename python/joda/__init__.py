@@ -2,14 +2,16 @@
 
 Every command is a function here, of the same name and meaning: `joda.attach`, `joda.plot`, ...
 They are loaded when they are first used, and the plugin with them, so that `import joda` stays
-light: it imports neither MuJoCo nor NumPy.
+light: it imports neither MuJoCo nor NumPy. Only a MuJoCo before 4.0, which looks for no plugins,
+is imported at once.
 """
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from joda.errors import JodaError
-from joda.plugin import load, plugin_path
+from joda.plugin import load, load_into_older, plugin_path
 
 if TYPE_CHECKING:
     from joda._add import add
@@ -109,3 +111,9 @@ def __getattr__(name: str) -> Any:
     if name != "doctor":
         load()  # MuJoCo 4 did so by itself when it was imported; this says what is wrong if not
     return getattr(import_module(_LAZY[name]), name)
+
+
+try:
+    load_into_older()
+except JodaError as error:  # whatever needs the plugin says so again, and stops
+    warnings.warn(str(error), stacklevel=2)

@@ -28,6 +28,7 @@ from joda.effects import (
 from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
+from joda.scenes.engine import require, set_strength
 from joda.scenes.scene import DAMPING_ROW, INERT, TRACE, open_scene
 
 ALL_EFFECTS = (
@@ -194,6 +195,7 @@ def _bench_scene(path: Path, progress: Callable[[str], None]) -> list[Row]:
 
 def _without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> mujoco.MjModel:
     """The scene without the plugin, with native elements of the same mean strength or none."""
+    require((3, 3, 4), "joda bench of a scene")  # older ones delete nothing from a spec
     spec = mujoco.MjSpec.from_file(str(path))
     for body in spec.bodies:
         body.plugin.active = False
@@ -208,8 +210,8 @@ def _without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> m
         joint, channels = spec.joint(name), profile.channels
         mean = [float(np.mean(evaluate(c, grid)[0])) for c in (channels.friction, channels.damping)]
         joint.frictionloss, damping = mean if native else (0.0, 0.0)
-        joint.damping[0] = damping
-        joint.stiffness[0] = 0.01 if native else 0.0
+        set_strength(joint, "damping", damping)
+        set_strength(joint, "stiffness", 0.01 if native else 0.0)
     return spec.compile()
 
 

@@ -12,6 +12,7 @@ from joda.plain import line
 from joda.profile import Joint
 from joda.scenes.actuators import actuators_on
 from joda.scenes.angles import range_doubt
+from joda.scenes.engine import inertia_at
 from joda.scenes.masses import mass_doubts
 from joda.scenes.model import describe_joint, find_joint, load_model, moves_with
 from joda.scenes.motion import gravity_force
@@ -166,12 +167,10 @@ def _inertia_and_height(
 ) -> tuple[float, float]:
     """Generalised inertia of the dof, and the height (m) of what it moves."""
     mujoco.mj_fwdPosition(m, data)
-    mass = np.empty((m.nv, m.nv))
-    mujoco.mj_fullM(m, data, mass)
     up = -np.asarray(m.opt.gravity)
     length = float(np.linalg.norm(up))
     height = float(data.subtree_com[body] @ up) / length if length else 0.0
-    return float(mass[dof, dof]), height
+    return inertia_at(m, data, dof), height
 
 
 def _points(m: mujoco.MjModel, data: mujoco.MjData, body: int) -> NDArray[np.float64]:

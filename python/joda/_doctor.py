@@ -18,7 +18,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
-from joda._build import MUJOCO_VERSION
 from joda.errors import JodaError
 from joda.files import cache_folder
 from joda.plugin import PLUGIN, plugin_path
@@ -41,6 +40,8 @@ FORCE = 1.3
 
 PLUGIN_CODE = f"""
 import mujoco
+if int(mujoco.__version__.partition(".")[0]) < 4:
+    import joda
 model = mujoco.MjModel.from_xml_string('''<mujoco>
   <extension><plugin plugin="{PLUGIN}"><instance name="p">
     <config key="conservative" value="0 1 | 0 1 | 1 2"/></instance></plugin></extension>
@@ -122,14 +123,11 @@ def _cores() -> int | None:
 
 
 def _mujoco() -> Check:
-    remedy = _pip(f"mujoco=={MUJOCO_VERSION}")
+    remedy = _pip("mujoco")
     try:
         found = metadata.version("mujoco")
     except metadata.PackageNotFoundError:
         return Check("MuJoCo", "missing", "not installed", remedy, needed=True)
-    if found != MUJOCO_VERSION:
-        told = f"{found}, and joda was built for {MUJOCO_VERSION}"
-        return Check("MuJoCo", "broken", told, remedy, needed=True)
     works, told = _child("import mujoco; print(mujoco.__file__)")
     if not works:
         backend = os.environ.get("MUJOCO_GL")

@@ -25,7 +25,7 @@ from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.refining.curvefit import CurveProblem
 from joda.refining.refinement import history, picture, unseen
-from joda.scenes.model import find_joint, joint_name, load
+from joda.scenes.model import find_joint, joint_name, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
 
@@ -133,7 +133,7 @@ def refine(
         raise JodaError(f"fit: '{sorted(unknown)[0]}' is none of {', '.join(KINDS)}.")
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
-    spec, compiled = load(source)
+    compiled = load_model(source)
     number = find_joint(compiled, joint)
     (measured, unused), (held_out, more) = (
         read_logs(compiled, number, paths, passive) for paths in (runs, check)
@@ -141,7 +141,7 @@ def refine(
     if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
         raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
     name = joint_name(compiled, number)
-    profiles = profiles_of(spec, compiled)
+    profiles = profiles_of(compiled)
     if name not in profiles:
         raise JodaError(
             f"{source}: joint '{name}' carries no profile; make one with joda generate, or attach "

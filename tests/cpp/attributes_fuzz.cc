@@ -18,12 +18,12 @@ namespace joda::fuzz {
 namespace {
 
 // Places where the channel may go wrong: all over, at its knots and right beside them.
-std::vector<double> Places(Random& random, const Eigen::VectorXd& knots) {
+std::vector<double> Places(Random& random, const std::vector<double>& knots) {
   std::vector<double> out = {-1, 0, 1, 2, NAN, INFINITY};
   for (int k = 0; k < 30; ++k) out.push_back(3 * Uniform(random) - 1);
-  for (Eigen::Index k = 0; k < knots.size(); ++k) {
-    for (const double to : {-1.0, 2.0}) out.push_back(std::nextafter(knots[k], to));
-    out.push_back(knots[k]);
+  for (const double knot : knots) {
+    for (const double to : {-1.0, 2.0}) out.push_back(std::nextafter(knot, to));
+    out.push_back(knot);
   }
   return out;
 }
@@ -44,7 +44,10 @@ bool Parse(const std::string& text, const char* combine, Accepted* out) {
   } catch (const std::invalid_argument&) {
     return false;
   }
-  for (const auto& c : out->components) out->bound += c.y.cwiseAbs().maxCoeff();
+  for (const auto& c : out->components) {
+    const auto [least, most] = std::minmax_element(c.y.begin(), c.y.end());
+    out->bound += std::max(std::abs(*least), std::abs(*most));
+  }
   return true;
 }
 
@@ -120,10 +123,12 @@ Trial TryNumbers(Random& random) {
   for (int k = Below(random, 5); k > 0; --k) out.text += " " + Number(random);
   out.text = Disturb(random, out.text);
   try {
-    const Eigen::VectorXd numbers = ParseNumbers(out.text);
+    const std::vector<double> numbers = ParseNumbers(out.text);
     const auto words = internal::Words(out.text);
     out.accepted = true;
-    out.good = numbers.size() == static_cast<Eigen::Index>(words.size()) && numbers.allFinite();
+    out.good =
+        numbers.size() == words.size() &&
+        std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
     for (size_t k = 0; out.good && k < words.size(); ++k) {
       out.good = numbers[k] == std::strtod(std::string(words[k]).c_str(), nullptr);
     }

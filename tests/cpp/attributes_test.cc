@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <string>
+#include <vector>
 
 namespace joda {
 namespace {
@@ -23,8 +24,8 @@ TEST_CASE("a channel is parsed with labels, white space and a closing semicolon"
   REQUIRE(channel.size() == 2);
   CHECK(channel[0].label == "latch");
   CHECK(channel[0].b == 0.5);
-  CHECK(channel[0].x == Eigen::Vector3d(0, 0.5, 1));
-  CHECK(channel[0].y == Eigen::Vector3d(1, -2, 3));
+  CHECK(channel[0].x == std::vector<double>{0, 0.5, 1});
+  CHECK(channel[0].y == std::vector<double>{1, -2, 3});
   CHECK(channel[1].label == "");
   CHECK(channel[1].a == 0.5);
 }

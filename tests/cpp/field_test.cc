@@ -55,7 +55,7 @@ double Largest(const std::vector<double>& values) {
 }
 
 Component Line(double a, double b, double from, double to) {
-  return {"", a, b, Eigen::Vector2d(0, 1), Eigen::Vector2d(from, to)};
+  return {"", a, b, {0, 1}, {from, to}};
 }
 
 TEST_CASE("the field agrees with SciPy's golden vectors") {
@@ -104,7 +104,7 @@ TEST_CASE("a maximum of lines changes over exactly at their crossing") {
 
 TEST_CASE("a maximum changes over where the curves cross with a common tangent") {
   // cubics through (0, -1), (1/2, 0), (1, 1): 8 (t - 1/2)^3 against 0
-  const Eigen::Vector4d c(-1, 6, -12, 8);
+  const Coefficients c = {-1, 6, -12, 8};
   const auto roots = internal::Roots(c, 1);
   REQUIRE(!roots.empty());
   for (const double root : roots) CHECK(root == doctest::Approx(0.5).epsilon(1e-5));
@@ -137,7 +137,7 @@ TEST_CASE("no component covers a position that is not a number") {
 
 TEST_CASE("all three crossings of two cubics are found") {
   // 100 (t - 0.1) (t - 0.5) (t - 0.6)
-  const auto roots = internal::Roots(100 * Eigen::Vector4d(-0.03, 0.41, -1.2, 1), 1);
+  const auto roots = internal::Roots({-3, 41, -120, 100}, 1);
   REQUIRE(roots.size() == 3);
   CHECK(roots[0] == doctest::Approx(0.1).epsilon(1e-12));
   CHECK(roots[1] == doctest::Approx(0.5).epsilon(1e-12));
@@ -146,7 +146,7 @@ TEST_CASE("all three crossings of two cubics are found") {
 
 TEST_CASE("the largest descent is met at the vertex of a cubic's slope") {
   // the smooth step from 1 to 0 has its steepest slope, -1.5, in the middle
-  const Component step = {"", 0, 1, Eigen::Vector4d(0, 0.25, 0.75, 1), Eigen::Vector4d(1, 1, 0, 0)};
+  const Component step = {"", 0, 1, {0, 0.25, 0.75, 1}, {1, 1, 0, 0}};
   const PiecewiseCubic channel({step}, Combine::kSum);
   CHECK(channel.MaxDescent() == doctest::Approx(3).epsilon(1e-14));
   CHECK(channel.MaxDescent(0, 0.2) == 0);

@@ -21,7 +21,7 @@ from joda.files import check_target, make_folder, write_bytes, write_together
 from joda.measured.reading import read_measured
 from joda.plain import plain
 from joda.profile import Profile
-from joda.scenes.model import describe_joint, find_joint, joint_name, joint_type, load
+from joda.scenes.model import describe_joint, find_joint, joint_name, joint_type, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
 
@@ -67,8 +67,8 @@ class Desk:
         """
         self.folder = Folder(folder or scene.parent)
         self.scene = self.folder.inside(scene.absolute())
-        spec, self.model = load(scene)
-        carried = profiles_of(spec, self.model)
+        self.model = load_model(scene)
+        carried = profiles_of(self.model)
         self.number = find_joint(self.model, joint or self._only(list(carried)))
         self.joint = joint_name(self.model, self.number)
         self.context = context(self.scene, self.joint)

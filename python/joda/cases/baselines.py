@@ -21,6 +21,7 @@ from joda.field import evaluate
 from joda.joints.single import single
 from joda.measured.gauge import static_force
 from joda.profile import Channel, Channels, Profile, Resistance
+from joda.scenes.engine import set_strength
 from joda.scenes.model import find_joint, load, load_model
 from joda.scenes.motion import Motion
 
@@ -74,8 +75,9 @@ class Baseline:
         """
         spec, compiled = load(model)
         element = spec.joints[find_joint(compiled, joint)]
-        element.frictionloss, element.damping[0] = self.friction, self.damping
-        element.stiffness[0], element.springref = self.stiffness, self.rest
+        element.frictionloss, element.springref = self.friction, self.rest
+        set_strength(element, "damping", self.damping)
+        set_strength(element, "stiffness", self.stiffness)
         if not usual:
             element.solref_friction[:] = 0, -1 / compiled.opt.timestep
             element.solimp_friction[:2] = STIFFEST

@@ -11,7 +11,6 @@ from typing import Annotated
 import typer
 
 from joda import __version__
-from joda._build import MUJOCO_VERSION
 from joda.cli import interrupt
 from joda.cli.act import experiments, simulate, with_usual
 from joda.cli.edit import studio
@@ -22,6 +21,7 @@ from joda.cli.observe import context, plot, render
 from joda.cli.reference import doctor, schema, templates
 from joda.cli.say import complain, say
 from joda.errors import JodaError
+from joda.plugin import mujoco_version
 
 __all__ = ["app", "main"]
 
@@ -35,7 +35,7 @@ app = typer.Typer(
 
 def _tell_version(asked: bool) -> None:
     if asked:
-        say(f"joda {__version__} for MuJoCo {MUJOCO_VERSION}")
+        say(f"joda {__version__} with MuJoCo {mujoco_version()}")
         raise typer.Exit
 
 

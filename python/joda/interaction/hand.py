@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from joda.scenes.engine import inertia_at
 from joda.scenes.motion import Motion, play
 
 SET_OUT = 0.3
@@ -92,9 +93,7 @@ class Hand:
         """Stiffness and (critical) damping for the inertia that the joint begins with."""
         model, grip = self._model, self._grip
         mujoco.mj_forward(model, data)
-        mass = np.empty((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, mass)
-        inertia = float(mass[self._dof, self._dof])
+        inertia = inertia_at(model, data, self._dof)
         self._stiffness = min(grip.stiffness, FIRMEST * inertia / model.opt.timestep**2)
         self._damping = 2 * np.sqrt(self._stiffness * inertia)
         reach = grip.strength / self._stiffness

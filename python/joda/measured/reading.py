@@ -23,7 +23,7 @@ from joda.profile import Profile
 from joda.scenes.angles import range_doubt
 from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact
-from joda.scenes.model import describe_joint, find_joint, joint_name, load
+from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
 
@@ -148,12 +148,12 @@ def read_measured(
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
     source = Path(model)
-    spec, compiled = load(source)
+    compiled = load_model(source)
     number = find_joint(compiled, joint)
     name = joint_name(compiled, number)
     found = context(source, name)
     bare = Profile(joint=describe_joint(compiled, number))
-    profile = whole_profile(compiled, number, profiles_of(spec, compiled).get(name, bare))
+    profile = whole_profile(compiled, number, profiles_of(compiled).get(name, bare))
     read, unused = read_logs(compiled, number, runs, passive)
     notes = [*checked(read, found, float(compiled.opt.timestep)), *unused]
     clear = clear_of_contacts(compiled, number, found, profile, read)

@@ -28,13 +28,13 @@ except ImportError as error:
         f'joda.mjx needs JAX and MJX (no module {error.name}); run: pip install ".[mjx]"'
     ) from None
 
-SUPPORTED = "3.17"
+OLDEST, NEWEST = (3, 11), (3, 17)
 """Of mujoco-mjx: other versions may have other internals than `pipeline` is composed of."""
 
-if not f"{version('mujoco-mjx')}.".startswith(f"{SUPPORTED}."):
+if not OLDEST <= tuple(map(int, version("mujoco-mjx").split(".")[:2])) <= NEWEST:
     raise JodaError(
-        f"joda.mjx works with mujoco-mjx {SUPPORTED} and found {version('mujoco-mjx')}; "
-        f"run: pip install 'mujoco-mjx=={SUPPORTED}.*'"
+        f"joda.mjx works with mujoco-mjx {OLDEST[0]}.{OLDEST[1]} to {NEWEST[0]}.{NEWEST[1]} and "
+        f"found {version('mujoco-mjx')}; run: pip install 'mujoco-mjx=={NEWEST[0]}.{NEWEST[1]}.*'"
     )
 
 from joda._core import stop_damping  # noqa: E402

@@ -43,7 +43,8 @@ def _moved_tendons(model: mujoco.MjModel, joint: int) -> list[int]:
 
 def _resists(model: mujoco.MjModel, tendon: int) -> bool:
     """Whether a tendon has a strength or a limit."""
-    strengths = (model.tendon_stiffness, model.tendon_damping, model.tendon_armature)
+    fields = "tendon_stiffness", "tendon_damping", "tendon_armature"
+    strengths = (getattr(model, field) for field in fields if hasattr(model, field))
     return bool(
         model.tendon_frictionloss[tendon] > TINY
         or model.tendon_limited[tendon]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.profile import Joint
+from joda.scenes.engine import inertia_at
 from joda.scenes.model import moves_with
 
 Array = NDArray[np.float64]
@@ -180,9 +181,7 @@ class _Sweep:
 
     def _inertia(self) -> float:
         mujoco.mj_fwdPosition(self.model, self.data)
-        mass = np.empty((self.model.nv, self.model.nv))
-        mujoco.mj_fullM(self.model, self.data, mass)
-        return float(mass[self.dof, self.dof])
+        return inertia_at(self.model, self.data, self.dof)
 
     def look(self, position: float) -> dict[Pair, Felt]:
         """The forces of all contacts of what moves with what does not, at a position."""

@@ -1,4 +1,4 @@
-"""Copies of plugins that MuJoCo 4.0.0 cannot make, told before it reads the text.
+"""Copies of plugins that MuJoCo cannot make, told before it reads the text.
 
 An instance in a <replicate> corrupts its memory, whatever the plugin: it crashes now or later. A
 plugin without an instance of its own in an attached model leaves a reference to nowhere.

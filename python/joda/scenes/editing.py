@@ -14,6 +14,7 @@ from joda.errors import JodaError
 from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
+from joda.scenes.engine import is_discrete, polynomial
 from joda.scenes.limits import firm_limit, limit_parameters
 from joda.scenes.mjcf import Element, MjcfError, Source, quoted
 from joda.scenes.model import joint_name, joint_type, write_out
@@ -102,7 +103,7 @@ class EditedScene:
         if "solimplimit" not in changes:
             changes |= self._bearing(joint, profile, changes)
         changes |= self._inertia(joint, profile)
-        if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
+        if is_discrete(self.model):
             changes |= self._discrete(joint)
         if not self.names[joint]:
             changes["name"] = self._new_name(joint)
@@ -147,7 +148,7 @@ class EditedScene:
         """Puts the profile into the instance of the joint's body."""
         body = int(self.model.jnt_bodyid[joint])
         if body not in self.instances:
-            found = find_instance(self.spec, self.model, body)
+            found = find_instance(self.model, body)
             if found is None and self.model.body_plugin[body] >= 0:
                 raise JodaError(
                     f"the body of joint '{joint_name(self.model, joint)}' carries another plugin "
@@ -187,8 +188,8 @@ class EditedScene:
         """What becomes of the joint's own damping, stiffness and frictionloss."""
         m, dof = self.model, self.model.jnt_dofadr[joint]
         values = {
-            "damping": [m.dof_damping[dof], *m.dof_dampingpoly[dof]],
-            "stiffness": [m.jnt_stiffness[joint], *m.jnt_stiffnesspoly[joint]],
+            "damping": polynomial(m, "dof_damping", dof),
+            "stiffness": polynomial(m, "jnt_stiffness", joint),
             "frictionloss": [m.dof_frictionloss[dof]],
         }
         present = {name: v for name, v in values.items() if any(v) and v != [float(TRACE)]}
@@ -264,7 +265,7 @@ class EditedScene:
     def _inertia(self, joint: int, profile: Profile) -> dict[str, str]:
         """The armature with the profile's added inertia, without that of the one it replaces."""
         name = joint_name(self.model, joint)
-        replaced = profiles_of(self.spec, self.model).get(name)
+        replaced = profiles_of(self.model).get(name)
         before, after = replaced.added_inertia if replaced else 0.0, profile.added_inertia
         if before == after:
             return {}

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from joda.errors import JodaError
 from joda.profile import Joint, describe
 from joda.scenes.copies import refuse_copied_plugins
+from joda.scenes.engine import FORGETS_INSTANCES
 
 _TYPES = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name
@@ -76,7 +77,13 @@ def sentence(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     own = [line for line in lines if line.startswith("joda.joint_dynamics:")]
     text = own[0] if own else "; ".join(dict.fromkeys(lines)).replace(":;", ":")
-    return re.sub(r"^((XML )?Error: )+", "", text).rstrip(".") + "."
+    text = re.sub(r"^((XML )?Error: )+", "", text).rstrip(".")
+    if FORGETS_INSTANCES and "for plugin instance" in text:
+        text += (
+            f"; MuJoCo {mujoco.__version__} forgets instances behind a <replicate>: put that after "
+            "the body, or install MuJoCo 3.16 or newer"
+        )
+    return f"{text}."
 
 
 def joint_type(model: mujoco.MjModel, joint: int) -> str:

@@ -5,6 +5,7 @@ import mujoco
 from joda.component import Component
 from joda.effects import QuadraticDamping
 from joda.profile import Profile
+from joda.scenes.engine import polynomial
 from joda.scenes.scene import TRACE
 
 LEAST = 1e3 * float(TRACE)
@@ -36,7 +37,7 @@ def whole_profile(model: mujoco.MjModel, joint: int, profile: Profile) -> Profil
         out = out.with_component("friction", _line("native friction", friction, friction))
     if damping:
         out = out.with_component("damping", _line("native damping", damping, damping))
-    square = float(model.dof_dampingpoly[dof, 0])
+    square = float(sum(polynomial(model, "dof_damping", dof)[1:2]))
     if square and not any(isinstance(effect, QuadraticDamping) for effect in out.effects):
         out = out.with_effect(QuadraticDamping(y=(square, square)))
     return out

@@ -5,9 +5,9 @@ from pathlib import Path
 import mujoco
 
 from joda.errors import JodaError
-from joda.plugin import PLUGIN
+from joda.plugin import set_texts, slot
 from joda.profile import ATTRIBUTES, Profile
-from joda.scenes.model import describe_joint, find_joint, load
+from joda.scenes.model import describe_joint, find_joint, load_model
 
 TRACE = "1e-12"
 """A frictionloss (N or N·m) that makes a solver row and is otherwise nothing."""
@@ -15,36 +15,42 @@ TRACE = "1e-12"
 DAMPING_ROW = "joda_damping_"
 """Begins the name of the equality constraint whose row carries a joint's damping."""
 
+MOST_JOINTS = 6
+"""Hinges and slides that one body of MuJoCo can have."""
+
 INERT = 'active="true" solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
 """Makes that constraint do nothing until the plugin sets its row."""
 
 
-def find_instance(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, body: int
-) -> tuple[str, dict[str, str]] | None:
+def find_instance(model: mujoco.MjModel, body: int) -> tuple[str, dict[str, str]] | None:
     """Name and attributes of the plugin's instance on the body, None if there is none.
 
     Args:
-        spec: the compiled spec.
-        model: what it compiled to.
+        model: any model.
         body: id.
 
     Returns:
         the name, empty where the attributes are written in the body itself, and the attributes;
         each has its joint's `prefix`.
     """
-    reference = spec.bodies[body].plugin
-    if not reference.active:
+    instance = int(model.body_plugin[body])
+    if instance < 0 or model.plugin[instance] != slot():
         return None
-    if reference.plugin_name == PLUGIN:
-        name, config = "", reference.config
-    else:
-        declared = {p.name: p.config for p in spec.plugins if p.plugin_name == PLUGIN}
-        if reference.name not in declared:
-            return None
-        name, config = reference.name, declared[reference.name]
+    name = bytes(model.names[model.name_pluginadr[instance] :]).partition(b"\0")[0].decode()
     alone = model.body_jntnum[body] == 1
-    return name, {k.removeprefix("0.") if alone else k: text for k, text in config.items() if text}
+    return name, {
+        key.removeprefix("0.") if alone else key: text
+        for key, text in _attributes(model, instance).items()
+        if text
+    }
+
+
+def _attributes(model: mujoco.MjModel, instance: int) -> dict[str, str]:
+    """All attributes of an instance of the plugin, in the order in which it declares them."""
+    fronts = ["", *(f"{place}." for place in range(MOST_JOINTS))]
+    texts = bytes(model.plugin_attr[model.plugin_attradr[instance] :]).split(b"\0")
+    names = [front + name for front in fronts for name in ATTRIBUTES]
+    return {name: text.decode() for name, text in zip(names, texts, strict=False)}
 
 
 def prefix(model: mujoco.MjModel, joint: int) -> str:
@@ -76,23 +82,23 @@ def read_profiles(path: str | Path) -> dict[str, Profile]:
     Raises:
         JodaError: the file cannot be loaded.
     """
-    return profiles_of(*load(Path(path)))
+    return profiles_of(load_model(Path(path)))
 
 
 def open_scene(path: Path) -> tuple[mujoco.MjModel, dict[str, Profile]]:
     """A scene and its profiles, as `read_profiles`; raises JodaError also where there are none."""
-    spec, model = load(path)
-    profiles = profiles_of(spec, model)
+    model = load_model(path)
+    profiles = profiles_of(model)
     if not profiles:
         raise JodaError(f"{path}: carries no profile; attach one first with: joda attach")
     return model, profiles
 
 
-def profiles_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[str, Profile]:
-    """Joint name to profile, of a compiled spec and what it compiled to; raises JodaError."""
+def profiles_of(model: mujoco.MjModel) -> dict[str, Profile]:
+    """Joint name to profile; raises JodaError."""
     out = {}
     for joint in range(model.njnt):
-        found = find_instance(spec, model, int(model.jnt_bodyid[joint]))
+        found = find_instance(model, int(model.jnt_bodyid[joint]))
         config = found[1] if found else {}
         front = prefix(model, joint)
         own = {key: config[front + key] for key in ATTRIBUTES if front + key in config}
@@ -117,12 +123,7 @@ def set_profile(
     Raises:
         JodaError: the joint does not exist or carries no profile.
     """
-    import joda._core as core
-
     number = joint if isinstance(joint, int) else find_joint(model, joint)
     attributes = profile.attributes()
     texts = [attributes.get(key, "") for key in ATTRIBUTES if key != "range"]
-    try:
-        core.set_profile(model._address, data._address, number, *profile.joint.range, texts)
-    except ValueError as error:
-        raise JodaError(str(error)) from None
+    set_texts(model._address, data._address, number, profile.joint.range, texts)
