@@ -28,7 +28,7 @@ from joda.effects import (
 from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
-from joda.scenes.scene import DAMPING_ROW, INERT, TRACE, open_scene
+from joda.scenes.scene import DAMPING_ROW, INERT, TRACE, open_scene, strip_plugin
 
 ALL_EFFECTS = (
     AsymmetricFriction(direction="positive", y=(0.05, 0.05)),
@@ -195,11 +195,7 @@ def _bench_scene(path: Path, progress: Callable[[str], None]) -> list[Row]:
 def _without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> mujoco.MjModel:
     """The scene without the plugin, with native elements of the same mean strength or none."""
     spec = mujoco.MjSpec.from_file(str(path))
-    for body in spec.bodies:
-        body.plugin.active = False
-    for plugin in list(spec.plugins):
-        if plugin.plugin_name == PLUGIN:
-            spec.delete(plugin)
+    strip_plugin(spec)
     for equality in list(spec.equalities):
         if equality.name.startswith(DAMPING_ROW):
             spec.delete(equality)
