@@ -196,6 +196,7 @@ def act(
     time: wp.array(dtype=float),
     qpos: wp.array2d(dtype=float),
     qvel: wp.array2d(dtype=float),
+    qacc_warmstart: wp.array2d(dtype=float),
     qfrc_applied: wp.array2d(dtype=float),
     xanchor: wp.array2d(dtype=wp.vec3),
     xaxis: wp.array2d(dtype=wp.vec3),
@@ -316,6 +317,12 @@ def act(
             if joint.damps != 0:
                 rate = n[int(Number.PRESLIDING_FRICTION_DAMPING), w, j]
                 drag += passage.resistance * rate * left
+            # near slip a soft row would cost so much that float32 loses the others beside it: the
+            # bound is what the bristles will have reached by then, and the row is stiffer
+            ahead = v + h * qacc_warmstart[w, dof]
+            if psi * ahead < 0.0 and D * laws.MOST_COST < bound * bound:
+                bound = wp.min(bound, wp.abs(psi) + D * wp.abs(ahead) / h)
+                D = bound * bound / laws.MOST_COST
         efc_D[w, row] = D
         efc_aref[w, row] = psi / D - v / h
         efc_frictionloss[w, row] = bound
@@ -370,7 +377,7 @@ def launch(m: Any, d: Any, profiles: Profiles) -> None:
         inputs=[
             *(m.opt.disableflags, m.opt.timestep, m.opt.gravity, m.body_subtreemass),
             *(m.jnt_range, m.dof_frictionloss, m.dof_invweight0),
-            *(d.time, d.qpos, d.qvel, d.qfrc_applied, d.xanchor, d.xaxis, d.subtree_com),
+            *(d.time, d.qpos, d.qvel, d.qacc_warmstart, d.qfrc_applied, d.xanchor, d.xaxis, d.subtree_com),
             *(d.ne, d.nf, d.nl, efc.type, efc.id, efc.pos, efc.margin, efc.force),
             profiles,
         ],

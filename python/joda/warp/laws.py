@@ -7,9 +7,12 @@ import warp as wp
 
 from joda.scenes.limits import IMPEDANCE, STIFFNESS
 
-STILL = wp.constant(1e-9)
-"""As kStill in cpp/effects.h, and so on."""
+STILL = wp.constant(1e-6)
+"""Speed below which a joint counts as still: float32's rounding, larger than in cpp/effects.h."""
+MOST_COST = wp.constant(3e4)
+"""Largest bound² / D of a row of bristles: what the solver's cost resolves in float32."""
 LEAST_BRISTLE = wp.constant(1e-6)
+"""As kLeastBristle in cpp/effects.h, and so on."""
 LEAST_IN_ROW = wp.constant(0.05)
 HEAVIEST_LOAD = wp.constant(0.95)
 EXPLICIT_STIFFNESS = wp.constant(1.0)
