@@ -20,7 +20,7 @@ LAYERS = [
     {"scenes"},
     {"_schema", "_context", "_attach", "_bench"},
     {"_compile", "joints"},
-    {"mjx", "pictures"},
+    {"mjx", "pictures", "warp"},
     {"_plot", "_render", "_templates", "measured"},
     {"hidden", "interaction", "diagnosis"},
     {"_compare", "_simulate", "_diagnose", "_improve", "refining"},

@@ -90,7 +90,7 @@ COMMANDS = (
     "studio",
     "templates",
 )
-_MODULES = ("effects", "field", "mjx")
+_MODULES = ("effects", "field", "mjx", "warp")
 _LAZY = {
     "Profile": "joda.profile",
     "generate_all": "joda._generate_all",

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from joda.propose import Usage
     from joda.propose.history import Round
     from joda.template import Template
+    from joda.warp.bench import WarpRow
 
 
 def print_json(value: Any) -> None:
@@ -179,6 +180,21 @@ def tell_ratios(rows: "Iterable[Row]") -> None:
             row.what, f"{row.ratio:.3f} ± {row.spread:.3f}", row.bar, f"{ours:.2f} / {other:.2f}"
         )
     Console(width=None if sys.stdout.isatty() else 110).print(table)
+
+
+def tell_worlds(rows: "Sequence[WarpRow]") -> None:
+    """The table of `joda bench --warp`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    heads = ("worlds", "steps/s with profiles", "native", "none", "÷ native", "÷ none", "kernels")
+    table = Table(*heads, box=None, pad_edge=False)
+    for row in rows:
+        speeds = (f"{speed:,.0f}" for speed in row.per_second)
+        ratios = (f"{row.native_ratio:.2f}", f"{row.plain_ratio:.2f}")
+        table.add_row(str(row.worlds), *speeds, *ratios, " / ".join(map(str, row.launches)))
+    Console(width=None if sys.stdout.isatty() else 110).print(table)
+    say(f"device {rows[0].device}; ÷: time with profiles over that of the other scene")
 
 
 def tell_cases(shown: "Iterable[Shown]") -> None:

@@ -21,6 +21,7 @@ from joda.scenes.scene import damping_equality
 
 Array = jax.Array
 
+
 @dataclass(frozen=True)
 class Place:
     """Where a joint is in the model.

@@ -33,6 +33,6 @@ if not f"{version('mujoco-warp')}.".startswith(f"{SUPPORTED}."):
     )
 
 from joda.warp.fields import Fields, attach, put_fields  # noqa: E402
-from joda.warp.scene import open_scene, take_profiles  # noqa: E402
+from joda.warp.scene import open_scene, quiet, take_profiles  # noqa: E402
 
-__all__ = ["Fields", "attach", "open_scene", "put_fields", "take_profiles"]
+__all__ = ["Fields", "attach", "open_scene", "put_fields", "quiet", "take_profiles"]

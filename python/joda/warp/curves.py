@@ -17,13 +17,13 @@ class Curves:
         descents: the largest descent -dF/ds on that piece, or 0.
     """
 
-    first: wp.array3d(dtype=int)
-    pieces: wp.array3d(dtype=int)
-    steepest: wp.array3d(dtype=float)
-    knots: wp.array(dtype=float)
-    at: wp.array(dtype=float)
-    cubics: wp.array(dtype=wp.vec4)
-    descents: wp.array(dtype=float)
+    first: wp.array3d[int]
+    pieces: wp.array3d[int]
+    steepest: wp.array3d[float]
+    knots: wp.array[float]
+    at: wp.array[float]
+    cubics: wp.array[wp.vec4]
+    descents: wp.array[float]
 
 
 @wp.func
@@ -31,7 +31,7 @@ def piece(curves: Curves, first: int, pieces: int, s: float) -> int:
     """The last knot at or before s, for s within the knots."""
     lo, hi = int(0), int(pieces)
     while hi - lo > 1:
-        middle = (lo + hi) / 2
+        middle = (lo + hi) // 2
         if curves.knots[first + middle] <= s:
             lo = middle
         else:

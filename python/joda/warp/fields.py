@@ -60,8 +60,6 @@ class Fields:
         device = self.friction.device
         if not isinstance(mask, wp.array):
             chosen = np.ones(self.nworld, bool) if mask is None else np.asarray(mask, bool)
-            if chosen.shape != (self.nworld,):
-                raise JodaError(f"mask has the shape {chosen.shape}; it must be ({self.nworld},).")
             mask = wp.array(chosen, dtype=bool, device=device)
         if mask.shape != (self.nworld,):
             raise JodaError(f"mask has the shape {mask.shape}; it must be ({self.nworld},).")

@@ -38,11 +38,11 @@ class Profiles:
     """
 
     curves: Curves
-    numbers: wp.array3d(dtype=float)
-    state: wp.array3d(dtype=float)
-    rows: wp.array2d(dtype=int)
-    places: wp.array2d(dtype=int)
-    inertia: wp.array(dtype=float)
+    numbers: wp.array3d[float]
+    state: wp.array3d[float]
+    rows: wp.array2d[int]
+    places: wp.array2d[int]
+    inertia: wp.array[float]
 
 
 @wp.struct
@@ -62,8 +62,8 @@ class Joint:
 
 @wp.func
 def find_row(
-    kinds: wp.array(dtype=int),
-    ids: wp.array(dtype=int),
+    kinds: wp.array[int],
+    ids: wp.array[int],
     first: int,
     last: int,
     expected: int,
@@ -96,7 +96,11 @@ def resist(profiles: Profiles, joint: Joint, v: float) -> wp.vec3:
     drag = joint.damping
     if joint.damps != 0:
         extra = along(
-            profiles, joint, int(Curve.DAMPING_UP), int(Number.DIRECTION_DEPENDENT_DAMPING_STRENGTH), v
+            profiles,
+            joint,
+            int(Curve.DAMPING_UP),
+            int(Number.DIRECTION_DEPENDENT_DAMPING_STRENGTH),
+            v,
         ) + wp.abs(v) * along(
             profiles, joint, int(Curve.QUADRATIC_UP), int(Number.QUADRATIC_DAMPING_STRENGTH), v
         )
@@ -155,7 +159,7 @@ def implicit_stiffness(
 
 @wp.func
 def remember(
-    profiles: Profiles, w: int, j: int, t: float, h: float, v: float, forces: wp.array(dtype=float)
+    profiles: Profiles, w: int, j: int, t: float, h: float, v: float, forces: wp.array[float]
 ):
     """Takes from the last step what the joint remembers, if one was taken; forgets if reset."""
     state = profiles.state
@@ -186,36 +190,36 @@ def remember(
 def act(
     # of the model
     disabled: int,
-    timestep: wp.array(dtype=float),
-    gravity: wp.array(dtype=wp.vec3),
-    body_subtreemass: wp.array2d(dtype=float),
-    jnt_range: wp.array2d(dtype=wp.vec2),
-    dof_frictionloss: wp.array2d(dtype=float),
-    dof_invweight0: wp.array2d(dtype=float),
+    timestep: wp.array[float],
+    gravity: wp.array[wp.vec3],
+    body_subtreemass: wp.array2d[float],
+    jnt_range: wp.array2d[wp.vec2],
+    dof_frictionloss: wp.array2d[float],
+    dof_invweight0: wp.array2d[float],
     # of the data
-    time: wp.array(dtype=float),
-    qpos: wp.array2d(dtype=float),
-    qvel: wp.array2d(dtype=float),
-    qacc_warmstart: wp.array2d(dtype=float),
-    qfrc_applied: wp.array2d(dtype=float),
-    xanchor: wp.array2d(dtype=wp.vec3),
-    xaxis: wp.array2d(dtype=wp.vec3),
-    subtree_com: wp.array2d(dtype=wp.vec3),
-    ne: wp.array(dtype=int),
-    nf: wp.array(dtype=int),
-    nl: wp.array(dtype=int),
-    efc_type: wp.array2d(dtype=int),
-    efc_id: wp.array2d(dtype=int),
-    efc_pos: wp.array2d(dtype=float),
-    efc_margin: wp.array2d(dtype=float),
-    efc_force: wp.array2d(dtype=float),
+    time: wp.array[float],
+    qpos: wp.array2d[float],
+    qvel: wp.array2d[float],
+    qacc_warmstart: wp.array2d[float],
+    qfrc_applied: wp.array2d[float],
+    xanchor: wp.array2d[wp.vec3],
+    xaxis: wp.array2d[wp.vec3],
+    subtree_com: wp.array2d[wp.vec3],
+    ne: wp.array[int],
+    nf: wp.array[int],
+    nl: wp.array[int],
+    efc_type: wp.array2d[int],
+    efc_id: wp.array2d[int],
+    efc_pos: wp.array2d[float],
+    efc_margin: wp.array2d[float],
+    efc_force: wp.array2d[float],
     # ours, with its state
     profiles: Profiles,
     # changed
-    efc_D: wp.array2d(dtype=float),
-    efc_aref: wp.array2d(dtype=float),
-    efc_frictionloss: wp.array2d(dtype=float),
-    qfrc_passive: wp.array2d(dtype=float),
+    efc_D: wp.array2d[float],
+    efc_aref: wp.array2d[float],
+    efc_frictionloss: wp.array2d[float],
+    qfrc_passive: wp.array2d[float],
 ):
     """One joint in one world; dimensions (worlds, joints)."""
     w, j = wp.tid()
@@ -320,7 +324,7 @@ def act(
             # near slip a soft row would cost so much that float32 loses the others beside it: the
             # bound is what the bristles will have reached by then, and the row is stiffer
             ahead = v + h * qacc_warmstart[w, dof]
-            if psi * ahead < 0.0 and D * laws.MOST_COST < bound * bound:
+            if psi * ahead < 0.0 and bound * bound > D * laws.MOST_COST:
                 bound = wp.min(bound, wp.abs(psi) + D * wp.abs(ahead) / h)
                 D = bound * bound / laws.MOST_COST
         efc_D[w, row] = D
@@ -361,7 +365,7 @@ def act(
 
 
 @wp.kernel(enable_backward=False)
-def forget(mask: wp.array(dtype=bool), profiles: Profiles):
+def forget(mask: wp.array[bool], profiles: Profiles):
     """Makes the joints of the masked worlds begin anew; dimensions (worlds, joints)."""
     w, j = wp.tid()
     if mask[w]:
@@ -377,7 +381,16 @@ def launch(m: Any, d: Any, profiles: Profiles) -> None:
         inputs=[
             *(m.opt.disableflags, m.opt.timestep, m.opt.gravity, m.body_subtreemass),
             *(m.jnt_range, m.dof_frictionloss, m.dof_invweight0),
-            *(d.time, d.qpos, d.qvel, d.qacc_warmstart, d.qfrc_applied, d.xanchor, d.xaxis, d.subtree_com),
+            *(
+                d.time,
+                d.qpos,
+                d.qvel,
+                d.qacc_warmstart,
+                d.qfrc_applied,
+                d.xanchor,
+                d.xaxis,
+                d.subtree_com,
+            ),
             *(d.ne, d.nf, d.nl, efc.type, efc.id, efc.pos, efc.margin, efc.force),
             profiles,
         ],

@@ -32,7 +32,7 @@ class Number(IntEnum):
     END_STOP_RESTITUTION_HIGH = 23
 
     @property
-    def title(self) -> str:  # type: ignore[override]
+    def title(self) -> str:
         """Its name outside: owner and number, as "friction.strength"."""
         owner, _, number = self.name.lower().rpartition("_")
         return f"{owner}.{number}"

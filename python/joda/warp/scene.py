@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import mujoco
+import warp as wp
 
 from joda.errors import JodaError
 from joda.profile import Profile
@@ -45,3 +46,8 @@ def take_profiles(spec: mujoco.MjSpec) -> dict[str, Profile]:
     profiles = profiles_of(spec, spec.compile())
     strip_plugin(spec)
     return profiles
+
+
+def quiet() -> None:
+    """Makes Warp say only what is wrong, not which kernels it loads."""
+    wp.config.log_level = wp.LOG_ERROR

@@ -73,7 +73,9 @@ def numbers_of(profile: Profile) -> Array:
 def curves_of(profile: Profile) -> dict[Curve, tuple[str, str]]:
     """A profile's curves: text and how components are combined, as in the plugin's attributes."""
     out = {}
-    for curve, name in zip((Curve.CONSERVATIVE, Curve.FRICTION, Curve.DAMPING), CHANNELS, strict=True):
+    for curve, name in zip(
+        (Curve.CONSERVATIVE, Curve.FRICTION, Curve.DAMPING), CHANNELS, strict=True
+    ):
         channel = getattr(profile.channels, name)
         if channel.components:
             out[curve] = (channel.text(), channel.combine)
