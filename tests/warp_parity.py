@@ -221,7 +221,8 @@ def main() -> None:
         close, missed = 100 * np.mean(error < CLOSE), (error >= CLOSE).sum(0)
         print(
             f"{integrator}, {cone}: {close:.1f} % of {error.size} profiles within {CLOSE:g} of the "
-            f"range, all but {missed[0]} on the arm and {missed[1]} on the drawer; median {np.median(error):.1e}, 99 % within {np.quantile(error, 0.99):.1e}"
+            f"range, all but {missed[0]} on the arm and {missed[1]} on the drawer; "
+            f"median {np.median(error):.1e}, 99 % within {np.quantile(error, 0.99):.1e}"
         )
 
 
