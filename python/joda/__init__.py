@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from joda._diagnose import diagnose
     from joda._doctor import doctor
     from joda._experiments import experiments
+    from joda._export import export
     from joda._generate import generate
     from joda._generate_all import generate_all
     from joda._hidden_effect import hidden_effect
@@ -51,6 +52,7 @@ __all__ = [
     "diagnose",
     "doctor",
     "experiments",
+    "export",
     "generate",
     "generate_all",
     "hidden_effect",
@@ -79,6 +81,7 @@ COMMANDS = (
     "diagnose",
     "doctor",
     "experiments",
+    "export",
     "generate",
     "improve",
     "plot",

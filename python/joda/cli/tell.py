@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from joda._generate import Generated
     from joda._refine import Refined
     from joda.cases.gallery import Shown
+    from joda.exporting.nearest import Nearest
     from joda.propose import Usage
     from joda.propose.history import Round
     from joda.template import Template
@@ -195,6 +196,23 @@ def tell_worlds(rows: "Sequence[WarpRow]") -> None:
         table.add_row(str(row.worlds), *speeds, *ratios, " / ".join(map(str, row.launches)))
     Console(width=None if sys.stdout.isatty() else 110).print(table)
     say(f"device {rows[0].device}; ÷: time with profiles over that of the other scene")
+
+
+def tell_nearest(joints: "Iterable[Nearest]") -> None:
+    """The table of `joda export`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("joint", "what", "error: rms", "largest", "of", box=None, pad_edge=False)
+    for joint in joints:
+        for error in joint.errors:
+            least = 1e-9 * error.size  # rounding
+            sizes = (
+                f"{size:.3g}" if size > least else "0"
+                for size in (error.rms, error.largest, error.size)
+            )
+            table.add_row(joint.joint, f"{error.what}, {error.unit}", *sizes)
+    Console(width=None if sys.stdout.isatty() else 110).print(table)
 
 
 def tell_cases(shown: "Iterable[Shown]") -> None:
