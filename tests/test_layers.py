@@ -27,8 +27,8 @@ LAYERS = [
     {"_compare", "_simulate", "_diagnose", "_improve", "refining"},
     {"_add", "_refine", "propose"},
     {"_generate", "_hidden_effect"},
-    {"_generate_all", "_revise", "_demo", "cases"},
-    {"_experiments", "_studio"},
+    {"_generate_all", "_revise", "_demo", "cases", "distributed"},
+    {"_experiments", "_studio", "_distribute"},
     {"cli"},
     {"__main__"},
 ]

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from joda._context import context
     from joda._demo import demo
     from joda._diagnose import diagnose
+    from joda._distribute import distribute
     from joda._doctor import doctor
     from joda._experiments import experiments
     from joda._export import export
@@ -50,6 +51,7 @@ __all__ = [
     "context",
     "demo",
     "diagnose",
+    "distribute",
     "doctor",
     "experiments",
     "export",
@@ -79,6 +81,7 @@ COMMANDS = (
     "context",
     "demo",
     "diagnose",
+    "distribute",
     "doctor",
     "experiments",
     "export",
