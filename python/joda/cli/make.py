@@ -269,7 +269,7 @@ def export(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write the nearest that MuJoCo itself, URDF, SDF or USD can say, and its error.
+    """Write the nearest that URDF, SDF, USD or plain MJCF can say.
 
     Example:
 

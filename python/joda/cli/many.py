@@ -49,7 +49,7 @@ def distribute(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Diagnose, improve or generate many joints at once, here or on a cluster.
+    """Diagnose, improve or generate many joints at once.
 
     Leaves a folder per joint, with result.json last. Example:
 
