@@ -75,14 +75,14 @@ def commands() -> str:
 
 
 def python() -> str:
-    """The functions of joda and what they return, then joda.effects and joda.mjx."""
+    """The functions of joda and what they return, then joda.effects, joda.mjx and joda.warp."""
     functions = [getattr(joda, name) for name in joda.__all__]
     returned = dict.fromkeys(one for f in functions for one in _returned(f))
     classes = [one for one in returned if one not in functions]
     out = ["# Python", *(_auto(getattr(joda, name), f"joda.{name}") for name in joda.__all__)]
     out += ["## What they return"]
     out += [_auto(one, f"{one.__module__}.{one.__name__}") for one in classes]
-    for module in (joda.effects, joda.mjx):
+    for module in (joda.effects, joda.mjx, joda.warp):
         out += [f"## {module.__name__}", _directive("automodule", module.__name__, "no-members:")]
         own = {f"{module.__name__}.{name}": getattr(module, name) for name in module.__all__}
         out += [

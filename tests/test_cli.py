@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from joda import COMMANDS, JodaError, Profile, bench, demo, plot
-from joda._bench import _without_plugin, hinges
+from joda._bench import hinges, without_plugin
 from joda._refine import Refined
 from joda.cli import app, main
 from joda.cli.tell import tell_viewer
@@ -240,10 +240,15 @@ class TestBench:
         from joda.scenes.scene import read_profiles
 
         joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
-        native = _without_plugin(folder / "scene.xml", read_profiles(folder / "scene.xml"), True)
+        native = without_plugin(folder / "scene.xml", read_profiles(folder / "scene.xml"), True)
         assert (native.nplugin, native.neq, native.njnt) == (0, 0, 4)
         assert native.dof_damping[0] > 0.1
         assert native.dof_frictionloss[0] == pytest.approx(0.07, rel=1e-6)
+
+    def test_worlds_are_of_warp(self, folder):
+        result = joda("bench", "--worlds", "2", cwd=folder)
+        assert result.returncode == 2
+        assert "--worlds is of --warp; add --warp." in result.stderr
 
     def test_hinges_differ_only_in_what_acts_on_them(self):
         plain, native, ours = (hinges(3, kind) for kind in ("plain", "native", "joda"))

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from joda._context import context
     from joda._demo import demo
     from joda._diagnose import diagnose
+    from joda._distribute import distribute
     from joda._doctor import doctor
     from joda._experiments import experiments
+    from joda._export import export
     from joda._generate import generate
     from joda._generate_all import generate_all
     from joda._hidden_effect import hidden_effect
@@ -51,8 +53,10 @@ __all__ = [
     "context",
     "demo",
     "diagnose",
+    "distribute",
     "doctor",
     "experiments",
+    "export",
     "generate",
     "generate_all",
     "hidden_effect",
@@ -79,8 +83,10 @@ COMMANDS = (
     "context",
     "demo",
     "diagnose",
+    "distribute",
     "doctor",
     "experiments",
+    "export",
     "generate",
     "improve",
     "plot",
@@ -92,7 +98,7 @@ COMMANDS = (
     "studio",
     "templates",
 )
-_MODULES = ("effects", "field", "mjx")
+_MODULES = ("effects", "field", "mjx", "warp")
 _LAZY = {
     "Profile": "joda.profile",
     "generate_all": "joda._generate_all",

@@ -29,7 +29,7 @@ from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
 from joda.scenes.engine import require, set_strength
-from joda.scenes.scene import DAMPING_ROW, INERT, TRACE, open_scene
+from joda.scenes.scene import DAMPING_ROW, INERT, TRACE, open_scene, strip_plugin
 
 ALL_EFFECTS = (
     AsymmetricFriction(direction="positive", y=(0.05, 0.05)),
@@ -108,6 +108,11 @@ def bench(
 def hinges(count: int, kind: str) -> mujoco.MjModel:
     """Doors side by side: "plain", with "native" spring, damping and friction, with profiles
     ("joda"), or with profiles and all effects that there are ("effects")."""
+    return mujoco.MjModel.from_xml_string(hinges_text(count, kind))
+
+
+def hinges_text(count: int, kind: str) -> str:
+    """The same as MJCF."""
     attributes = {
         "plain": "",
         "native": 'stiffness="0.5" damping="0.2" frictionloss="0.1"',
@@ -132,7 +137,7 @@ def hinges(count: int, kind: str) -> mujoco.MjModel:
     extension = f'<extension><plugin plugin="{PLUGIN}">{"".join(instances)}</plugin></extension>'
     extra = (extension, f"<equality>{''.join(rows)}</equality>") if ours else ("", "")
     quiet = '<option><flag contact="disable"/></option>'  # a row of doors is no collision benchmark
-    return mujoco.MjModel.from_xml_string(
+    return (
         f'<mujoco><compiler angle="radian"/>{quiet if count > 1 else ""}{extra[0]}'
         f"<worldbody>{''.join(bodies)}</worldbody>{extra[1]}</mujoco>"
     )
@@ -185,7 +190,7 @@ def _bench_scene(path: Path, progress: Callable[[str], None]) -> list[Row]:
     ours, profiles = open_scene(path)
     what = f"{path.name}, {len(profiles)} profiles"
     progress(what)
-    native, plain = _without_plugin(path, profiles, True), _without_plugin(path, profiles, False)
+    native, plain = (without_plugin(path, profiles, kind) for kind in (True, False))
     times = _measure([(plain, None), (native, None), (ours, None)])
     return [
         _row(f"{what} / native elements", times[2], times[1], "<= 1.05 for the kitchen"),
@@ -193,15 +198,11 @@ def _bench_scene(path: Path, progress: Callable[[str], None]) -> list[Row]:
     ]
 
 
-def _without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> mujoco.MjModel:
+def without_plugin(path: Path, profiles: dict[str, Profile], native: bool) -> mujoco.MjModel:
     """The scene without the plugin, with native elements of the same mean strength or none."""
     require((3, 3, 4), "joda bench of a scene")  # older ones delete nothing from a spec
     spec = mujoco.MjSpec.from_file(str(path))
-    for body in spec.bodies:
-        body.plugin.active = False
-    for plugin in list(spec.plugins):
-        if plugin.plugin_name == PLUGIN:
-            spec.delete(plugin)
+    strip_plugin(spec)
     for equality in list(spec.equalities):
         if equality.name.startswith(DAMPING_ROW):
             spec.delete(equality)

@@ -16,7 +16,7 @@ Advance = Callable[[int, int, str], None]
 Results = dict[str, Generated | JodaError]
 
 
-class _Job(NamedTuple):
+class Job(NamedTuple):
     """A joint, and the folder for it."""
 
     model: Path
@@ -68,7 +68,7 @@ def generate_all(
     _check_target(target, force or resume)
     chosen = choose(proposer, key, vlm)
     done: Results = {}
-    jobs = _jobs(source, target, joint, done)
+    jobs = find_jobs(source, target, joint, done)
     make_folder(target)
     further = [Path(path) for path in templates]
     sessions: dict[str, Session] = {}
@@ -132,9 +132,9 @@ def _check_target(folder: Path, allowed: bool) -> None:
         )
 
 
-def _jobs(source: Path, target: Path, joint: str | None, failed: Results) -> dict[str, _Job]:
+def find_jobs(source: Path, target: Path, joint: str | None, failed: Results) -> dict[str, Job]:
     """The joints to be done, by label; models that cannot be loaded are added to `failed`."""
-    jobs: dict[str, _Job] = {}
+    jobs: dict[str, Job] = {}
     others = set()
     for path, stem, part in _models(source, target):
         try:
@@ -147,7 +147,7 @@ def _jobs(source: Path, target: Path, joint: str | None, failed: Results) -> dic
         for name in names:
             folder = target / stem / _unique(file_name(name), taken)
             if joint in (None, name):
-                jobs[f"{stem}/{name}"] = _Job(path, name, folder)
+                jobs[f"{stem}/{name}"] = Job(path, name, folder)
             else:
                 others.add(name)
     if not jobs and others:

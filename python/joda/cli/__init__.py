@@ -14,7 +14,8 @@ from joda import __version__
 from joda.cli import interrupt
 from joda.cli.act import experiments, simulate, with_usual
 from joda.cli.edit import studio
-from joda.cli.make import attach, compile, demo, generate, revise
+from joda.cli.make import attach, compile, demo, export, generate, revise
+from joda.cli.many import distribute
 from joda.cli.measure import bench, compare, refine
 from joda.cli.mend import add, diagnose, improve
 from joda.cli.observe import context, plot, render
@@ -65,7 +66,8 @@ def _help(command: Callable[..., None]) -> str:
 
 for command in (
     demo, attach, compile, context, generate, revise, plot, simulate, compare, diagnose, add,
-    improve, refine, render, experiments, studio, bench, schema, templates, doctor,
+    improve, refine, render, experiments, studio, export, distribute,
+    bench, schema, templates, doctor,
 ):  # fmt: skip
     app.command(help=_help(command))(command)
 

@@ -17,6 +17,7 @@ from joda.cli.tell import (
     tell_cost,
     tell_doors,
     tell_files,
+    tell_nearest,
     tell_round,
     tell_viewer,
     with_text_paths,
@@ -254,3 +255,34 @@ def attach(
     for note in run(model, composed, output, joint=joint, native=native, force=force):
         say(note)
     say(output)
+
+
+def export(
+    scene: Annotated[Path, typer.Argument(help="Scene with profiles.", show_default=False)],
+    to: Annotated[
+        Literal["native", "urdf", "sdf", "usd"],
+        typer.Option(help="native: MJCF without the plugin; urdf; sdf; usd.", show_default=False),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="File to write.", show_default=False)
+    ],
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write the nearest that URDF, SDF, USD or plain MJCF can say.
+
+    Example:
+
+        joda export scene.xml --to urdf -o scene.urdf
+    """
+    from joda import export as run
+
+    result = run(scene, to, output, force=force)
+    if as_json:
+        print_json({**asdict(result), "files": [str(path) for path in result.files]})
+        return
+    tell_nearest(result.joints)
+    for note in result.notes:
+        say(note)
+    for path in result.files:
+        say(path)

@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
@@ -16,8 +17,10 @@ from joda.cli.tell import (
     tell_changes,
     tell_errors,
     tell_ratios,
+    tell_worlds,
     with_text_paths,
 )
+from joda.errors import JodaError
 from joda.files import cache_folder
 
 
@@ -122,6 +125,12 @@ def bench(
     scene: Annotated[
         Path | None, typer.Argument(help="Scene with profiles [default: hinges of our own].")
     ] = None,
+    warp: Annotated[
+        bool, typer.Option("--warp", help="In MuJoCo Warp, from 1 to 8192 worlds.")
+    ] = False,
+    worlds: Annotated[
+        list[int] | None, typer.Option(min=1, help="With --warp: so many worlds instead.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Measure what profiles cost per step, as ratios.
@@ -130,6 +139,11 @@ def bench(
 
         joda bench scene.xml
     """
+    if worlds and not warp:
+        raise JodaError("--worlds is of --warp; add --warp.")
+    if warp:
+        _bench_warp(scene, worlds or (), as_json)
+        return
     from joda import bench as run
 
     with spinner("bench") as progress:
@@ -138,3 +152,21 @@ def bench(
         print_json([asdict(row) for row in rows])
         return
     tell_ratios(rows)
+
+
+def _bench_warp(scene: Path | None, worlds: Sequence[int], as_json: bool) -> None:
+    """`joda bench --warp`."""
+    from joda.plugin import load
+
+    load()
+    from joda.warp import quiet
+    from joda.warp.bench import WORLDS
+    from joda.warp.bench import bench as run
+
+    quiet()
+    with spinner("bench") as progress:
+        rows = run(scene, worlds=worlds or WORLDS, progress=progress)
+    if as_json:
+        print_json([asdict(row) for row in rows])
+        return
+    tell_worlds(rows)

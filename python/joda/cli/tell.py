@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from joda._generate import Generated
     from joda._refine import Refined
     from joda.cases.gallery import Shown
+    from joda.exporting.nearest import Nearest
     from joda.propose import Usage
     from joda.propose.history import Round
     from joda.template import Template
+    from joda.warp.bench import WarpRow
 
 
 def print_json(value: Any) -> None:
@@ -178,6 +180,38 @@ def tell_ratios(rows: "Iterable[Row]") -> None:
         table.add_row(
             row.what, f"{row.ratio:.3f} ± {row.spread:.3f}", row.bar, f"{ours:.2f} / {other:.2f}"
         )
+    Console(width=None if sys.stdout.isatty() else 110).print(table)
+
+
+def tell_worlds(rows: "Sequence[WarpRow]") -> None:
+    """The table of `joda bench --warp`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    heads = ("worlds", "steps/s with profiles", "native", "none", "÷ native", "÷ none", "kernels")
+    table = Table(*heads, box=None, pad_edge=False)
+    for row in rows:
+        speeds = (f"{speed:,.0f}" for speed in row.per_second)
+        ratios = (f"{row.native_ratio:.2f}", f"{row.plain_ratio:.2f}")
+        table.add_row(str(row.worlds), *speeds, *ratios, " / ".join(map(str, row.launches)))
+    Console(width=None if sys.stdout.isatty() else 110).print(table)
+    say(f"device {rows[0].device}; ÷: time with profiles over that of the other scene")
+
+
+def tell_nearest(joints: "Iterable[Nearest]") -> None:
+    """The table of `joda export`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("joint", "what", "error: rms", "largest", "of", box=None, pad_edge=False)
+    for joint in joints:
+        for error in joint.errors:
+            least = 1e-9 * error.size  # rounding
+            sizes = (
+                f"{size:.3g}" if size > least else "0"
+                for size in (error.rms, error.largest, error.size)
+            )
+            table.add_row(joint.joint, f"{error.what}, {error.unit}", *sizes)
     Console(width=None if sys.stdout.isatty() else 110).print(table)
 
 

@@ -21,6 +21,7 @@ from joda.effects.mechanics import AddedInertia, Backlash, EndStopRestitution, G
 __all__ = [
     "CHANNEL_EFFECTS",
     "EFFECTS",
+    "ON_FRICTION",
     "AddedInertia",
     "AnyEffect",
     "AsymmetricFriction",
@@ -72,3 +73,9 @@ CHANNEL_EFFECTS = {
     "position_dependent_damping": "damping",
 }
 """Effects that are a free curve in a channel, and that channel."""
+
+ON_FRICTION = (
+    *("asymmetric_friction", "stribeck_friction"),
+    *("load_dependent_friction", "presliding_friction"),
+)
+"""Effects that act through the solver's friction row."""

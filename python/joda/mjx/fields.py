@@ -11,21 +11,15 @@ import mujoco
 import numpy as np
 
 from joda.component import Curve
-from joda.effects import CurveEffect
+from joda.effects import ON_FRICTION, CurveEffect
 from joda.errors import JodaError
 from joda.field import jaxeffects, jaxfield
 from joda.field.jaxeffects import Effects, from_effects
 from joda.profile import CHANNELS, Profile
 from joda.scenes.model import find_joint
-from joda.scenes.scene import DAMPING_ROW
+from joda.scenes.scene import damping_equality
 
 Array = jax.Array
-
-ON_FRICTION = (
-    *("asymmetric_friction", "stribeck_friction"),
-    *("load_dependent_friction", "presliding_friction"),
-)
-"""Effects that act through the friction row."""
 
 
 @dataclass(frozen=True)
@@ -229,11 +223,9 @@ def _place(model: mujoco.MjModel, joint: int) -> Place:
     before = sizes[np.isin(model.eq_type, (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)))].sum()
     equality = damping_row = friction_row = -1
     if not (none or off & bit.mjDSBL_EQUALITY):
-        for k in np.flatnonzero(joints):
-            own = model.eq_obj1id[k] == joint and model.eq_obj2id[k] < 0
-            if own and DAMPING_ROW.rstrip("_") in model.equality(int(k)).name:
-                equality, damping_row = int(k), int(before + joints[:k].sum())
-                break
+        equality = damping_equality(model, joint)
+        if equality >= 0:
+            damping_row = int(before + joints[:equality].sum())
     dof = int(model.jnt_dofadr[joint])
     rows = 0 if off & bit.mjDSBL_EQUALITY else int(sizes.sum())
     if not (none or off & bit.mjDSBL_FRICTIONLOSS):

@@ -22,8 +22,8 @@ from joda.scenes.scene import (
     DAMPING_ROW,
     INERT,
     TRACE,
+    damping_equality,
     find_instance,
-    has_damping_row,
     prefix,
     profiles_of,
 )
@@ -111,7 +111,7 @@ class EditedScene:
             self.names[joint] = changes["name"]
         self.joints[joint][1].set(**{**changes, **also})
         self._configure(joint, profile)
-        if not has_damping_row(self.model, joint):
+        if damping_equality(self.model, joint) < 0:
             row, name = quoted(DAMPING_ROW + self.names[joint]), quoted(self.names[joint])
             self.rows.append(f"<joint name={row} joint1={name} {INERT}/>")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco
 
 from joda.errors import JodaError
-from joda.plugin import set_texts, slot
+from joda.plugin import PLUGIN, set_texts, slot
 from joda.profile import ATTRIBUTES, Profile
 from joda.scenes.model import describe_joint, find_joint, load_model
 
@@ -60,14 +60,27 @@ def prefix(model: mujoco.MjModel, joint: int) -> str:
     return "" if alone else f"{joint - model.body_jntadr[body]}."
 
 
-def has_damping_row(model: mujoco.MjModel, joint: int) -> bool:
-    """Whether the joint has the equality constraint whose row carries its damping."""
-    return any(
-        model.eq_type[k] == int(mujoco.mjtEq.mjEQ_JOINT)
-        and (model.eq_obj1id[k], model.eq_obj2id[k]) == (joint, -1)
-        and DAMPING_ROW in model.equality(k).name
-        for k in range(model.neq)
-    )
+def damping_equality(model: mujoco.MjModel, joint: int) -> int:
+    """Id of the equality constraint on the joint alone whose row carries its damping, -1: none."""
+    for k in range(model.neq):
+        if (
+            model.eq_type[k] == int(mujoco.mjtEq.mjEQ_JOINT)
+            and (model.eq_obj1id[k], model.eq_obj2id[k]) == (joint, -1)
+            and DAMPING_ROW.rstrip("_") in model.equality(k).name
+        ):
+            return k
+    return -1
+
+
+def strip_plugin(spec: mujoco.MjSpec) -> None:
+    """Takes the plugin's instances out of the spec; the rows of its joints stay."""
+    own = {plugin.name for plugin in spec.plugins if plugin.plugin_name == PLUGIN} - {""}
+    for body in spec.bodies:
+        if body.plugin.plugin_name == PLUGIN or body.plugin.name in own:
+            body.plugin.active = False
+    for plugin in list(spec.plugins):
+        if plugin.plugin_name == PLUGIN:
+            spec.delete(plugin)
 
 
 def read_profiles(path: str | Path) -> dict[str, Profile]:

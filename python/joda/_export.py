@@ -1,0 +1,102 @@
+"""Writes a scene with profiles for who has no plugin, and says how near the constants come."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from joda.errors import JodaError
+from joda.exporting.markup import meshes_of
+from joda.exporting.native import native
+from joda.exporting.nearest import Format, Nearest, nearest
+from joda.exporting.sdf import sdf
+from joda.exporting.tree import Link, links_of, stl
+from joda.exporting.urdf import urdf
+from joda.exporting.usd import usd
+from joda.files import check_target, file_name, write_together
+from joda.scenes.model import find_joint, load
+from joda.scenes.native import whole_profile
+from joda.scenes.scene import profiles_of
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What `joda export` has written.
+
+    Attributes:
+        files: the file, and the meshes beside it.
+        joints: the constants of each joint that carried a profile, with their errors.
+        notes: what is not in the file, one sentence each.
+    """
+
+    files: tuple[Path, ...]
+    joints: tuple[Nearest, ...]
+    notes: tuple[str, ...]
+
+
+def export(scene: str | Path, to: Format, output: str | Path, *, force: bool = False) -> Exported:
+    """Writes the nearest that a format can express of a scene with profiles.
+
+    Args:
+        scene: MJCF file that carries profiles.
+        to: "native": MJCF without the plugin, with MuJoCo's polynomial spring and damping; "urdf":
+            damping and friction; "sdf": a linear spring, damping and friction; "usd": a drive as
+            linear spring and damping, and friction as PhysX and MuJoCo read it.
+        output: the file; meshes lie beside it as STL, but for USD, which holds them, and MJCF.
+        force: overwrite files.
+
+    Returns:
+        the files, and the constants with their errors.
+
+    Raises:
+        JodaError: the scene cannot be loaded, carries no profile or holds what the format cannot;
+            a file cannot be written; usd-core is not installed.
+    """
+    scene, output = Path(scene), Path(output)
+    check_target(output, force)
+    spec, model = load(scene)
+    profiles = profiles_of(model)
+    if not profiles:
+        raise JodaError(f"{scene}: carries no profile; attach one first with: joda attach")
+    ids = {name: find_joint(model, name) for name in profiles}
+    own = {
+        ids[name]: nearest(whole_profile(model, ids[name], profile), to)
+        for name, profile in profiles.items()
+    }
+    told = tuple(own.values())
+    if to == "native":
+        write_together({output: native(scene, spec, own, output.parent)})
+        return Exported((output,), told, tuple(_lost(told)))
+
+    links, left = links_of(model)
+    notes = [*left, *_lacking(links, to), *_lost(told)]
+    by_name = {links[model.jnt_bodyid[joint]].joint: one for joint, one in own.items()}
+    name = file_name(output.stem)
+    if to == "usd":
+        write_together({output: usd(model, name, links, by_name, notes)})
+        return Exported((output,), told, tuple(notes))
+    meshes = {k: f"{name}.mesh_{k}.stl" for k in sorted(meshes_of(links))}
+    write = urdf if to == "urdf" else sdf
+    contents: dict[Path, bytes | str] = {
+        output.with_name(file): stl(model, mesh) for mesh, file in meshes.items()
+    }
+    for path in contents:
+        check_target(path, force)
+    contents[output] = write(name, links, by_name, meshes, notes)
+    write_together(contents)
+    return Exported((output, *(path for path in contents if path != output)), told, tuple(notes))
+
+
+def _lost(told: Sequence[Nearest]) -> list[str]:
+    return [f"{one.joint}: not in it is {effect}" for one in told for effect in one.lost]
+
+
+def _lacking(links: Sequence[Link], to: Format) -> list[str]:
+    """Shapes that the format has no word for."""
+    if to != "urdf":
+        return []
+    kinds = [shape.kind for link in links for shape in link.shapes]
+    return [
+        f"URDF has no {kind}; {kinds.count(kind)} of them are left out"
+        for kind in ("plane", "ellipsoid")
+        if kind in kinds
+    ]

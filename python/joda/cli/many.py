@@ -1,0 +1,72 @@
+"""The command that does others for many joints at once."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from joda.cli.options import Folder, Force, Json, Passive
+from joda.cli.progress import progress_bar
+from joda.cli.say import say
+from joda.cli.tell import print_json
+
+
+def distribute(
+    what: Annotated[
+        Literal["diagnose", "improve", "generate"],
+        typer.Argument(help="What to do with each joint.", show_default=False),
+    ],
+    cases: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder of folders with a model and its runs; for generate: of models.",
+            show_default=False,
+        ),
+    ],
+    output: Folder,
+    joint: Annotated[
+        str | None,
+        typer.Option(help="Which of each model [default: the only one; for generate all]."),
+    ] = None,
+    passive: Passive = False,
+    describe: Annotated[
+        str, typer.Option(help="For generate: what the joints should do.", show_default=False)
+    ] = "",
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Ray cluster, or local for Ray on this machine [default: processes, no Ray].",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Tasks at a time [default: one per core].")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what the folder holds.")
+    ] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Diagnose, improve or generate many joints at once.
+
+    Leaves a folder per joint, with result.json last. Example:
+
+        joda distribute generate out --joint door -o many
+    """
+    from joda import distribute as run
+
+    with progress_bar() as bar:
+        done = run(
+            what, cases, output, joint=joint, passive=passive, describe=describe, ray=ray,
+            workers=workers, resume=resume, force=force, progress=bar,
+        )  # fmt: skip
+    if as_json:
+        print_json([{**asdict(one), "folder": str(one.folder)} for one in done])
+        return
+    for one in done:
+        state = "failed: " if one.failed else "kept: " if one.kept else ""
+        say(f"{one.label}: {state}{one.told}")
+    failed = sum(one.failed for one in done)
+    say(f"{len(done) - failed} of {len(done)} done; {output}")

@@ -1,0 +1,1 @@
+"""Joints as tasks: what one needs and leaves, and who runs many of them."""

@@ -1,0 +1,99 @@
+"""Who runs tasks: processes of this machine, or Ray's workers on many."""
+
+import os
+import socket
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from typing import Any
+
+from joda.distributed.task import Result, Task, run
+from joda.errors import JodaError
+
+HERE = "local"
+"""In the place of a cluster's address: Ray on this machine."""
+PATIENCE = 10
+"""Within which a cluster must answer, s."""
+AHEAD = 4
+"""Tasks per worker that are handed out before one is done: their files wait in memory."""
+
+
+def by_processes(tasks: Iterable[Task], workers: int | None) -> Iterator[tuple[Task, Result]]:
+    """Runs tasks in processes of this machine; yields them as they are done.
+
+    Args:
+        tasks: made as they are needed.
+        workers: processes, by default one per core.
+    """
+    count = workers or os.cpu_count() or 1
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+        waiting: dict[Any, Task] = {}
+        try:
+            for task in tasks:
+                waiting[pool.submit(run, task)] = task
+                if len(waiting) >= AHEAD * count:
+                    yield _next(waiting)
+            while waiting:
+                yield _next(waiting)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _next(waiting: dict[Any, Task]) -> tuple[Task, Result]:
+    first = next(as_completed(waiting))
+    return waiting.pop(first), first.result()
+
+
+def by_ray(
+    tasks: Iterable[Task], address: str, workers: int | None
+) -> Iterator[tuple[Task, Result]]:
+    """The same on Ray; joda must be installed on all of its machines.
+
+    Args:
+        tasks: made as they are needed.
+        address: of the cluster; "local": Ray is started here and ends with the tasks.
+        workers: at most so many tasks at a time, by default one per core of the cluster.
+
+    Raises:
+        JodaError: Ray is not installed, or no cluster answers.
+    """
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is sent to its makers unasked
+    try:
+        import ray
+    except ImportError:
+        raise JodaError('--ray needs Ray; run: pip install ".[ray]"') from None
+    quiet = {"configure_logging": False, "log_to_driver": False}
+    if address == HERE:
+        ray.init(address=HERE, num_cpus=workers, include_dashboard=False, **quiet)
+    else:
+        _check_answers(address)
+        ray.init(address=address, **quiet)
+    try:
+        remote: Callable[..., Any] = ray.remote(num_cpus=1, max_retries=2)(run).remote
+        count = workers or int(ray.cluster_resources().get("CPU", 1))
+        waiting: dict[Any, Task] = {}
+
+        def done() -> tuple[Task, Result]:
+            (first,), _ = ray.wait(list(waiting), num_returns=1)
+            return waiting.pop(first), ray.get(first)
+
+        for task in tasks:
+            waiting[remote(task)] = task
+            if len(waiting) >= (count if workers else AHEAD * count):
+                yield done()
+        while waiting:
+            yield done()
+    finally:
+        ray.shutdown()
+
+
+def _check_answers(address: str) -> None:
+    """Raises JodaError where nothing listens: Ray itself would wait for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    try:
+        socket.create_connection((host, int(port)), timeout=PATIENCE).close()
+    except (OSError, ValueError, OverflowError):
+        raise JodaError(
+            f"no Ray cluster answers at {address}; give HOST:PORT of one that `ray start --head` "
+            "has started, or --ray local."
+        ) from None

@@ -1,0 +1,1 @@
+"""Scenes for who has no plugin: the nearest that other formats can express, and how near it is."""

@@ -1,0 +1,156 @@
+"""Many joints at once: what is made is what the commands make one by one, wherever it is made."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from distributed_cases import make
+
+import joda
+from joda import distribute
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory) -> Path:
+    """Two doors, one with two models, one whose run is no run."""
+    folder = make(tmp_path_factory.mktemp("many") / "cases", 2)
+    shutil.copytree(folder / "door_0000", folder / "deep" / "two")
+    (folder / "deep" / "two" / "other.xml").write_text("<mujoco/>")
+    shutil.copytree(folder / "door_0001", folder / "bad")
+    (folder / "bad" / "run1.csv").write_text("time,position\n0,1\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def diagnosed(cases):
+    seen = []
+    done = distribute(
+        "diagnose", cases, cases.parent / "out", workers=2, progress=lambda *what: seen.append(what)
+    )
+    return done, seen
+
+
+def test_a_diagnosis_is_the_same_as_by_itself(cases, diagnosed, tmp_path, monkeypatch):
+    done, seen = diagnosed
+    assert [one.label for one in done] == ["bad", "deep/two", "door_0000", "door_0001"]
+    assert [one.failed for one in done] == [True, True, False, False]
+    assert "holds 2 models beside runs" in done[1].told
+    assert "run1.csv" in done[0].told and not done[0].folder.exists()
+    assert seen[-1][:2] == (4, 4)
+    monkeypatch.chdir(cases.parent)
+    for one in done[2:]:
+        case = Path("cases") / one.label
+        runs = sorted(case.glob("*.csv"))
+        direct = joda.diagnose(case / "door.xml", "door", runs, json=tmp_path / f"{one.label}.json")
+        assert direct.summary == one.told
+        there = (one.folder / "diagnosis.json").read_bytes()
+        assert there == (tmp_path / f"{one.label}.json").read_bytes()
+        assert json.loads((one.folder / "result.json").read_text())["told"] == one.told
+
+
+def test_ray_makes_the_same_bytes(cases, diagnosed):
+    pytest.importorskip("ray")
+    done, _ = diagnosed
+    again = distribute("diagnose", cases, cases.parent / "by_ray", ray="local", workers=2)
+    assert [(one.label, one.told) for one in again] == [(one.label, one.told) for one in done]
+    assert contents(cases.parent / "by_ray") == contents(cases.parent / "out")
+
+
+def test_resume_does_what_is_not_there_or_has_changed(cases, diagnosed, tmp_path):
+    done, _ = diagnosed
+    shutil.copytree(cases.parent / "out", tmp_path / "out")
+    shutil.copytree(cases, tmp_path / "cases")
+    shutil.rmtree(tmp_path / "cases" / "bad")
+    shutil.rmtree(tmp_path / "cases" / "deep")
+    (tmp_path / "out" / "door_0001" / "diagnosis.html").unlink()
+    before = contents(tmp_path / "out")
+    with pytest.raises(joda.JodaError, match="go on with --resume"):
+        distribute("diagnose", tmp_path / "cases", tmp_path / "out")
+    again = distribute("diagnose", tmp_path / "cases", tmp_path / "out", workers=1, resume=True)
+    assert [one.kept for one in again] == [True, False]
+    assert [one.told for one in again] == [one.told for one in done[2:]]
+    assert contents(tmp_path / "out") == {
+        **before,
+        "door_0001/diagnosis.html": (done[3].folder / "diagnosis.html").read_bytes(),
+    }
+    run = tmp_path / "cases" / "door_0000" / "run0.csv"
+    run.write_text("\n".join(run.read_text().splitlines()[:-5]) + "\n")
+    again = distribute("diagnose", tmp_path / "cases", tmp_path / "out", workers=1, resume=True)
+    assert [one.kept for one in again] == [False, True]
+
+
+def test_improve_writes_the_scene_that_it_writes_by_itself(cases, tmp_path):
+    shutil.copytree(cases / "door_0001", tmp_path / "cases" / "door")
+    (one,) = distribute("improve", tmp_path / "cases", tmp_path / "out", workers=1)
+    assert not one.failed and one.told.startswith("constant_damping_hinge added; ")
+    case = tmp_path / "cases" / "door"
+    direct = tmp_path / "direct" / "door"
+    direct.mkdir(parents=True)
+    joda.improve(case / "door.xml", "door", sorted(case.glob("*.csv")), direct / "new.xml")
+    for name in ("new.xml", "new.composed.json", "new.png"):
+        assert (one.folder / name).read_bytes() == (direct / name).read_bytes()
+
+
+def test_generate_does_every_joint_as_by_itself(tmp_path):
+    models = Path(__file__).parents[1] / "models"
+    (tmp_path / "models").mkdir()
+    shutil.copy(models / "knob.xml", tmp_path / "models")
+    (one,) = distribute("generate", tmp_path / "models", tmp_path / "out", workers=1)
+    assert one.label == "knob/knob" and not one.failed, one.told
+    direct = tmp_path / "direct" / "knob" / "knob"
+    joda.generate(tmp_path / "models" / "knob.xml", "knob", direct, proposer="offline")
+    for name in ("composed.json", "proposal.json", "scene.xml", "profile.png"):
+        assert (one.folder / name).read_bytes() == (direct / name).read_bytes()
+
+
+def test_mistakes_are_one_sentence(cases, tmp_path):
+    for arguments, said in (
+        (("diagnose", tmp_path / "none"), "no such folder"),
+        (("diagnose", tmp_path), "holds no folder with a model"),
+        (("generate", tmp_path), "holds no model"),
+    ):
+        with pytest.raises(joda.JodaError, match=said):
+            distribute(*arguments, tmp_path / "out")
+    with pytest.raises(joda.JodaError, match="--describe is of generate"):
+        distribute("diagnose", cases, tmp_path / "out", describe="it stays")
+    with pytest.raises(joda.JodaError, match="--passive is of diagnose and improve"):
+        distribute("generate", cases, tmp_path / "out", passive=True)
+    code = (
+        "import sys; sys.modules['ray'] = None\nimport joda\n"
+        f"try: joda.distribute('diagnose', {str(cases)!r}, {str(tmp_path / 'o')!r}, ray='local')\n"
+        "except joda.JodaError as error: print(error)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert '--ray needs Ray; run: pip install ".[ray]"' in run.stdout
+
+
+def test_a_cluster_that_does_not_answer_is_one_sentence(cases, tmp_path):
+    pytest.importorskip("ray")
+    with pytest.raises(joda.JodaError, match=r"no Ray cluster answers at 127\.0\.0\.1:1;"):
+        distribute("diagnose", cases, tmp_path / "out", ray="127.0.0.1:1")
+
+
+def test_a_joint_must_be_named_where_there_are_several(cases, tmp_path):
+    case = tmp_path / "cases" / "door"
+    shutil.copytree(cases / "door_0000", case)
+    two = (
+        (case / "door.xml")
+        .read_text()
+        .replace(
+            "</worldbody>", '<body><joint name="b" range="0 1"/><geom size="1"/></body></worldbody>'
+        )
+    )
+    (case / "door.xml").write_text(two)
+    (one,) = distribute("diagnose", tmp_path / "cases", tmp_path / "out", workers=1)
+    assert one.failed and "2 hinges and slides with a range ('door', 'b'); name one" in one.told

@@ -1,0 +1,357 @@
+"""joda export: what is written is the scene, and the errors that are told are those it makes."""
+
+import json
+import subprocess
+import sys
+from math import degrees
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import joda
+from joda import export
+from joda.component import Component
+from joda.effects import (
+    AddedInertia,
+    AsymmetricFriction,
+    Backlash,
+    GravityOffset,
+    QuadraticDamping,
+    StribeckFriction,
+)
+from joda.profile import Channel, Channels, Joint, Profile, Resistance
+
+SCENE = """
+<mujoco>
+  <compiler angle="radian"/>
+  <asset><mesh name="wedge" vertex="0 0 0  .2 0 0  0 .3 0  0 0 .1"/>
+    <material name="red" rgba="1 0 0 1"/></asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 .1"/>
+    <body name="case" pos=".1 .2 .3" euler=".3 .2 .1">
+      <geom type="box" size=".1 .2 .3" pos="0 .1 0" material="red"/>
+      <body name="lid" pos=".1 0 .2" quat=".8 .6 0 0">
+        <joint name="lid" axis="0 .6 .8" pos=".05 -.1 .2" range="-.4 1.4" ref=".3" damping=".1"/>
+        <geom type="capsule" size=".03 .2" pos=".1 0 0" euler="0 1 0"/>
+        <geom type="mesh" mesh="wedge" pos="0 .1 0" euler="0 0 .4"/>
+        <body name="slider" pos="0 0 .3" euler="0 .5 0">
+          <joint name="slider" type="slide" axis=".6 0 .8" range="0 .3" ref=".1"/>
+          <geom type="cylinder" size=".05 .1"/>
+          <body name="tip" pos="0 0 .1"><geom type="sphere" size=".04" group="4"/></body>
+        </body>
+      </body>
+    </body>
+    <body name="ball" pos="1 0 1"><freejoint/><geom type="ellipsoid" size=".1 .12 .15"/></body>
+  </worldbody>
+</mujoco>"""
+
+
+def part(a, b, *y):
+    x = tuple(float(u) for u in np.linspace(0, 1, len(y)))
+    return Component(interval=(a, b), x=x, y=y)
+
+
+LID = Profile(
+    joint=Joint(name="lid", type="hinge", range=(-0.4, 1.4), unit="rad"),
+    channels=Channels(
+        conservative=Channel(components=(part(0, 1, 2.0, -1.0), part(0, 0.3, 0, -1.5, 0))),
+        friction=Resistance(components=(part(0, 1, 0.4, 0.2),)),
+        damping=Resistance(components=(part(0, 1, 0.5, 0.5), part(0.8, 1, 0, 2.0))),
+    ),
+    effects=(
+        QuadraticDamping(y=(0.2, 0.2)),
+        AsymmetricFriction(direction="negative", y=(0.1, 0.1)),
+        StribeckFriction(velocity=0.1, y=(0.3, 0.3)),
+        GravityOffset(sin=0.2),
+        AddedInertia(inertia=0.01),
+        Backlash(play=0.01, inertia=0.001),
+    ),
+)
+SLIDER = Profile(
+    joint=Joint(name="slider", type="slide", range=(0, 0.3), unit="m"),
+    channels=Channels(
+        conservative=Channel(components=(part(0, 1, 6.0, -3.0),)),
+        friction=Resistance(components=(part(0, 1, 2.0, 2.0),)),
+        damping=Resistance(components=(part(0, 1, 4.0, 4.0),)),
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("export")
+    (folder / "plain.xml").write_text(SCENE)
+    joda.attach(folder / "plain.xml", [LID, SLIDER], folder / "scene.xml")
+    return folder / "scene.xml"
+
+
+@pytest.fixture(scope="module")
+def model(scene) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(scene))
+
+
+def poses(model, names, q):
+    """Where in the moved bodies the joints are, and their axes, with the joints at q."""
+    data = mujoco.MjData(model)
+    for name in names:
+        data.qpos[model.joint(name).qposadr] = q[name]
+    mujoco.mj_kinematics(model, data)
+    ids = [model.joint(name).id for name in names]
+    bodies = model.jnt_bodyid[ids]
+    turned = np.einsum("nij,nj->ni", data.xmat[bodies].reshape(-1, 3, 3), model.jnt_pos[ids])
+    return data.xpos[bodies] + turned, data.xaxis[ids]
+
+
+JOINTS = ("lid", "slider")
+
+
+@pytest.mark.parametrize("q", [{"lid": 0.0, "slider": 0.0}, {"lid": 1.1, "slider": 0.25}])
+def test_the_urdf_moves_and_weighs_as_the_scene(scene, model, tmp_path, q):
+    """As MuJoCo itself reads URDF: where joints are, mass matrix, limits, geoms."""
+    written = export(scene, "urdf", tmp_path / "o.urdf")
+    other = mujoco.MjModel.from_xml_path(str(tmp_path / "o.urdf"))
+    for ours, theirs in zip(poses(model, JOINTS, q), poses(other, JOINTS, q), strict=True):
+        assert np.allclose(ours, theirs, atol=1e-6)
+    assert other.body_mass.sum() == pytest.approx(model.body_mass[2:].sum(), rel=1e-6)  # fused
+    assert np.allclose(mass_matrix(other, q), mass_matrix(model, q, less=0.01), rtol=1e-5)
+    assert np.allclose(other.jnt_range[other.joint("lid").id], (-0.4, 1.4))
+    (told,) = [one for one in written.joints if one.joint == "lid"]
+    dof = other.joint("lid").dofadr[0]
+    assert other.dof_damping[dof] == pytest.approx(told.damping[0], rel=1e-6)
+    assert other.dof_frictionloss[dof] == pytest.approx(told.friction, rel=1e-6)
+    assert (other.geom_type == mujoco.mjtGeom.mjGEOM_MESH).any()
+    assert any("no plane" in note for note in written.notes)
+    assert sum("lid: not in it is" in note for note in written.notes) == 4
+
+
+def mass_matrix(model, q, less=0.0):
+    data = mujoco.MjData(model)
+    for name in JOINTS:
+        data.qpos[model.joint(name).qposadr] = q[name]
+    mujoco.mj_forward(model, data)
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    dofs = [model.joint(name).dofadr[0] for name in JOINTS]
+    out = full[np.ix_(dofs, dofs)]
+    out[0, 0] -= less  # the added inertia, which URDF has no word for
+    return out
+
+
+def test_native_makes_the_error_that_it_tells(scene, model, tmp_path):
+    """Force by force against the plugin, over the range; it needs no plugin."""
+    told = {one.joint: one for one in export(scene, "native", tmp_path / "n.xml").joints}
+    other = mujoco.MjModel.from_xml_path(str(tmp_path / "n.xml"))
+    assert (other.nplugin, other.neq, other.njnt) == (0, 0, model.njnt)
+    assert other.dof_armature[0] == pytest.approx(0.01)
+    for name in JOINTS:
+        found = {error.what: error for error in told[name].errors}
+        # the plugin writes friction of two bounds as a symmetric one about half their difference
+        force = differences(model, other, name) - (0.05 if name == "lid" else 0)
+        assert np.sqrt(np.square(force).mean()) == pytest.approx(
+            found["conservative force"].rms, rel=1e-3, abs=1e-6
+        )
+        assert np.abs(force).max() == pytest.approx(
+            found["conservative force"].largest, rel=1e-3, abs=1e-6
+        )
+        assert found["conservative force"].rms == pytest.approx(best(name), rel=1e-6, abs=1e-9)
+    assert told["lid"].damping[1] == pytest.approx(0.2, abs=1e-6)
+    assert told["slider"].stiffness[0] == pytest.approx(30)
+    dof = other.joint("lid").dofadr[0]
+    assert other.dof_frictionloss[dof] == pytest.approx(0.35, rel=1e-4)  # 0.3, and half of 0.1
+
+
+def best(name):
+    """What the best of all cubics leaves of the force."""
+    profile = {"lid": LID, "slider": SLIDER}[name]
+    s = np.linspace(0, 1, 501)
+    lo, hi = profile.joint.range
+    force = joda.field.evaluate(profile.channels.conservative, s)[0]
+    if name == "lid":
+        force = force + 0.2 * np.sin(lo + s * (hi - lo))
+    return np.sqrt(np.square(force - np.polyval(np.polyfit(s, force, 3), s)).mean())
+
+
+def differences(model, other, name):
+    """Conservative forces of the plugin minus those of the other model, at rest."""
+    out = []
+    for s in np.linspace(0, 1, 501):
+        forces = []
+        for one in (model, other):
+            data = mujoco.MjData(one)
+            lo, hi = one.joint(name).range
+            data.qpos[one.joint(name).qposadr] = lo + s * (hi - lo)
+            mujoco.mj_forward(one, data)
+            forces.append(data.qfrc_passive[one.joint(name).dofadr[0]])
+        out.append(forces[0] - forces[1])
+    return np.array(out)
+
+
+def test_the_nearest_line_is_that_of_least_squares(scene, tmp_path):
+    """Checked by trying the neighbours; URDF's error of the force is the whole force."""
+    told = {one.joint: one for one in export(scene, "sdf", tmp_path / "o.sdf").joints}["lid"]
+    force = next(error for error in told.errors if error.what == "conservative force")
+    q = np.linspace(-0.4, 1.4, 501)
+    s = (q + 0.4) / 1.8
+    true = joda.field.evaluate(LID.channels.conservative, s)[0] + 0.2 * np.sin(q)
+
+    def rms(k, zero):
+        return np.sqrt(np.square(true + k * (q - zero)).mean())
+
+    k, zero = told.stiffness[0], told.reference
+    assert rms(k, zero) == pytest.approx(force.rms)
+    for dk, dz in ((0.02, 0), (-0.02, 0), (0, 0.02), (0, -0.02)):
+        assert rms(k + dk, zero + dz) > force.rms
+    urdf = export(scene, "urdf", tmp_path / "u.urdf").joints[0]
+    assert urdf.errors[0].rms == pytest.approx(np.sqrt(np.square(true).mean()))
+
+
+def test_a_force_that_pushes_away_becomes_a_constant_one(tmp_path):
+    """No format but MJCF takes a spring of negative stiffness without blowing up."""
+    (tmp_path / "plain.xml").write_text(SCENE)
+    away = Channels(conservative=Channel(components=(part(0, 1, 1.0, 3.0),)))
+    profile = LID.model_copy(update={"channels": away, "effects": ()})
+    joda.attach(tmp_path / "plain.xml", profile, tmp_path / "scene.xml")
+    (told,) = export(tmp_path / "scene.xml", "sdf", tmp_path / "o.sdf").joints
+    assert told.stiffness[0] > 0
+    for q in (-0.4, 0.5, 1.4):
+        assert -told.stiffness[0] * (q - told.reference) == pytest.approx(2, rel=0.011)
+    assert told.errors[0].rms == pytest.approx(2 / np.sqrt(12), rel=0.03)
+
+
+def test_the_sdf_is_the_scene(scene, model, tmp_path):
+    """Frames of the links, joint by joint from the world, with the joints at 0; the numbers."""
+    told = {one.joint: one for one in export(scene, "sdf", tmp_path / "o.sdf").joints}
+    root = ET.parse(tmp_path / "o.sdf").getroot().find("model")
+    anchors, axes = poses(model, JOINTS, dict.fromkeys(JOINTS, 0.0))
+    for name, anchor, axis in zip(JOINTS, anchors, axes, strict=True):
+        position, turn = sdf_frame(root, name)
+        assert np.allclose(position, anchor, atol=1e-7)
+        element = root.find(f"joint[@name='{name}']/axis")
+        written = np.array(element.findtext("xyz").split(), float)
+        assert np.allclose(turn @ written, axis, atol=1e-7)
+        dynamics = element.find("dynamics")
+        for tag, value in (
+            ("damping", told[name].damping[0]),
+            ("friction", told[name].friction),
+            ("spring_reference", told[name].reference),
+            ("spring_stiffness", told[name].stiffness[0]),
+        ):
+            assert float(dynamics.findtext(tag)) == pytest.approx(value, rel=1e-8)
+    assert root.find("joint[@name='lid']/parent").text == "case"
+    assert root.find("joint[@name='ball_joint']") is None  # it is free
+    assert root.find("link[@name='ball']") is not None
+    uri = root.findtext(".//mesh/uri")
+    assert (tmp_path / uri).stat().st_size == 84 + 4 * 50
+
+
+def sdf_frame(root, name):
+    """Position and rotation of a link in the world."""
+    pose = root.find(f"link[@name='{name}']/pose")
+    values = np.array(pose.text.split(), float)
+    turn, position = Rotation.from_euler("xyz", values[3:]).as_matrix(), values[:3]
+    above = pose.get("relative_to")
+    if above is None:
+        return position, turn
+    there, turned = sdf_frame(root, above)
+    return there + turned @ position, turned @ turn
+
+
+def test_the_usd_is_the_scene(scene, model, tmp_path):
+    """As usd-core reads it: frames at both sides of each joint, units per degree, friction."""
+    Usd = pytest.importorskip("pxr.Usd")
+    from pxr import UsdGeom, UsdPhysics
+
+    told = {one.joint: one for one in export(scene, "usd", tmp_path / "o.usda").joints}
+    stage = Usd.Stage.Open(str(tmp_path / "o.usda"))
+    cache = UsdGeom.XformCache()
+    anchors, axes = poses(model, JOINTS, dict.fromkeys(JOINTS, 0.0))
+    for name, anchor, axis in zip(JOINTS, anchors, axes, strict=True):
+        prim = stage.GetPrimAtPath(f"/o/joint_{name}")
+        joint = UsdPhysics.Joint(prim)
+        sides = []
+        for side in (0, 1):
+            body = getattr(joint, f"GetBody{side}Rel")().GetTargets()[0]
+            frame = cache.GetLocalToWorldTransform(stage.GetPrimAtPath(body))
+            at = frame.Transform(getattr(joint, f"GetLocalPos{side}Attr")().Get())
+            turn = getattr(joint, f"GetLocalRot{side}Attr")().Get()
+            along = frame.TransformDir(turn.Transform((0, 0, 1)))
+            across = frame.TransformDir(turn.Transform((1, 0, 0)))
+            sides.append((at, along, across))
+        assert np.allclose(sides[0], sides[1], atol=1e-6)
+        assert np.allclose(sides[1][0], anchor, atol=1e-6)
+        assert np.allclose(sides[1][1], axis, atol=1e-6)
+        way, per = ("angular", degrees(1)) if name == "lid" else ("linear", 1.0)
+        drive = UsdPhysics.DriveAPI.Get(prim, way)
+        own = told[name]
+        for value, expected in (
+            (drive.GetStiffnessAttr().Get() * per, own.stiffness[0]),
+            (drive.GetDampingAttr().Get() * per, own.damping[0]),
+            (drive.GetTargetPositionAttr().Get() / per, own.reference),
+            (prim.GetAttribute("mjc:frictionloss").Get(), own.friction),
+            (
+                prim.GetAttribute(f"physxJointAxis:{way}:staticFrictionEffort").Get(),
+                own.static_friction,
+            ),
+        ):
+            assert value == pytest.approx(expected, rel=1e-6)
+    assert told["lid"].static_friction == pytest.approx(told["lid"].friction + 0.3)
+    mass = UsdPhysics.MassAPI(stage.GetPrimAtPath("/o/lid"))
+    assert mass.GetMassAttr().Get() == pytest.approx(model.body("lid").mass[0])
+    assert not stage.GetPrimAtPath("/o/world").HasAPI(UsdPhysics.RigidBodyAPI)
+
+
+SEVERAL = """<mujoco><compiler angle="radian"/><worldbody>
+  <body name="two"><joint name="lid" range="-.4 1.4" limited="true"/>
+  {other}<geom size=".1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ('<joint name="b" type="slide"/>', "body 'two' has 2 joints, which only MJCF"),
+        (
+            '<geom size=".1"/></body><body><joint name="c" type="ball"/>',
+            "joint 'c' is a ball joint; only hinges",
+        ),
+    ],
+)
+def test_what_no_other_format_can_say_is_refused(tmp_path, other, said):
+    (tmp_path / "plain.xml").write_text(SEVERAL.format(other=other))
+    profile = LID.model_copy(update={"effects": ()})
+    joda.attach(tmp_path / "plain.xml", profile, tmp_path / "scene.xml")
+    with pytest.raises(joda.JodaError, match=said):
+        export(tmp_path / "scene.xml", "urdf", tmp_path / "o.urdf")
+    assert not (tmp_path / "o.urdf").exists()
+    export(tmp_path / "scene.xml", "native", tmp_path / "n.xml")
+
+
+def test_mistakes_are_one_sentence(scene, tmp_path):
+    (tmp_path / "plain.xml").write_text(SCENE)
+    with pytest.raises(joda.JodaError, match="carries no profile; attach one first"):
+        export(tmp_path / "plain.xml", "sdf", tmp_path / "o.sdf")
+    with pytest.raises(joda.JodaError, match="exists already"):
+        export(scene, "sdf", tmp_path / "plain.xml")
+    code = (
+        "import sys; sys.modules['pxr'] = None\nimport joda\n"
+        f"try: joda.export({str(scene)!r}, 'usd', {str(tmp_path / 'o.usda')!r})\n"
+        "except joda.JodaError as error: print(error)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 'needs usd-core; run: pip install ".[export]"' in run.stdout
+
+
+def test_the_command_tells_errors_in_units(scene, tmp_path):
+    command = [Path(sys.executable).parent / "joda", "export", scene, "--to", "urdf"]
+    run = subprocess.run([*command, "-o", "a.urdf"], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert "conservative force, N·m" in run.stdout and "friction, N " in run.stdout
+    run = subprocess.run(
+        [*command, "-o", "b.urdf", "--json"], cwd=tmp_path, capture_output=True, text=True
+    )
+    told = json.loads(run.stdout)
+    assert told["files"][0] == "b.urdf"
+    assert [error["unit"] for error in told["joints"][1]["errors"]] == ["N"] * 3
