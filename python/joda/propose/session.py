@@ -30,6 +30,7 @@ from joda.plain import plain
 from joda.profile import Profile, describe
 from joda.proposal import Proposal
 from joda.propose import Answer, Proposer, Task, Turn, Usage, total
+from joda.propose.archetype import read_archetypes
 from joda.propose.history import Failure, History, Round
 from joda.propose.wishes import read_wishes, unmet
 from joda.template import read_templates
@@ -83,7 +84,13 @@ class Session:
         make_folder(folder)
         self._save()
         write_text(folder / "context.json", plain(self.context.model_dump_json(indent=2)) + "\n")
-        self.task = Task(self.context, library, self._pictures(), history.description)
+        self.task = Task(
+            self.context,
+            library,
+            self._pictures(),
+            history.description,
+            read_archetypes(self._templates),
+        )
         if self.turns and not self._finished():
             self._write(self.turns[-1])
 
@@ -220,6 +227,7 @@ class Session:
             unmet=tuple(unmet([*wanted, *asked], behaved, self.context).values()),
             notes=tuple(answer.notes),
             usage=answer.usage,
+            recognised=answer.recognised,
         )
         return round, self._turn(round, profile)
 

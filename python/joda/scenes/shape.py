@@ -34,6 +34,11 @@ OUT, NEARLY = 0.12, 0.03
 against the model's reference position, and where that tells nothing."""
 
 
+HAND = 0.12
+"""Parts up to this size (m) are worked by fingers; one that slides is at rest where the model has
+it, be that out of its object, as a button, or in it."""
+
+
 class Shape(Frozen):
     """Features of a joint's part and of the object that it belongs to. SI units and degrees.
 
@@ -95,10 +100,6 @@ class Shape(Frozen):
     carries: bool = False
 
 
-HAND = 0.12
-"""Parts up to this size (m) are worked by fingers."""
-
-
 @dataclass(frozen=True)
 class Seen:
     """What is seen of a joint.
@@ -135,7 +136,8 @@ def look(model: mujoco.MjModel, joint: int, described: Joint, reference: End | s
         end: _Look.at(model, data, joint, q, own, rest)
         for end, q in zip(("low_end", "high_end"), described.range, strict=True)
     }
-    closed = _closed(looks, reference, described.type == "slide")
+    tiny = float(max(looks["low_end"].box.size)) <= HAND and described.type == "slide"
+    closed = _end(reference) if tiny else _closed(looks, reference, described.type == "slide")
     shut = closed if closed != "unknown" else "low_end"
     other: End = "high_end" if shut == "low_end" else "low_end"
     at, open_ = looks[shut], looks[other]
