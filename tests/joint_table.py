@@ -151,9 +151,7 @@ def judge(row: Row) -> Result:
         profile = compile(answer.proposal, found)
         behaved = behaviour(found, profile)
         lacking = unmet(read_wishes(answer.proposal.whole_motion_descrptn), behaved, found)
-        turns.append(
-            Turn(answer.proposal, profile, behaved, b"", "", tuple(lacking.values()))
-        )
+        turns.append(Turn(answer.proposal, profile, behaved, b"", "", tuple(lacking.values())))
     behaved, summary = turns[-1].behaviour, turns[-1].proposal.joint_summary
     arm = found.lever_arm if row.arm is None else row.arm
     way = behaved.opening
@@ -192,7 +190,8 @@ def holds(key: str, value: Any, behaved: Behaviour, arm: float) -> bool:
         return all(abs(rest(way) - 0.5) < 0.1 for way in (0.1, 0.9))
     if key == "force":
         way = behaved.opening
-        return bool(way.arrived and value[0] <= way.force / arm <= value[1])
+        steady = way.force if way.steady is None else way.steady
+        return bool(way.arrived and value[0] <= steady / arm <= value[1])
     raise KeyError(key)
 
 

@@ -148,9 +148,9 @@ def falls_shut(seen: Seen) -> str:
 
 
 def takes(seen: Seen) -> str:
-    """The most that a slow hand needs to open it lies within these forces."""
+    """The most that a slow hand needs to open it, but for its inertia, lies within these forces."""
     way = seen.behaviour.opening
-    force = way.force / seen.context.lever_arm
+    force = (way.force if way.steady is None else way.steady) / seen.context.lever_arm
     return _unless(
         way.arrived and seen.number <= force <= seen.most, f"opening it takes {force:.3g} N"
     )

@@ -13,7 +13,7 @@ import numpy as np
 from joda._compile import reference_scales
 from joda._context import Context
 from joda.component import Frozen
-from joda.propose.archetype import Archetype, Feature, read_archetypes
+from joda.propose.archetype import Archetype, Feature, Force, forces, read_archetypes
 from joda.propose.naming import concepts, said
 
 Gravity = Literal["level", "opens", "closes"]
@@ -61,6 +61,7 @@ class Recognition(Frozen):
         decided: what spoke for it and against it, the most important first.
         others: what else it could be, the likeliest first.
         because: why such joints do what they do.
+        force: what opening one takes at the handle, and who says so; None where nothing is known.
     """
 
     title: str
@@ -68,6 +69,7 @@ class Recognition(Frozen):
     decided: tuple[Evidence, ...] = ()
     others: tuple[Other, ...] = ()
     because: str = ""
+    force: Force | None = None
 
     def describe(self) -> str:
         """The answer in one line."""
@@ -121,6 +123,7 @@ def recognise(
         decided=tuple(one for one in decided if abs(one.points) >= FITS)[:6],
         others=tuple(others),
         because=best.evidence,
+        force=forces()[best.force] if best.force else None,
     )
 
 
@@ -160,7 +163,9 @@ def _weigh(one: Archetype, context: Context, description: str) -> list[Evidence]
     for name, expected in one.shape.items():
         if name in found:
             out.append(
-                Evidence(feature=f"{name} {_value(found[name])}", points=_fits(found[name], expected))
+                Evidence(
+                    feature=f"{name} {_value(found[name])}", points=_fits(found[name], expected)
+                )
             )
     return out
 

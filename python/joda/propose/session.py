@@ -22,7 +22,7 @@ from joda._context import Context, context
 from joda._render import render
 from joda.errors import JodaError
 from joda.files import make_folder, read_text, write_bytes, write_text
-from joda.interaction.behaviour import behaviour
+from joda.interaction.behaviour import Behaviour, behaviour
 from joda.interaction.surroundings import surroundings
 from joda.pictures.draw import draw
 from joda.pictures.style import png
@@ -31,11 +31,15 @@ from joda.profile import Profile, describe
 from joda.proposal import Proposal
 from joda.propose import Answer, Proposer, Task, Turn, Usage, total
 from joda.propose.archetype import read_archetypes
+from joda.propose.checks import Seen, takes
 from joda.propose.history import Failure, History, Round
+from joda.propose.recognise import recognise
 from joda.propose.wishes import read_wishes, unmet
 from joda.template import read_templates
 
 PICTURES = 5
+SURE = 0.5
+"""How sure it must be what a joint is, before somebody's proposal is doubted for its force."""
 
 Progress = Callable[[str], None]
 
@@ -225,11 +229,30 @@ class Session:
             behaviour=behaved,
             facts=behaved.describe(self.context),
             unmet=tuple(unmet([*wanted, *asked], behaved, self.context).values()),
-            notes=tuple(answer.notes),
+            notes=(*answer.notes, *self._implausible(behaved, answer)),
             usage=answer.usage,
             recognised=answer.recognised,
         )
         return round, self._turn(round, profile)
+
+    def _implausible(self, behaved: Behaviour, answer: Answer) -> tuple[str, ...]:
+        """That opening takes another force than such joints do; of rules it is a wish of theirs."""
+        if answer.recognised is not None:
+            return ()
+        found = recognise(self.context, self.history.description, self.task.archetypes)[1]
+        if found.force is None or found.likely < SURE:
+            return ()
+        least, most = found.force.opening
+        instead = takes(Seen(behaved, self.context, least, most))
+        return (
+            (
+                f"It looks like a {found.title} ({found.likely:.0%}), which takes {least:g} to "
+                f"{most:g} N at the handle to open ({found.force.source or 'an estimate'}), but "
+                f"{instead}.",
+            )
+            if instead
+            else ()
+        )
 
     def _compiled(self, proposal: Proposal) -> Profile:
         return compile(proposal, self.context, templates=self._templates, key=self.history.key)

@@ -1,5 +1,7 @@
 """Cavities: whether a part covers a hollow, or is one itself, told by rays from inside."""
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,8 @@ Array = NDArray[np.float64]
 
 RAYS = 96
 """How many directions are looked at from a point, evenly over the sphere."""
+FREED = 0.005
+"""How much farther (m) a ray must go when the part is away: faces that touch hide nothing."""
 WALLED = 0.8
 """From inside a cavity, at least this share of what the part leaves free is wall."""
 
@@ -24,30 +28,45 @@ def _sphere(count: int) -> Array:
 DIRECTIONS = _sphere(RAYS)
 
 
-def seen(model: mujoco.MjModel, data: mujoco.MjData, point: Array, reach: float) -> Array:
-    """The geoms that rays from a point hit within `reach` (m), -1 for none; one per direction."""
+class View(NamedTuple):
+    """What rays from a point hit, one per direction.
+
+    Attributes:
+        geoms: -1 for none, or a plane: floors and walls are no part of any object.
+        distances: m, infinite for none.
+    """
+
+    geoms: NDArray[np.int32]
+    distances: Array
+
+
+def view(model: mujoco.MjModel, data: mujoco.MjData, point: Array, reach: float) -> View:
+    """What rays from a point hit within `reach` (m)."""
     geoms, distances = np.full(RAYS, -1, np.int32), np.empty(RAYS)
     mujoco.mj_multiRay(
         model, data, point, DIRECTIONS.ravel(), None, 1, -1, geoms, distances, None, RAYS, reach
     )
-    planes = np.isin(geoms, np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE))
-    return np.where(planes, -1, geoms)
+    planes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    none = (geoms < 0) | np.isin(geoms, planes)
+    return View(np.where(none, -1, geoms), np.where(none, np.inf, distances))
 
 
-def covered(hits: Array, own: Array) -> float:
+def covered(shut: View, open_: View, own: NDArray[np.intp]) -> float:
     """The share of a point's view that a part takes, if all else in view is wall; else 0.
 
     Args:
-        hits: what `seen` found there.
+        shut: with the part where it may cover a cavity.
+        open_: with the part at the other end; what is as near then was no cover.
         own: the geoms of the part.
     """
-    part = np.isin(hits, own)
-    rest = hits[~part]
+    part = np.isin(shut.geoms, own)
+    rest = shut.geoms[~part]
     walled = len(rest) == 0 or float(np.mean(rest >= 0)) >= WALLED
-    return float(part.mean()) if walled else 0.0
+    frees = open_.distances > shut.distances + FREED
+    return float(np.mean(part & frees)) if walled else 0.0
 
 
-def open_above(hits: Array, own: Array, up: Array) -> bool:
+def open_above(hits: NDArray[np.int32], own: NDArray[np.intp], up: Array) -> bool:
     """Whether a part surrounds a point at the sides and below, and leaves it open above."""
     part, height = np.isin(hits, own), DIRECTIONS @ up
     below, above = part[height < 0.2], part[height > 0.7]

@@ -13,24 +13,27 @@ from numpy.typing import NDArray
 
 from joda.component import Frozen
 from joda.profile import Joint
-from joda.scenes.cavity import covered, open_above, seen
+from joda.scenes.cavity import covered, open_above, view
 from joda.scenes.model import moves_with
 from joda.scenes.outline import Box, box_along, corners, grip, own_geoms, rest_of_object, surface
 
 Array = NDArray[np.float64]
 End = Literal["low_end", "high_end"]
+Faces = Literal["along", "normal", "none"]
 
 _SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 DEPTHS = (0.1, 0.25, 0.45)
 """How far behind a part it is looked for a cavity, as shares of the object's depth there."""
 MIDDLES = ((0.0, 0.0), (0.4, 0.4), (-0.4, -0.4), (0.4, -0.4), (-0.4, 0.4))
 """Where on the part's face, from its centre, in units of its half sizes."""
+WITNESSES = 3
+"""From at least so many of these places the part must be seen to close a cavity."""
 ALIKE = 0.03
 """Parts whose sizes differ by no more than this share are of equal shape."""
 LEVEL = 0.15
 """A part that rises by less than this share of its size neither falls open nor shut."""
 OUT, NEARLY = 0.12, 0.03
-"""A part that is so much farther out of its object (in object sizes) at one end is open there,
+"""A part that is so much farther out of its object (in its own sizes) at one end is open there,
 against the model's reference position, and where that tells nothing."""
 
 
@@ -60,7 +63,7 @@ class Shape(Frozen):
             "level" also where it does neither for most of the way.
         covers: share of the view from inside that the part takes where it closes a cavity; else 0.
         holds: whether the part is open above and closed else, as a tray.
-        sticks_out: how much farther the part is out of the object when open, in object sizes.
+        sticks_out: how much farther the part is out of the object when open, in its own sizes.
         object_size: the largest edge of the box around the object, without the part; m, 0 if none.
         object_flat: the smallest edge of that box over its largest.
         share: the part's size over that.
@@ -71,6 +74,7 @@ class Shape(Frozen):
         doors: how many other joints of the object move parts larger than a hand.
         carried: whether the part is mounted on something that a joint moves itself.
         carries: whether other joints are mounted on the part.
+        linked: whether it carries, or is carried by, a part of like size, as the links of an arm.
     """
 
     length: float = 0.0
@@ -81,7 +85,7 @@ class Shape(Frozen):
     slim: float = 1.0
     travel: float = 0.0
     axis: Literal["vertical", "level", "slanted"] = "level"
-    faces: Literal["along", "normal", "none"] = "none"
+    faces: Faces = "none"
     offset: float = 0.0
     weight: Literal["opens", "closes", "level"] = "level"
     covers: float = 0.0
@@ -98,6 +102,7 @@ class Shape(Frozen):
     doors: int = 0
     carried: bool = False
     carries: bool = False
+    linked: bool = False
 
 
 @dataclass(frozen=True)
@@ -132,9 +137,10 @@ def look(model: mujoco.MjModel, joint: int, described: Joint, reference: End | s
         return Seen(None, _end(reference), None, described.name)
     data = mujoco.MjData(model)
     rest = rest_of_object(model, data_at(model, data, joint, described.range[0]), body)
+    low, high = described.range
     looks = {
-        end: _Look.at(model, data, joint, q, own, rest)
-        for end, q in zip(("low_end", "high_end"), described.range, strict=True)
+        "low_end": _Look.at(model, data, joint, (low, high), own, rest),
+        "high_end": _Look.at(model, data, joint, (high, low), own, rest),
     }
     tiny = float(max(looks["low_end"].box.size)) <= HAND and described.type == "slide"
     closed = _end(reference) if tiny else _closed(looks, reference, described.type == "slide")
@@ -144,23 +150,23 @@ def look(model: mujoco.MjModel, joint: int, described: Joint, reference: End | s
     data_at(model, data, joint, described.range[0 if shut == "low_end" else 1])
     alike, controls, doors = _neighbours(model, data, joint)
     shape = _features(model, described, at, open_, data)
-    family = [k for k in (joint, *alike)]
+    below, above = _carriers(model, body), _carried(model, body)
     shape = shape.model_copy(
         update={
             "siblings": len(alike),
             "controls": controls + int(shape.size <= HAND),
             "doors": doors,
-            "carried": _moved(model, int(model.body_parentid[body])),
-            "carries": bool(
-                np.isin(model.jnt_bodyid, np.flatnonzero(moves_with(model, body))).sum() > 1
-            ),
+            "carried": bool(below),
+            "carries": bool(above),
+            "linked": any(_like(model, data, joint, other) for other in (*below, *above)),
         }
     )
     grips = None
     if described.type == "hinge":
         anchor, axis = data.xanchor[joint], data.xaxis[joint]
         grips = grip(model, data, body, anchor, axis, at.outward)
-    return Seen(shape, _end(closed), grips, model.joint(min(family)).name or described.name)
+    first = model.joint(min(joint, *alike, joint)).name
+    return Seen(shape, _end(closed), grips, first or described.name)
 
 
 def data_at(
@@ -187,6 +193,7 @@ class _Look:
         object: corners of the object's boxes, m; empty if there are none.
         anchor, axis: of the joint, in the world.
         outward: across the part's face, away from the object.
+        up: against gravity.
         covers, holds: see Shape.
     """
 
@@ -196,6 +203,7 @@ class _Look:
     anchor: Array
     axis: Array
     outward: Array
+    up: Array
     covers: float
     holds: bool
 
@@ -205,11 +213,12 @@ class _Look:
         model: mujoco.MjModel,
         data: mujoco.MjData,
         joint: int,
-        position: float,
-        own: Array,
-        rest: Array,
+        ends: tuple[float, float],
+        own: NDArray[np.intp],
+        rest: NDArray[np.intp],
     ) -> "_Look":
-        data_at(model, data, joint, position)
+        """With the joint at the first of its ends; the cover is that which the other removes."""
+        data_at(model, data, joint, ends[0])
         points, others = surface(model, data, own), corners(model, data, rest)
         axis, anchor = data.xaxis[joint].copy(), data.xanchor[joint].copy()
         box = box_along(points, axis)
@@ -223,45 +232,41 @@ class _Look:
             outward = -outward
         covers, holds = 0.0, False
         if len(others):
-            depth = float(np.ptp(others @ outward))
-            covers = _covers(model, data, box, outward, depth, own, points)
-            hits = seen(model, data, box.centre, 2 * float(box.size.max()))
+            hits = view(model, data, box.centre, 2 * float(box.size.max())).geoms
             holds = open_above(hits, own, _up(model))
-        return cls(points, box, others, anchor, axis, outward, covers, holds)
+            depth = float(np.ptp(others @ outward))
+            places = _behind(box, outward, depth, float((points @ outward).min()))
+            reach = 2 * (depth + float(box.size.max()))
+            shut = [view(model, data, place, reach) for place in places]
+            data_at(model, data, joint, ends[1])
+            covers = sorted(
+                covered(one, view(model, data, place, reach), own)
+                for one, place in zip(shut, places, strict=True)
+            )[-WITNESSES]
+        return cls(points, box, others, anchor, axis, outward, _up(model), covers, holds)
 
     def out(self) -> float:
-        """Mean distance of the part's corners from the box around the object, in its sizes."""
+        """Mean distance of the part's points from the object's box, in the part's sizes."""
         if not len(self.object):
             return 0.0
-        low, high = self.object.min(axis=0), self.object.max(axis=0)
-        beyond = np.maximum(np.maximum(low - self.points, self.points - high), 0)
-        return float(np.linalg.norm(beyond, axis=1).mean() / max(np.max(high - low), 1e-9))
+        around = box_along(self.object, self.up)
+        apart = np.abs((self.points - around.centre) @ around.axes.T) - around.size / 2
+        far = np.linalg.norm(np.maximum(apart, 0), axis=1).mean()
+        return float(far / max(self.box.size.max(), 1e-9))
 
 
-def _covers(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    box: Box,
-    outward: Array,
-    depth: float,
-    own: Array,
-    points: Array,
-) -> float:
-    """The largest cover that is seen from behind the part's face."""
-    back = float((points @ outward).min())
-    across = [(axis, half) for axis, half in zip(box.axes, box.size / 2, strict=True)
-              if abs(axis @ outward) < 0.5]  # fmt: skip
-    best = 0.0
-    reach = 2 * (depth + float(box.size.max()))
+def _behind(box: Box, outward: Array, depth: float, back: float) -> list[Array]:
+    """Places behind a part's face, in an object of that depth (m) there."""
+    (first, a), (second, b) = (
+        (axis, half)
+        for axis, half in zip(box.axes, box.size / 2, strict=True)
+        if abs(axis @ outward) < 0.5
+    )
+    out = []
     for share in DEPTHS:
         inner = box.centre + (back - share * depth - box.centre @ outward) * outward
-        for u, v in MIDDLES:
-            (first, a), (second, b) = across
-            point = inner + u * a * first + v * b * second
-            best = max(best, covered(seen(model, data, point, reach), own))
-            if best > 0.1:  # it is one; the rest would only say how large
-                return best
-    return best
+        out += [inner + u * a * first + v * b * second for u, v in MIDDLES]
+    return out
 
 
 def _closed(looks: dict[str, _Look], reference: str, slide: bool) -> End | Literal["unknown"]:
@@ -289,13 +294,13 @@ def _features(
     rise = abs(float(at.axis @ up))
     thin = int(np.argmin(box.size))
     is_flat = small < 0.45 * middle
-    faces = "none" if not is_flat else "normal" if thin == 0 else "along"
+    faces: Faces = "none" if not is_flat else "normal" if thin == 0 else "along"
     across = at.anchor - box.centre
     across = across - (across @ at.axis) * at.axis
     half = max(float(box.size[1]) / 2, 1e-9)
     offset = (hi - lo) / max(float(box.size[0]), 1e-9) if slide else np.linalg.norm(across) / half
     others = at.object
-    extent = np.ptp(others, axis=0) if len(others) else np.zeros(3)
+    extent = box_along(others, up).size if len(others) else np.zeros(3)
     object_size = float(extent.max())
     heights = others @ up if len(others) else np.zeros(1)
     height = (float(box.centre @ up) - heights.min()) / max(float(np.ptp(heights)), 1e-9)
@@ -356,11 +361,12 @@ def _neighbours(
             continue
         small = bool(sizes.max() <= HAND)
         controls, doors = controls + int(small), doors + int(not small)
-        kin = model.jnt_type[other] == model.jnt_type[joint] and mine is not None
+        if mine is None or model.jnt_type[other] != model.jnt_type[joint]:
+            continue
         spans = np.ptp(model.jnt_range[[joint, other]], axis=1)
-        if kin and mine is not None and np.allclose(sizes, mine, rtol=ALIKE, atol=1e-4):
-            if abs(spans[0] - spans[1]) <= ALIKE * spans.max():
-                alike.append(other)
+        alike_in = (np.append(sizes, spans[1]), np.append(mine, spans[0]))
+        if np.allclose(*alike_in, rtol=ALIKE, atol=1e-4):
+            alike.append(other)
     return alike, controls, doors
 
 
@@ -374,14 +380,27 @@ def _sizes(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> Array | No
     return np.asarray(np.sort(np.ptp(corners(model, data, geoms) @ frame, axis=0)))
 
 
-def _moved(model: mujoco.MjModel, body: int) -> bool:
-    """Whether a hinge or slide moves the body."""
-    while body:
-        first = int(model.body_jntadr[body])
+def _carriers(model: mujoco.MjModel, body: int) -> list[int]:
+    """The hinges and slides that move a body from below."""
+    out, above = [], int(model.body_parentid[body])
+    while above:
+        first = int(model.body_jntadr[above])
         if first >= 0 and model.jnt_type[first] >= _SLIDE:
-            return True
-        body = int(model.body_parentid[body])
-    return False
+            out.append(first)
+        above = int(model.body_parentid[above])
+    return out
+
+
+def _carried(model: mujoco.MjModel, body: int) -> list[int]:
+    """The hinges and slides of what a body carries."""
+    inside = moves_with(model, body)
+    inside[body] = False
+    return [int(k) for k in np.flatnonzero(inside[model.jnt_bodyid] & (model.jnt_type >= _SLIDE))]
+
+
+def _like(model: mujoco.MjModel, data: mujoco.MjData, joint: int, other: int) -> bool:
+    mine, its = _sizes(model, data, joint), _sizes(model, data, other)
+    return mine is not None and its is not None and bool(0.5 < mine.max() / its.max() < 2)
 
 
 def _up(model: mujoco.MjModel) -> Array:
