@@ -186,7 +186,7 @@ def test_the_same_part_is_another_kind_on_another_object(tmp_path):
         "fridge": "refrigerator door",
         "microwave": "microwave door",
         "wardrobe": "cabinet door",
-        "m": "door",
+        "m": "cabinet door",  # by its size
     }
 
 

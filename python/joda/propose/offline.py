@@ -40,7 +40,7 @@ EXCLUSIVE = {
 }  # fmt: skip
 """Wishes about the middle of the way: the user's replace those of the kind."""
 
-FORCEFUL = EXCLUSIVE | {"takes", "free", "caught", "latched", "held_shut", "snaps"}
+FORCEFUL = EXCLUSIVE | {"left_open", "takes", "free", "caught", "latched", "held_shut", "snaps"}
 """Wishes that say how strong something is; without them it takes what such joints take."""
 
 CLOSES = {"closes_near", "closes_from", "closes_anywhere"}
@@ -62,11 +62,11 @@ class Offline:
             return Answer(self._first(task, kind, found), recognised=found)
         last = turns[-1]
         if last.complaint:
-            return Answer(self._revised(task, last))
+            return Answer(self._revised(task, last), recognised=found)
         wanted = read_wishes(last.proposal.whole_motion_descrptn)
         lacking = unmet(wanted, last.behaviour, task.context)
         if not lacking:
-            return Answer(None)
+            return Answer(None, recognised=found)
         mended = last.proposal
         if "soft" in lacking:
             mended = _softer(mended, task.context, last)
@@ -76,7 +76,7 @@ class Offline:
             mended = _less_damped(mended, task.context, wanted)
         if lacking.keys() - {"soft"}:
             mended = self._mended(mended, task, wanted)
-        return Answer(None if mended == last.proposal else mended)
+        return Answer(None if mended == last.proposal else mended, recognised=found)
 
     def _mended(self, proposal: Proposal, task: Task, wanted: Sequence[Wanted]) -> Proposal:
         """With strengths that fulfil the wishes, and further effects where strengths cannot."""

@@ -22,12 +22,16 @@ FITS, OFF = 0.6, -2.0
 """Points of a feature that lies where it should, and of one that lies far off."""
 PART, OBJECT = 4.0, 3.5
 """Points of a name of the part and of the object."""
-OTHER_PART, OTHER_OBJECT = -2.5, -1.5
+OTHER_PART, OTHER_OBJECT = -2.5, -3.0
 """Points where names speak of another part or object."""
-SAID_PART, SAID_OBJECT = 5.0, 10.0
-"""Points of the user's words."""
+SAID_PART, SAID_OBJECT, SAID_OTHER = 8.0, 10.0, -2.5
+"""Points of the user's words, and where they name another part."""
 DRIVEN = 2.5
 """Points of a robot's joint that an actuator moves; minus this, of all others."""
+OF_OBJECT = {
+    "covers", "holds", "sticks_out", "object_size", "object_flat", "share", "height", "top",
+}  # fmt: skip
+"""Features that a part without an object does not have."""
 SUREST = 0.95
 LISTED = 0.05
 """Archetypes at least so likely are told as what it could be besides."""
@@ -147,7 +151,7 @@ def _weigh(one: Archetype, context: Context, description: str) -> list[Evidence]
     for words, mine, yes, no, what in (
         (own, one.part, PART, OTHER_PART, "the part"),
         (everything, one.object, OBJECT, OTHER_OBJECT, "the object"),
-        (said(description, "part"), one.part, SAID_PART, 0.0, "your words"),
+        (said(description, "part"), one.part, SAID_PART, SAID_OTHER, "your words"),
         (said(description, "object"), one.object, SAID_OBJECT, 0.0, "your words"),
     ):
         hit = words & set(mine)
@@ -160,6 +164,8 @@ def _weigh(one: Archetype, context: Context, description: str) -> list[Evidence]
         out.append(Evidence(feature="an actuator" if context.driven else "no actuator",
                             points=points))  # fmt: skip
     found = context.shape.model_dump() if context.shape else {"weight": gravity_role(context)}
+    if context.shape and not context.shape.object_size:  # nothing to hold it against
+        found = {name: value for name, value in found.items() if name not in OF_OBJECT}
     for name, expected in one.shape.items():
         if name in found:
             out.append(

@@ -34,21 +34,25 @@ class View(NamedTuple):
     Attributes:
         geoms: -1 for none, or a plane: floors and walls are no part of any object.
         distances: m, infinite for none.
+        within: whether the surface is met from behind: the point lies within a solid.
     """
 
     geoms: NDArray[np.int32]
     distances: Array
+    within: NDArray[np.bool_]
 
 
 def view(model: mujoco.MjModel, data: mujoco.MjData, point: Array, reach: float) -> View:
     """What rays from a point hit within `reach` (m)."""
     geoms, distances = np.full(RAYS, -1, np.int32), np.empty(RAYS)
+    ways, normals = DIRECTIONS.ravel(), np.zeros(3 * RAYS)
     mujoco.mj_multiRay(
-        model, data, point, DIRECTIONS.ravel(), None, 1, -1, geoms, distances, None, RAYS, reach
+        model, data, point, ways, None, 1, -1, geoms, distances, normals, RAYS, reach
     )
+    within = np.sum(normals.reshape(-1, 3) * DIRECTIONS, axis=1) > 0
     planes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
     none = (geoms < 0) | np.isin(geoms, planes)
-    return View(np.where(none, -1, geoms), np.where(none, np.inf, distances))
+    return View(np.where(none, -1, geoms), np.where(none, np.inf, distances), within & ~none)
 
 
 def covered(shut: View, open_: View, own: NDArray[np.intp]) -> float:
@@ -60,8 +64,8 @@ def covered(shut: View, open_: View, own: NDArray[np.intp]) -> float:
         own: the geoms of the part.
     """
     part = np.isin(shut.geoms, own)
-    rest = shut.geoms[~part]
-    walled = len(rest) == 0 or float(np.mean(rest >= 0)) >= WALLED
+    wall = ((shut.geoms >= 0) & ~shut.within)[~part]
+    walled = len(wall) == 0 or float(np.mean(wall)) >= WALLED
     frees = open_.distances > shut.distances + FREED
     return float(np.mean(part & frees)) if walled else 0.0
 

@@ -33,8 +33,8 @@ ALIKE = 0.03
 LEVEL = 0.15
 """A part that rises by less than this share of its size neither falls open nor shut."""
 OUT, NEARLY = 0.12, 0.03
-"""A part that is so much farther out of its object (in its own sizes) at one end is open there,
-against the model's reference position, and where that tells nothing."""
+"""A part that is so much farther out of its object (in its own sizes) at one end is open there: one
+that slides, against the model's reference position; any, where that tells nothing."""
 
 
 HAND = 0.12
@@ -270,16 +270,16 @@ def _behind(box: Box, outward: Array, depth: float, back: float) -> list[Array]:
 
 
 def _closed(looks: dict[str, _Look], reference: str, slide: bool) -> End | Literal["unknown"]:
-    """The end at which a part covers its object, or a sliding one is within it.
+    """The end at which a hinge's part covers its object, or a slide's part is within it.
 
-    That of the reference position where neither tells; of a slide whose reference is at an end,
-    only if it sticks out far there.
+    Where that does not tell it is that of the reference position; where that does not tell either,
+    that at which the part is nearer to its object.
     """
     low, high = looks["low_end"], looks["high_end"]
     covers, out = low.covers - high.covers, low.out() - high.out()
     if not slide and abs(covers) > 0.03 and min(low.covers, high.covers) < 0.02:
         return "low_end" if covers > 0 else "high_end"
-    if abs(out) > (OUT if reference != "unknown" else NEARLY):
+    if (slide and abs(out) > OUT) or (reference == "unknown" and abs(out) > NEARLY):
         return "low_end" if out < 0 else "high_end"
     return _end(reference)
 
