@@ -18,7 +18,7 @@ LAYERS = [
     {"profile", "_doctor"},
     {"field", "template", "proposal"},
     {"scenes"},
-    {"_context", "_attach", "_bench"},
+    {"_context", "_attach", "_bench", "_weigh"},
     {"_compile", "joints"},
     {"mjx", "pictures"},
     {"_plot", "_render", "_templates", "measured"},

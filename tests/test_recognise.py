@@ -1,4 +1,4 @@
-"""What a joint is taken for: by names in many languages, by shape alone, by a table of one's own."""
+"""What a joint is taken for: by names in many languages, by its shape, by a table of one's own."""
 
 import json
 import secrets

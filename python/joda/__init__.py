@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from joda._simulate import simulate
     from joda._studio import studio
     from joda._templates import templates
+    from joda._weigh import weigh
     from joda.profile import Profile
     from joda.scenes.scene import read_profiles, set_profile
 
@@ -66,6 +67,7 @@ __all__ = [
     "simulate",
     "studio",
     "templates",
+    "weigh",
 ]
 
 COMMANDS = (
@@ -89,6 +91,7 @@ COMMANDS = (
     "simulate",
     "studio",
     "templates",
+    "weigh",
 )
 _MODULES = ("effects", "field", "mjx")
 _LAZY = {

@@ -15,7 +15,7 @@ from joda._build import MUJOCO_VERSION
 from joda.cli import interrupt
 from joda.cli.act import experiments, simulate, with_usual
 from joda.cli.edit import studio
-from joda.cli.make import attach, compile, demo, generate, revise
+from joda.cli.make import attach, compile, demo, generate, revise, weigh
 from joda.cli.measure import bench, compare, refine
 from joda.cli.mend import add, diagnose, improve
 from joda.cli.observe import context, plot, render
@@ -65,7 +65,7 @@ def _help(command: Callable[..., None]) -> str:
 
 for command in (
     demo, attach, compile, context, generate, revise, plot, simulate, compare, diagnose, add,
-    improve, refine, render, experiments, studio, bench, schema, templates, doctor,
+    improve, refine, render, experiments, studio, bench, schema, templates, weigh, doctor,
 ):  # fmt: skip
     app.command(help=_help(command))(command)
 
