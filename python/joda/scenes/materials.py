@@ -48,9 +48,9 @@ def estimate_weight(model: mujoco.MjModel, joint: int) -> Weight | None:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     box = box_along(surface(model, data, geoms), data.xaxis[joint])
-    thick, size = float(box.size.min()), float(box.size.max())
     volume = min(float(np.prod(box.size)), solid_volume(model, geoms))
     largest = int(geoms[int(np.argmax(np.prod(model.geom_aabb[geoms, 3:], axis=1)))])
+    thick, size = float(2 * model.geom_aabb[largest, 3:].min()), float(box.size.max())
     for material, pattern, density in NAMED:
         if re.search(pattern, _names(model, largest)):
             share = min(1.0, SHEET / thick) if density > HEAVY else 1.0
