@@ -197,6 +197,13 @@ def test_every_force_has_a_source_or_is_called_an_estimate():
         assert bool(row.source) == (row.basis != "estimate")
 
 
+def test_the_page_has_the_table_of_forces():
+    page = (MODELS.parent / "docs" / "generation.md").read_text()
+    for row in forces().values():
+        least, most = row.opening
+        assert f"| {row.name} | {least:g} to {most:g} | {row.source or 'estimate'} |" in page
+
+
 # --- forces
 @pytest.mark.parametrize(
     ("said", "least", "most"),

@@ -104,7 +104,7 @@ WISHES: dict[str, Wish] = {
         "falls shut from half-way open", r"falls? (?:back |down )?shut", checks.falls_shut
     ),
     "takes": Wish(
-        "takes {number} to {most} N at the handle to open",
+        "takes {number} to {most} newtons at the handle to open",
         rf"(?P<number>{_REAL}) ?(?:to|-|–) ?(?P<most>{_REAL}) ?{_NEWTON}|"
         rf"(?:at most|no more than|less than|under|below|up to) (?P<limit>{_REAL}) ?{_NEWTON}|"
         rf"(?P<about>{_REAL}) ?{_NEWTON}",
