@@ -86,12 +86,16 @@ ARM = """
 
 
 @pytest.mark.parametrize(("anchor", "x", "y"), [("0 0 0", 0, 0), ("-.3 .5 7", -0.3, 0.5)])
-def test_the_lever_arm_reaches_to_the_farthest_corner_from_the_axis(tmp_path, anchor, x, y):
-    """Of the grip: x from 0.75 to 0.85 m, y from 0.09 to 0.15 m, whatever the height; or leaf."""
-    found = context(write(tmp_path, ARM.format(anchor=anchor, actuators="")), "turn")
-    corners = [(0.85, 0.15), (0.85, 0.09), (0.8, -0.02), (0.8, 0.02)]
-    assert found.lever_arm == pytest.approx(max(np.hypot(a - x, b - y) for a, b in corners))
+def test_the_lever_arm_reaches_to_the_grip_else_to_the_farthest_corner(tmp_path, anchor, x, y):
+    """Of the grip to its middle; of the leaf: x to 0.8 m, y from -0.02 to 0.02 m, at any height."""
+    text = ARM.format(anchor=anchor, actuators="")
+    found = context(write(tmp_path, text), "turn")
+    assert found.lever_arm == pytest.approx(np.hypot(0.8 - x, 0.12 - y))
     assert found.size == pytest.approx((0.85, 0.17, 1.8))
+    bare = text[: text.index('<body name="handle"')] + text[text.index("</body>\n  </body>") + 7 :]
+    corners = [(0.8, -0.02), (0.8, 0.02)]
+    expected = max(np.hypot(a - x, b - y) for a, b in corners)
+    assert context(write(tmp_path, bare), "turn").lever_arm == pytest.approx(expected)
 
 
 def test_the_lever_arm_is_of_boxes_as_they_are_turned(tmp_path):

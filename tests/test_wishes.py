@@ -8,8 +8,9 @@ from test_behaviour import curve, joint, steady
 from joda.interaction.behaviour import behaviour
 from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
 
-NUMBERS = {"clicks": 5, "closes_from": 20}
-ALL = [Wanted(name, NUMBERS.get(name, 0)) for name in WISHES if name != "moves"]
+NUMBERS = {"clicks": 5, "closes_from": 20, "takes": 5}
+MOST = {"takes": 10}
+ALL = [Wanted(name, NUMBERS.get(name, 0), MOST.get(name, 0)) for name in WISHES if name != "moves"]
 
 
 @pytest.mark.parametrize("wish", ALL, ids=lambda wish: wish.name)
@@ -93,6 +94,9 @@ def names(text: str, **kwargs) -> str:
         ("It moves too freely.", ""),
         ("It opens to 90 degrees.", ""),
         ("The catch is made of brass.", ""),
+        ("The lid falls shut.", "falls_shut"),
+        ("Opening it takes about 20 N.", "takes"),
+        ("It is 20 mm thick and weighs 3 kg.", ""),
         ("", ""),
     ],
 )
@@ -160,6 +164,8 @@ CASES = {
     "closes_anywhere": (RETURN, MAGNET),
     "closes_from": (SPRUNG, MAGNET),
     "left_open": (FRICTION, MAGNET),
+    "falls_shut": (RETURN, MAGNET),
+    "takes": (FRICTION, RETURN),
     "opens_past": (((curve((-4, 6)),), (steady(0.2),), (steady(5),)), RETURN),
     "held_shut": (MAGNET, ((steady(2),), (steady(0.1),), (steady(3),))),
     "caught": (CATCH, ((steady(-6),), (steady(0.2),), (steady(3),))),
@@ -189,7 +195,7 @@ def test_every_wish_has_its_two_joints():
 @pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize("name", CASES)
 def test_a_wish_is_met_by_a_joint_that_does_it_and_not_by_one_that_does_not(tmp_path, name, mirror):
-    wanted = [Wanted(name, NUMBERS.get(name, 0))]
+    wanted = [Wanted(name, NUMBERS.get(name, 0), MOST.get(name, 0))]
     does, does_not = CASES[name]
     lacking = []
     for parts in (does, does_not):

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from joda._simulate import simulate
     from joda._studio import studio
     from joda._templates import templates
+    from joda._weigh import weigh
     from joda.profile import Profile
     from joda.scenes.scene import read_profiles, set_profile
 
@@ -72,6 +73,7 @@ __all__ = [
     "simulate",
     "studio",
     "templates",
+    "weigh",
 ]
 
 COMMANDS = (
@@ -97,6 +99,7 @@ COMMANDS = (
     "simulate",
     "studio",
     "templates",
+    "weigh",
 )
 _MODULES = ("effects", "field", "mjx", "warp")
 _LAZY = {

@@ -119,7 +119,7 @@ def contributions(
         number = seen[effect.effect_name] = seen.get(effect.effect_name, 0) + 1
         added = {}
         for name in CHANNELS:
-            draw = f"{key}|{found.joint.name}|{effect.effect_name}|{number}|{name}"
+            draw = f"{key}|{found.twin or found.joint.name}|{effect.effect_name}|{number}|{name}"
             component = _component(effect, template, name, references[name], draw)
             if component:
                 added[name] = component

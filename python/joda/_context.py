@@ -16,6 +16,8 @@ from joda.scenes.engine import inertia_at
 from joda.scenes.masses import mass_doubts
 from joda.scenes.model import describe_joint, find_joint, load_model, moves_with
 from joda.scenes.motion import gravity_force
+from joda.scenes.outline import own_geoms, surface
+from joda.scenes.shape import Shape, look
 
 POSITIONS = 21
 """At how many positions, evenly over the range, inertia and gravity are sampled."""
@@ -41,16 +43,20 @@ class Context(BaseModel):
         equivalent_inertia: the mean of `inertia`.
         gravity_scale: the largest magnitude of `gravity_force`.
         upper_end: the end at which the moving part lies higher, "level" if neither.
-        closed_end: the end at which the joint's reference position lies, "unknown" if it lies at
-            neither; opening is the motion away from it.
-        lever_arm: where a hand would take hold. Hinge: distance from the axis to the farthest point
-            of what moves (of a body without geoms, its radius of gyration), m; slide: 1. Times a
-            hand's force (N) it gives the generalised force.
+        closed_end: the end at which the part covers a cavity; else that at which the joint's
+            reference position lies, or the part lies in its object; "unknown" if nothing tells.
+            Opening is the motion away from it.
+        lever_arm: where a hand would take hold. Hinge: distance from the axis to the grip, or where
+            none is seen to the farthest point of what moves (of a body without geoms, its radius of
+            gyration), m; slide: 1. Times a hand's force (N) it gives the generalised force.
         size: of the box around what moves, along the world's axes, at the low end; m.
         driven: whether an actuator acts on the joint.
         actuators: which ones do.
         names: what the file calls the joint, the child and what moves with it, in this order.
         around: what it calls the bodies above, nearest first, and the model.
+        shape: features of the part and its object; None of a part without geoms.
+        twin: the first joint of the object whose part is of equal shape; else the joint itself.
+            What is drawn for one is drawn for the other.
         doubts: what cannot be meant of its range, mass or inertia, a sentence each.
     """
 
@@ -76,6 +82,8 @@ class Context(BaseModel):
     actuators: tuple[str, ...] = ()
     names: tuple[str, ...]
     around: tuple[str, ...]
+    shape: Shape | None = None
+    twin: str = ""
     doubts: tuple[str, ...] = ()
 
     def describe(self) -> str:
@@ -131,7 +139,10 @@ def context(model: str | Path, joint: str) -> Context:
     weight = float(m.body_subtreemass[body] * np.linalg.norm(m.opt.gravity))
     gravity[np.abs(gravity) <= 1e-9 * weight] = 0  # rounding
     parent = int(m.body_parentid[body])
-    points = _points(m, data, body)
+    points = surface(m, data, own_geoms(m, body))
+    if not len(points):
+        points = data.subtree_com[body][None]
+    seen = look(m, j, described, _closed_end(described, float(m.qpos0[m.jnt_qposadr[j]])))
     acting = actuators_on(m, j)
     return Context(
         joint=described,
@@ -147,14 +158,17 @@ def context(model: str | Path, joint: str) -> Context:
         equivalent_inertia=float(inertia.mean()),
         gravity_scale=float(np.abs(gravity).max()),
         upper_end=_upper_end(height),
-        closed_end=_closed_end(described, float(m.qpos0[m.jnt_qposadr[j]])),
-        lever_arm=_lever_arm(described, points, data.xanchor[j], data.xaxis[j])
+        closed_end=seen.closed_end,
+        lever_arm=seen.grip
+        or _lever_arm(described, points, data.xanchor[j], data.xaxis[j])
         or float(np.sqrt(inertia.mean() / m.body_subtreemass[body])),
         size=_vector(np.ptp(points, axis=0)),
         driven=bool(acting),
         actuators=acting,
         names=_names(m, j),
         around=_around(m, j),
+        shape=seen.shape,
+        twin=seen.twin,
         doubts=(
             *filter(None, [range_doubt(described)]),
             *mass_doubts(m, j, float(inertia.mean()), bool(acting)),
@@ -171,18 +185,6 @@ def _inertia_and_height(
     length = float(np.linalg.norm(up))
     height = float(data.subtree_com[body] @ up) / length if length else 0.0
     return inertia_at(m, data, dof), height
-
-
-def _points(m: mujoco.MjModel, data: mujoco.MjData, body: int) -> NDArray[np.float64]:
-    """Corners of the boxes around the geoms that move, and the centre of mass; shape (n, 3), m."""
-    corners = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3)
-    points = [data.subtree_com[body][None]]
-    for geom in np.flatnonzero(moves_with(m, body)[m.geom_bodyid]):
-        centre, half = np.split(m.geom_aabb[geom], 2)
-        points.append(
-            data.geom_xpos[geom] + (centre + corners * half) @ data.geom_xmat[geom].reshape(3, 3).T
-        )
-    return np.concatenate(points)
 
 
 def _lever_arm(

@@ -6,15 +6,18 @@ from pydantic import BaseModel
 
 from joda.profile import Profile
 from joda.proposal import Proposal
+from joda.propose.archetype import Archetypes
 from joda.template import Template
 
 
-def schema(file: Literal["composed", "proposal", "template"] = "composed") -> dict[str, Any]:
+def schema(
+    file: Literal["composed", "proposal", "template", "archetype"] = "composed",
+) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a file format.
 
     Args:
         file: "composed" for `composed.json`, "proposal" for `proposal.json`, "template" for the
-            effect templates.
+            effect templates, "archetype" for the tables of kinds of joints (TOML).
 
     Returns:
         the schema as a JSON object.
@@ -23,5 +26,6 @@ def schema(file: Literal["composed", "proposal", "template"] = "composed") -> di
         "composed": Profile,
         "proposal": Proposal,
         "template": Template,
+        "archetype": Archetypes,
     }
     return models[file].model_json_schema()

@@ -14,7 +14,7 @@ from joda import __version__
 from joda.cli import interrupt
 from joda.cli.act import experiments, simulate, with_usual
 from joda.cli.edit import studio
-from joda.cli.make import attach, compile, demo, export, generate, revise
+from joda.cli.make import attach, compile, demo, export, generate, revise, weigh
 from joda.cli.many import distribute
 from joda.cli.measure import bench, compare, refine
 from joda.cli.mend import add, diagnose, improve
@@ -67,7 +67,7 @@ def _help(command: Callable[..., None]) -> str:
 for command in (
     demo, attach, compile, context, generate, revise, plot, simulate, compare, diagnose, add,
     improve, refine, render, experiments, studio, export, distribute,
-    bench, schema, templates, doctor,
+    bench, schema, templates, weigh, doctor,
 ):  # fmt: skip
     app.command(help=_help(command))(command)
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from joda.cli.options import Folder, Force, Json, Key, Model, Scene, Templates, Vlm
+from joda.cli.options import Folder, Force, Joint, Json, Key, Model, Scene, Templates, Vlm
 from joda.cli.progress import progress_bar, spinner
 from joda.cli.say import say
 from joda.cli.tell import (
@@ -221,6 +221,30 @@ def compile(
 
     run(proposal, model, joint, output, templates=templates or (), key=key, force=force)
     say(output)
+
+
+def weigh(
+    model: Model,
+    joint: Joint,
+    output: Scene,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Overwrite the output; replace a mass that can be, too."),
+    ] = False,
+) -> None:
+    """Give what a joint moves a mass estimated from its size.
+
+    For models whose mass cannot be, as `joda context` and `joda generate` say. Rough, within a
+    factor of three; a scale is better. Example:
+
+        joda weigh out/oven.xml --joint door -o weighed.xml --force
+    """
+    from joda import weigh as run
+
+    done = run(model, joint, output, force=force)
+    for doubt in done.doubts:
+        say(doubt)
+    say(f"{done.describe()}; weigh it if you can.", output)
 
 
 def attach(

@@ -21,7 +21,10 @@ Passive = Annotated[
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to fill.", show_default=False)]
 Scene = Annotated[Path, typer.Option("-o", "--output", help="Scene to write.", show_default=False)]
 Templates = Annotated[
-    list[Path] | None, typer.Option("--templates", help="Further folders of templates.")
+    list[Path] | None,
+    typer.Option(
+        "--templates", help="Further folders of templates (*.json) and of archetypes (*.toml)."
+    ),
 ]
 Key = Annotated[
     str, typer.Option("--key", help="Another key draws other numbers for the same words.")

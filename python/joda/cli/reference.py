@@ -43,7 +43,7 @@ def templates(
 
 def schema(
     file: Annotated[
-        Literal["composed", "proposal", "template"], typer.Argument(help="Which file.")
+        Literal["composed", "proposal", "template", "archetype"], typer.Argument(help="Which file.")
     ] = "composed",
 ) -> None:
     """Print the JSON Schema of a file format.

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from joda._context import Context
 from joda.component import Frozen
 from joda.interaction.hand import finest, pull
-from joda.scenes.motion import FAST
+from joda.scenes.motion import FAST, Motion
 
 Array = NDArray[np.float64]
 
@@ -21,6 +21,10 @@ SLOW = 3.0
 """How long (s) a hand takes from one end to the other."""
 
 
+ACCELERATING = 0.05
+"""Half of the time (s) over which an acceleration is the mean."""
+
+
 class Pull(Frozen):
     """What a slow hand needs to move the joint from one end to the other.
 
@@ -30,6 +34,7 @@ class Pull(Frozen):
         at: normalised position where it took that; where it got stuck, if it did.
         first, middle, last: the most within the first 15 % of the way, the median between 30 % and
             70 %, the most within the last 15 %; N·m or N, negative where the hand holds back.
+        steady: the most that it took but for what set its mass in motion, N·m or N.
         held_by: what of the scene is in the way where it got stuck; empty if nothing is.
         snaps_at: normalised positions on the way where the joint ran ahead of the hand.
     """
@@ -41,6 +46,7 @@ class Pull(Frozen):
     middle: float
     last: float
     snaps_at: tuple[float, ...]
+    steady: float | None = None
     held_by: str = ""
 
 
@@ -78,8 +84,21 @@ def pulled(
         middle=number(np.median(middle)) if len(middle) else 0.0,
         last=number(last.max()) if len(last) else 0.0,
         snaps_at=apart(s[begins]),
+        steady=number((force - sign * _inertial(motion, context)).max()) if arrived else None,
     )
     return told, float(np.clip(s[-1], 0, 1))
+
+
+def _inertial(motion: Motion, context: Context) -> Array:
+    """Generalised force that sets the joint's own inertia in motion, N·m or N, over a motion.
+
+    The acceleration is the mean over a tenth of a second: nothing else is meant to be left out.
+    """
+    count = max(int(np.searchsorted(motion.time, ACCELERATING)), 1)
+    width = np.ones(2 * count + 1) / (2 * count + 1)
+    padded = np.pad(motion.velocity, count, mode="edge")
+    smooth = np.convolve(padded, width, mode="valid")
+    return np.asarray(context.equivalent_inertia * np.gradient(smooth, motion.time))
 
 
 def apart(positions: Array) -> tuple[float, ...]:

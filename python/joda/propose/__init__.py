@@ -15,6 +15,8 @@ from joda.errors import JodaError
 from joda.interaction.behaviour import Behaviour
 from joda.profile import Profile
 from joda.proposal import Proposal
+from joda.propose.archetype import Archetype
+from joda.propose.recognise import Recognition
 from joda.template import Template
 
 
@@ -28,12 +30,14 @@ class Task:
         pictures: PNG files of the joint at several positions, labelled, from the low to the high
             end; empty where nothing can render.
         description: what the user wants of the joint, in words; may be empty.
+        archetypes: kinds of joints to recognise; None: the library's.
     """
 
     context: Context
     templates: Mapping[str, Template]
     pictures: Sequence[bytes] = ()
     description: str = ""
+    archetypes: Sequence[Archetype] | None = None
 
 
 @dataclass(frozen=True)
@@ -86,11 +90,13 @@ class Answer:
         proposal: None where the last proposal is complete.
         usage: zero for proposers that cost nothing.
         notes: what the user should be told, a sentence each.
+        recognised: what the joint was taken for, and by what; None of who does not say.
     """
 
     proposal: Proposal | None
     usage: Usage = field(default_factory=Usage)
     notes: Sequence[str] = ()
+    recognised: Recognition | None = None
 
 
 class Proposer(Protocol):

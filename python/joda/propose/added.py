@@ -1,6 +1,6 @@
 """What is added to a joint for a wish that its kind does not have."""
 
-from joda.propose.parts import HELD, RISE, SNAP, SPRING, Part, catch, rising
+from joda.propose.parts import HELD, RISE, SNAP, SPRING, Part, catch, part, rising
 
 WISHED: dict[str, tuple[Part, ...]] = {
     "closes_near": (catch("strong", 0.1, "it is to close by itself"),),
@@ -9,28 +9,29 @@ WISHED: dict[str, tuple[Part, ...]] = {
         "closes_from", 1, RISE + (1 - RISE) / HELD, "a sprung hinge shuts it", "closes_from"
     ),
     "caught": rising("caught", 0.1, 0.1, "a catch holds it until it gives way"),
-    "closes_anywhere": (Part(SPRING, (0, 1), "it is to return from anywhere", "medium"),),
+    "closes_anywhere": (part(SPRING, (0, 1), "it is to return from anywhere", "medium"),),
     "left_open": (
-        Part("constant_friction_hinge", (0, 1), "it is not to close by itself", friction="weak"),
+        part("constant_friction_hinge", (0, 1), "it is not to close by itself", friction="weak"),
     ),
+    "falls_shut": (part(SPRING, (0, 1), "it is to fall shut", "weak"),),
     "opens_past": (
-        Part("constant_{opening}_conservative_hinge", (0.4, 1), "it is to open", "medium"),
+        part("constant_{opening}_conservative_hinge", (0.4, 1), "it is to open", "medium"),
     ),
-    "latched": (Part(SNAP, (0, 0.07), "it is to latch", "strong", "weak"),),
+    "latched": (part(SNAP, (0, 0.07), "it is to latch", "strong", "weak"),),
     "stays_put": (
-        Part("constant_friction_hinge", (0.1, 1), "it is to stay where left", friction="medium"),
+        part("constant_friction_hinge", (0.1, 1), "it is to stay where left", friction="medium"),
     ),
     "stays_half": (
-        Part("constant_friction_hinge", (0.3, 0.7), "it is to hold half-way", friction="strong"),
+        part("constant_friction_hinge", (0.3, 0.7), "it is to hold half-way", friction="strong"),
     ),
     "stays_open": (
-        Part("magnetic_return_to_{open}", (0.88, 1), "it is to stay open", "medium", "weak"),
+        part("magnetic_return_to_{open}", (0.88, 1), "it is to stay open", "medium", "weak"),
     ),
-    "clicks": (Part("detents", (0, 1), "it is to click", "medium"),),
-    "two_sides": (Part("bistable_mechanism", (0, 1), "it is to have two sides", "strong"),),
-    "returns_to_middle": (Part("detent_internal", (0, 1), "it is to return", "strong"),),
-    "snaps": (Part("detent_internal", (0.3, 0.7), "it is to snap through", "medium"),),
-    "soft": (Part("constant_damping_hinge", (0, 0.3), "it is to close softly", damping="medium"),),
+    "clicks": (part("detents", (0, 1), "it is to click", "medium"),),
+    "two_sides": (part("bistable_mechanism", (0, 1), "it is to have two sides", "strong"),),
+    "returns_to_middle": (part("detent_internal", (0, 1), "it is to return", "strong"),),
+    "snaps": (part("detent_internal", (0.3, 0.7), "it is to snap through", "medium"),),
+    "soft": (part("constant_damping_hinge", (0, 0.3), "it is to close softly", damping="medium"),),
 }
 """What is added for a wish that the kind does not have."""
 

@@ -38,12 +38,13 @@ class Seen:
     Attributes:
         behaviour: the facts.
         context: the joint.
-        number: the number that the wish names, 0 where it names none.
+        number, most: the numbers that the wish names, 0 where it names none.
     """
 
     behaviour: Behaviour
     context: Context
-    number: int = 0
+    number: float = 0
+    most: float = 0
 
     def after(self, way: float) -> Stretch:
         """What becomes of the joint let go at this share of the way."""
@@ -141,6 +142,20 @@ def latched(seen: Seen) -> str:
     return _unless(barrier, "closing the last part takes no push")
 
 
+def falls_shut(seen: Seen) -> str:
+    """From half-way on it closes."""
+    return _each(seen, np.linspace(0.1, 0.5, 17), "closes")
+
+
+def takes(seen: Seen) -> str:
+    """The most that a slow hand needs to open it, but for its inertia, lies within these forces."""
+    way = seen.behaviour.opening
+    force = (way.force if way.steady is None else way.steady) / seen.context.lever_arm
+    return _unless(
+        way.arrived and seen.number <= force <= seen.most, f"opening it takes {force:.3g} N"
+    )
+
+
 def stays_put(seen: Seen) -> str:
     """Beyond the first part of the way it stays."""
     return _each(seen, np.linspace(0.15, 0.95, 33), "stays")
@@ -164,7 +179,7 @@ def clicks(seen: Seen) -> str:
     apart = 0.5 / max(seen.number - 1, 1)
     groups = np.split(rests, np.flatnonzero(np.diff(rests) > apart) + 1) if len(rests) else []
     if len(groups) != seen.number and (seen.number or not groups):
-        return f"it rests by itself at {len(groups)} positions, not {max(seen.number, 1)}"
+        return f"it rests by itself at {len(groups)} positions, not {max(seen.number, 1):g}"
     loose = max(groups, key=np.ptp)
     return _unless(
         np.ptp(loose) <= 0.5 * apart,

@@ -10,6 +10,7 @@ from joda.interaction.behaviour import Behaviour
 from joda.profile import File
 from joda.proposal import Proposal
 from joda.propose import Usage, total
+from joda.propose.recognise import Recognition
 
 
 class Round(Frozen):
@@ -25,6 +26,7 @@ class Round(Frozen):
         unmet: what was wished for and did not come, a sentence each.
         notes: what the proposer had to say besides.
         usage: what it cost.
+        recognised: what the proposer took the joint for, and by what.
     """
 
     number: int
@@ -36,6 +38,7 @@ class Round(Frozen):
     unmet: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     usage: Usage = Usage()
+    recognised: Recognition | None = None
 
 
 class Failure(Frozen):

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from joda._compile import contributions, reference_scales
 from joda._context import Context
+from joda.component import Component
 from joda.field import evaluate
-from joda.interaction.pulling import grip
+from joda.interaction.pulling import SLOW, grip
 from joda.profile import Channel
 from joda.proposal import EffectProposal, Proposal
 from joda.propose.checks import ABOUT, FELT, share
-from joda.propose.wishes import Wanted
+from joda.propose.wishes import Wanted, read_wishes
 from joda.template import Template
 
 Array = NDArray[np.float64]
@@ -31,6 +32,8 @@ LEAST = 0.02
 """Least excess of a drive, in units of the reference force."""
 NEARLY = 0.8 * ABOUT
 """How far from an angle given by eye the joint may be undecided, as a share of it."""
+WITHIN = 0.85
+"""How near its bounds a force may come: the slow hand also accelerates, and brakes."""
 EVEN = 0.9
 """Share of a pull that is left where another one takes over."""
 FACTORS = (0.02, 50.0)
@@ -48,11 +51,14 @@ class Demand:
         terms: share of the way from the closed end, factor of the drive (positive opens) and of the
             friction there.
         least: in units of the reference force.
+        damping: how many times the force that damping makes under a slow hand, at the first term's
+            place, counts besides.
     """
 
     wish: str
     terms: tuple[tuple[float, float, float], ...]
     least: float = 0.0
+    damping: float = 0.0
 
 
 def mend(
@@ -90,6 +96,7 @@ def mend(
     sign = -1.0 if context.closed_end == "high_end" else 1.0
     gravity = sign * np.array(context.gravity_force) / reference
     grid = np.linspace(0, 1, len(gravity))
+    slow = float(np.ptp(context.joint.range)) / SLOW
 
     def side(way: float) -> float:
         return way if sign > 0 else 1 - way
@@ -107,6 +114,9 @@ def mend(
             s = side(way)
             rows[k] += [moved(place, s, drive, friction) for place in places]
             least[k] -= drive * float(np.interp(s, grid, gravity))
+        if demand.damping:
+            s = side(demand.terms[0][0])
+            least[k] -= demand.damping * _damped(parts, s) * slow / reference
     n, m = len(places), len(demands)
     # Unknowns: factors, how far each is from 1, what each demand lacks.
     cost = np.concatenate([np.zeros(n), np.ones(n), np.full(m, LACK)])
@@ -125,6 +135,12 @@ def mend(
         demand.wish for demand, lack in zip(demands, found.x[2 * n :], strict=True) if lack > 1e-6
     }
     return _scaled(proposal, dict(zip(places, found.x[:n].tolist(), strict=True))), lacks
+
+
+def _damped(parts: Sequence[Mapping[str, Component]], s: float) -> float:
+    """All damping at a normalised position, N·m·s/rad or N·s/m."""
+    components = tuple(part["damping"] for part in parts if "damping" in part)
+    return float(evaluate(Channel(components=components), np.array([s]))[0][0])
 
 
 def _scaled(proposal: Proposal, factors: Mapping[tuple[int, str], float]) -> Proposal:
@@ -162,6 +178,10 @@ def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]
             most = 0.6 * grip(context) / reference_scales(context)["conservative"]
             ways = np.linspace(0, 1, 33)
             return [_at(wish, way, sign, -1, -most) for way in ways for sign in (1, -1)]
+        case "takes":
+            return _takes(wish, proposal, context)
+        case "falls_shut":
+            return shut(0.08, 0.52)
         case "closes_near":
             return shut(0.01, 0.045)
         case "closes_from":
@@ -200,6 +220,23 @@ def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]
         case "snaps":
             return _snap(wish, proposal, context)
     return []
+
+
+def _takes(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]:
+    """Nowhere on the way open more than the most, and somewhere the least."""
+    unit = context.lever_arm / reference_scales(context)["conservative"]
+    most, least = WITHIN * wish.most * unit, wish.number / WITHIN * unit
+    demands = [
+        Demand(wish.name, ((float(way), 1, -1),), -most, -1.0) for way in np.linspace(0, 1, 41)
+    ]
+    wishes = {other.name for other in read_wishes(proposal.whole_motion_descrptn)}
+    if wishes & {"held_shut", "closes_near", "latched"}:
+        where: tuple[float, ...] = (0.0, 0.004)
+    elif wishes & {"clicks", "two_sides", "returns_to_middle"}:
+        where = ()
+    else:
+        where = (0.98,) if "closes_anywhere" in wishes else (0.5,)
+    return demands + [Demand(wish.name, ((way, -1, 1),), least, 1.0) for way in where]
 
 
 def _over(low: float, high: float) -> Array:

@@ -1,24 +1,29 @@
-"""The proposer that needs no model, key or network: rules over names, motion, gravity and words.
+"""The proposer that needs no model, key or network: a table of archetypes, told by shape and names.
 
-It recognises the kind of joint, proposes what such joints do, and from the second round on mends
-what the simulation did not show. How sure it is stands in each effect's confidence: a kind known by
-its object and part 0.7, by its part alone 0.5, by nothing 0.2.
+It recognises the kind of joint, proposes what such joints do and what force they take, and from the
+second round on mends what the simulation did not show. How sure it is stands in each effect's
+confidence, and what decided in the answer's `recognised`.
 """
 
 import re
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 
+import numpy as np
+
+from joda._compile import BANDS, reference_scales
 from joda._context import Context
 from joda.errors import JodaError
+from joda.interaction.pulling import SLOW
 from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
 from joda.propose import Answer, Task, Turn
 from joda.propose.added import RISING, WISHED
+from joda.propose.archetype import Archetype, forces
 from joda.propose.checks import FELT, SOFT, share
 from joda.propose.complaints import revise
 from joda.propose.mend import mend, rescale
-from joda.propose.parts import Kind, Part
-from joda.propose.recognise import recognise
+from joda.propose.parts import Part
+from joda.propose.recognise import Recognition, recognise
 from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
 
 APART = 0.785
@@ -35,6 +40,9 @@ EXCLUSIVE = {
 }  # fmt: skip
 """Wishes about the middle of the way: the user's replace those of the kind."""
 
+FORCEFUL = EXCLUSIVE | {"left_open", "takes", "free", "caught", "latched", "held_shut", "snaps"}
+"""Wishes that say how strong something is; without them it takes what such joints take."""
+
 CLOSES = {"closes_near", "closes_from", "closes_anywhere"}
 
 
@@ -49,23 +57,26 @@ class Offline:
 
     def propose(self, task: Task, turns: Sequence[Turn]) -> Answer:
         """See `joda.propose.Proposer`."""
+        kind, found = recognise(task.context, task.description, task.archetypes)
         if not turns:
-            return Answer(self._first(task))
+            return Answer(self._first(task, kind, found), recognised=found)
         last = turns[-1]
         if last.complaint:
-            return Answer(self._revised(task, last))
+            return Answer(self._revised(task, last), recognised=found)
         wanted = read_wishes(last.proposal.whole_motion_descrptn)
         lacking = unmet(wanted, last.behaviour, task.context)
         if not lacking:
-            return Answer(None)
+            return Answer(None, recognised=found)
         mended = last.proposal
         if "soft" in lacking:
             mended = _softer(mended, task.context, last)
         if "free" in lacking:
             mended = _lighter(mended, task.context, last)
+        if "takes" in lacking:
+            mended = _less_damped(mended, task.context, wanted)
         if lacking.keys() - {"soft"}:
             mended = self._mended(mended, task, wanted)
-        return Answer(None if mended == last.proposal else mended)
+        return Answer(None if mended == last.proposal else mended, recognised=found)
 
     def _mended(self, proposal: Proposal, task: Task, wanted: Sequence[Wanted]) -> Proposal:
         """With strengths that fulfil the wishes, and further effects where strengths cannot."""
@@ -107,16 +118,15 @@ class Offline:
             stated = _with(stated.model_copy(update={"effect_proposals": tuple(others)}), clicks)
         return self._mended(stated, task, wanted)
 
-    def _first(self, task: Task) -> Proposal:
+    def _first(self, task: Task, kind: Archetype, found: Recognition) -> Proposal:
         context = task.context
-        kind, confidence = recognise(context, task.description)
         wanted, parts = _plan(kind, context, task.description)
-        effects = _effects(parts, context, wanted, confidence)
+        effects = _effects(parts, context, wanted, found.likely)
         summary = JointSummary(
             joint_name=context.joint.name,
             joint_type="revolute" if context.joint.type == "hinge" else "prismatic",
-            motion_description=f"{kind.title}, by its names, motion and gravity",
-            overall_confidence=confidence,
+            motion_description=found.describe(),
+            overall_confidence=found.likely,
         )
         proposal = Proposal(
             joint_summary=summary, whole_motion_descrptn=state(wanted), effect_proposals=effects
@@ -126,7 +136,7 @@ class Offline:
         return proposal
 
 
-def _plan(kind: Kind, context: Context, description: str) -> tuple[list[Wanted], list[Part]]:
+def _plan(kind: Archetype, context: Context, description: str) -> tuple[list[Wanted], list[Part]]:
     """Wishes and parts: the user's, and those of the kind that do not contradict them."""
     asked = {wish.name: wish for wish in read_wishes(description)}
     denied = {wish.name for wish in read_wishes(description, refused=True)}
@@ -139,6 +149,9 @@ def _plan(kind: Kind, context: Context, description: str) -> tuple[list[Wanted],
     added = [part for name in asked if name not in served for part in WISHED.get(name, ())]
     taken = {name for part in added for name in part.serves}
     parts = [part for part in parts if not part.serves or set(part.serves) - taken]
+    if kind.force and not asked.keys() & FORCEFUL:
+        least, most = forces()[kind.force].opening
+        wanted.append(Wanted("takes", least, most))
     return _counted(wanted, context), parts + added
 
 
@@ -166,7 +179,7 @@ def _positions(context: Context) -> int:
     return min(max(round((hi - lo) / APART) + 1, 2), 12) if context.joint.type == "hinge" else 3
 
 
-def _number(wanted: Sequence[Wanted], name: str) -> int:
+def _number(wanted: Sequence[Wanted], name: str) -> float:
     return next((wish.number for wish in wanted if wish.name == name), 0)
 
 
@@ -184,7 +197,7 @@ def _effects(
     out = []
     for part in parts:
         reach = share(context, _number(wanted, part.reach)) if part.reach else 1.0
-        for name, (a, b) in _spread(part, _number(wanted, "clicks")):
+        for name, (a, b) in _spread(part, int(_number(wanted, "clicks"))):
             a, b = (min(reach * end, 1.0) for end in (a, b))
             start, end = (1 - b, 1 - a) if mirrored else (a, b)
             out.append(
@@ -252,6 +265,24 @@ def _lighter(proposal: Proposal, context: Context, last: Turn) -> Proposal:
         rescale(effect, "damping", min(factor, 1.0))
         if effect.strength.damping != "none" and effect.start_ratio < 0.7 and effect.end_ratio > 0.3
         else effect
+        for effect in proposal.effect_proposals
+    ]
+    return proposal.model_copy(update={"effect_proposals": tuple(effects)})
+
+
+def _less_damped(proposal: Proposal, context: Context, wanted: Sequence[Wanted]) -> Proposal:
+    """Damping that leaves a slow hand at least half of the most that opening may take."""
+    most = next(wish.most for wish in wanted if wish.name == "takes") * context.lever_arm
+    span = float(np.ptp(context.joint.range))
+    allowed = 0.3 * most * SLOW / span
+    reference = reference_scales(context)["damping"]
+
+    def factor(effect: EffectProposal) -> float:
+        strength = BANDS[effect.strength.damping][1] * effect.refineFactor.damping * reference
+        return min(allowed / strength, 1.0) if strength else 1.0
+
+    effects = [
+        rescale(effect, "damping", factor(effect)) if factor(effect) < 1 else effect
         for effect in proposal.effect_proposals
     ]
     return proposal.model_copy(update={"effect_proposals": tuple(effects)})

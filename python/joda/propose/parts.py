@@ -1,28 +1,23 @@
-"""What a kind of joint is, and the effects that it is made of.
+"""The effects that a kind of joint is made of.
 
 Places are shares of the way from the closed end (0) to the other (1). In an effect's name {closed}
 and {open} stand for those ends, {opening} and {closing} for the sign of the motion.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from pydantic import Field
 
-from joda._context import Context
+from joda.component import Frozen
 from joda.proposal import Label
 
-Gravity = Literal["level", "opens", "closes"]
 
-
-@dataclass(frozen=True)
-class Part:
+class Part(Frozen):
     """An effect of a kind.
 
     Attributes:
-        effect: the template's name.
+        effect: the template's name; "detents" for one at each of a knob's positions.
         place: from where to where; with `reach`, in units of the way that this wish names.
-        conservative, friction, damping: strengths.
         reason: why it is there.
+        conservative, friction, damping: strengths.
         serves: the wishes that it is there for; without them it goes.
         reach: a wish that names an angle from which something happens.
     """
@@ -33,47 +28,41 @@ class Part:
     conservative: Label = "none"
     friction: Label = "none"
     damping: Label = "none"
-    serves: tuple[str, ...] = ()
+    serves: tuple[str, ...] = Field(default=())
     reach: str = ""
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A kind of joint.
-
-    Attributes:
-        title: what it is.
-        own: words in the name of the joint or of the body that it moves.
-        objects: words in any name around, of the object that it belongs to.
-        alone: whether its own name is enough where there are `objects`.
-        joint: hinge, slide, or either.
-        gravity: what gravity may do to it.
-        wishes: what it does, by name; {number} wishes get theirs from `count`.
-        parts: how.
-    """
-
-    title: str
-    own: str = ""
-    objects: str = ""
-    alone: bool = False
-    joint: str = "hinge or slide"
-    gravity: tuple[Gravity, ...] = ("level", "opens", "closes")
-    wishes: tuple[str, ...] = ()
-    parts: tuple[Part, ...] = ()
-    suits: Callable[[Context], bool] = lambda context: True
-
-
-FRICTION = Part("constant_friction_hinge", (0, 1), "hinges and guides rub", friction="weak")
-DAMPING = Part("constant_damping_hinge", (0, 1), "grease and air", damping="weak")
 MAGNET = "magnetic_return_to_{closed}"
 SPRING = "spring_return_to_{closed}"
 SNAP = "spring_loaded_snap_detent_to_{closed}"
 
 
+def part(
+    effect: str,
+    place: tuple[float, float],
+    reason: str,
+    conservative: Label = "none",
+    friction: Label = "none",
+    damping: Label = "none",
+    serves: tuple[str, ...] = (),
+    reach: str = "",
+) -> Part:
+    """A `Part`, its fields in order."""
+    return Part(
+        effect=effect,
+        place=place,
+        reason=reason,
+        conservative=conservative,
+        friction=friction,
+        damping=damping,
+        serves=serves,
+        reach=reach,
+    )
+
+
 def catch(strength: Label, width: float, what: str) -> Part:
     """What pulls it shut over the last of its way, and holds it."""
-    serves = ("closes_near", "held_shut")
-    return Part(MAGNET, (0, width), what, strength, serves=serves)
+    return part(MAGNET, (0, width), what, strength, serves=("closes_near", "held_shut"))
 
 
 RISE = 1 / 3
@@ -89,6 +78,6 @@ def rising(wish: str, width: float, fades: float, what: str, reach: str = "") ->
     """
     serves, top = (wish, "closes_near", "held_shut"), RISE * width
     return (
-        Part(SPRING, (0, top), what, "strong", serves=serves, reach=reach),
-        Part(MAGNET, (top, fades), "past that it fades", "strong", serves=serves, reach=reach),
+        part(SPRING, (0, top), what, "strong", serves=serves, reach=reach),
+        part(MAGNET, (top, fades), "past that it fades", "strong", serves=serves, reach=reach),
     )

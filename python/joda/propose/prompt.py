@@ -105,8 +105,8 @@ def system(templates: Mapping[str, Template]) -> str:
         for label, (low, high) in BANDS.items()
     )
     effects = "\n".join(_effect(template) for template in templates.values())
-    checked = [wish.says.format(number="N") for name, wish in WISHES.items() if name != "moves"]
-    behaviours = "\n".join(f"- it {says}" for says in checked)
+    checked = [wish.says for name, wish in WISHES.items() if name != "moves"]
+    behaviours = "\n".join(f"- it {says.format(number='N', most='M')}" for says in checked)
     return "\n".join(
         (
             _read("system", bands=bands, behaviours=behaviours),

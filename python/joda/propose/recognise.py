@@ -1,11 +1,91 @@
-"""Which kind of joint it is, as far as names, motion, gravity and words tell."""
+"""What kind of joint it is: features of the shape weighed against a table, names being one more.
 
-import re
+Each archetype gets points: for a feature that lies where it should, minus points for one that lies
+off, the farther the more; the same for names and the user's words. The points are logarithms of
+odds, so that all archetypes together give how sure the best one is.
+"""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
 
 from joda._compile import reference_scales
 from joda._context import Context
-from joda.propose.kinds import KINDS, UNKNOWN
-from joda.propose.parts import Gravity, Kind
+from joda.component import Frozen
+from joda.propose.archetype import Archetype, Feature, Force, forces, read_archetypes
+from joda.propose.naming import concepts, said
+
+Gravity = Literal["level", "opens", "closes"]
+
+FITS, OFF = 0.6, -2.0
+"""Points of a feature that lies where it should, and of one that lies far off."""
+PART, OBJECT = 4.0, 3.5
+"""Points of a name of the part and of the object."""
+OTHER_PART, OTHER_OBJECT = -2.5, -3.0
+"""Points where names speak of another part or object."""
+SAID_PART, SAID_OBJECT, SAID_OTHER = 8.0, 10.0, -2.5
+"""Points of the user's words, and where they name another part."""
+DRIVEN = 2.5
+"""Points of a robot's joint that an actuator moves; minus this, of all others."""
+OF_OBJECT = {
+    "covers", "holds", "sticks_out", "object_size", "object_flat", "share", "height", "top",
+}  # fmt: skip
+"""Features that a part without an object does not have."""
+SUREST = 0.95
+LISTED = 0.05
+"""Archetypes at least so likely are told as what it could be besides."""
+
+
+class Evidence(Frozen):
+    """A feature and the points that it gave.
+
+    Attributes:
+        feature: what was looked at, and what was found, in words.
+        points: positive for what speaks for the answer, negative against it.
+    """
+
+    feature: str
+    points: float
+
+
+class Other(Frozen):
+    """What the joint could be besides, and how likely that is, 0 to 1."""
+
+    title: str
+    likely: float
+
+
+class Recognition(Frozen):
+    """What a joint was taken for.
+
+    Attributes:
+        title: of the archetype.
+        likely: how sure that is, 0 to 1.
+        decided: what spoke for it and against it, the most important first.
+        others: what else it could be, the likeliest first.
+        because: why such joints do what they do.
+        force: what opening one takes at the handle, and who says so; None where nothing is known.
+    """
+
+    title: str
+    likely: float
+    decided: tuple[Evidence, ...] = ()
+    others: tuple[Other, ...] = ()
+    because: str = ""
+    force: Force | None = None
+
+    def describe(self) -> str:
+        """The answer in one line."""
+        decided = ", ".join(one.feature for one in self.decided if one.points > 0)
+        against = ", ".join(one.feature for one in self.decided if one.points < 0)
+        others = ", ".join(f"{one.title} {one.likely:.0%}" for one in self.others)
+        return (
+            f"{self.title} ({self.likely:.0%})"
+            + (f", by {decided}" if decided else "")
+            + (f"; against it: {against}" if against else "")
+            + (f"; else {others}" if others else "")
+        )
 
 
 def gravity_role(context: Context) -> Gravity:
@@ -17,36 +97,99 @@ def gravity_role(context: Context) -> Gravity:
     return "opens" if towards_high != (context.closed_end == "high_end") else "closes"
 
 
-def recognise(context: Context, description: str = "") -> tuple[Kind, float]:
-    """The kind of a joint, and how sure that is, 0 to 1.
+def recognise(
+    context: Context, description: str = "", archetypes: Sequence[Archetype] | None = None
+) -> tuple[Archetype, Recognition]:
+    """The archetype of a joint, and how it was found.
 
     Args:
         context: the joint.
         description: what the user says of it; its words count most.
+        archetypes: to choose from; by default the library's.
     """
-    near = " ".join(context.names[:2]).lower()
-    everything = " ".join((*context.names, *context.around)).lower()
-    said = description.lower()
-    best, most = UNKNOWN, 0
-    for kind in KINDS:
-        if context.joint.type not in kind.joint or gravity_role(context) not in kind.gravity:
-            continue
-        if not kind.suits(context):
-            continue
-        object_known = _in(kind.objects, everything) or _in(kind.objects, said)
-        if kind.objects and not kind.alone and not object_known:
-            continue
-        score = 4 * _in(kind.own, near) + 3 * _in(kind.objects, everything)
-        score += 10 * _in(kind.objects, said) + 5 * _in(_word(kind.own), said)
-        if score > most:
-            best, most = kind, score
-    return best, {0: 0.2, 3: 0.4, 4: 0.5}.get(most, 0.7)
+    known = read_archetypes() if archetypes is None else archetypes
+    fitting = [one for one in known if _may_be(one, context, description)]
+    weighed = [_weigh(one, context, description) for one in fitting]
+    points = np.array(
+        [one.common + sum(e.points for e in each)
+         for one, each in zip(fitting, weighed, strict=True)]
+    )  # fmt: skip
+    odds = np.exp(points - points.max())
+    odds /= odds.sum()
+    order = np.argsort(-odds, kind="stable")
+    best, found = fitting[order[0]], weighed[order[0]]
+    others = [Other(title=fitting[k].title, likely=round(float(odds[k]), 2))
+              for k in order[1:4] if odds[k] >= LISTED]  # fmt: skip
+    decided = sorted(found, key=lambda one: -abs(one.points))
+    return best, Recognition(
+        title=best.title,
+        likely=round(min(float(odds[order[0]]), SUREST), 2),
+        decided=tuple(one for one in decided if abs(one.points) >= FITS)[:6],
+        others=tuple(others),
+        because=best.evidence,
+        force=forces()[best.force] if best.force else None,
+    )
 
 
-def _word(words: str) -> str:
-    """As nouns: what latches, or needs a push to latch, is not a latch."""
-    return rf"(?<!to )\b(?:{words})s?\b" if words else ""
+def _may_be(one: Archetype, context: Context, description: str) -> bool:
+    if context.joint.type not in one.joint:
+        return False
+    if one.closed != "any" and (context.closed_end == "unknown") != (one.closed == "unknown"):
+        return False
+    if not one.needs_object:
+        return True
+    named = concepts((*context.names, *context.around), "object") | said(description, "object")
+    return bool(named & set(one.object))
 
 
-def _in(words: str, text: str) -> bool:
-    return bool(words and re.search(words, text))
+def _weigh(one: Archetype, context: Context, description: str) -> list[Evidence]:
+    if one.unknown:
+        return []
+    out = []
+    own = concepts(context.names[:2], "part")
+    everything = concepts((*context.names, *context.around), "object")
+    for words, mine, yes, no, what in (
+        (own, one.part, PART, OTHER_PART, "the part"),
+        (everything, one.object, OBJECT, OTHER_OBJECT, "the object"),
+        (said(description, "part"), one.part, SAID_PART, SAID_OTHER, "your words"),
+        (said(description, "object"), one.object, SAID_OBJECT, 0.0, "your words"),
+    ):
+        hit = words & set(mine)
+        if hit:
+            out.append(Evidence(feature=f"{what} is called {'/'.join(sorted(hit))}", points=yes))
+        elif words and mine and no:
+            out.append(Evidence(feature=f"{what} is called {'/'.join(sorted(words))}", points=no))
+    if one.driven or context.driven:
+        points = DRIVEN if one.driven == context.driven else -DRIVEN
+        out.append(Evidence(feature="an actuator" if context.driven else "no actuator",
+                            points=points))  # fmt: skip
+    found = context.shape.model_dump() if context.shape else {"weight": gravity_role(context)}
+    if context.shape and not context.shape.object_size:  # nothing to hold it against
+        found = {name: value for name, value in found.items() if name not in OF_OBJECT}
+    for name, expected in one.shape.items():
+        if name in found:
+            out.append(
+                Evidence(
+                    feature=f"{name} {_value(found[name])}", points=_fits(found[name], expected)
+                )
+            )
+    return out
+
+
+def _fits(value: bool | float | str, expected: Feature) -> float:
+    """Points of a feature."""
+    if isinstance(expected, bool | str):
+        return FITS if value == expected else OFF
+    low, high = expected if isinstance(expected, tuple) else (expected, expected)
+    number = float(value)
+    if low <= number <= high:
+        return FITS
+    apart = max(low - number, number - high)
+    scale = max(0.5 * (high - low), 0.25 * abs(high), 0.04)
+    return FITS + (OFF - FITS) * min(apart / scale, 1.0)
+
+
+def _value(value: bool | float | str) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return value if isinstance(value, str) else f"{value:.3g}"

@@ -22,7 +22,7 @@ from joda._context import Context, context
 from joda._render import render
 from joda.errors import JodaError
 from joda.files import make_folder, read_text, write_bytes, write_text
-from joda.interaction.behaviour import behaviour
+from joda.interaction.behaviour import Behaviour, behaviour
 from joda.interaction.surroundings import surroundings
 from joda.pictures.draw import draw
 from joda.pictures.style import png
@@ -30,11 +30,16 @@ from joda.plain import plain
 from joda.profile import Profile, describe
 from joda.proposal import Proposal
 from joda.propose import Answer, Proposer, Task, Turn, Usage, total
+from joda.propose.archetype import read_archetypes
+from joda.propose.checks import Seen, takes
 from joda.propose.history import Failure, History, Round
+from joda.propose.recognise import recognise
 from joda.propose.wishes import read_wishes, unmet
 from joda.template import read_templates
 
 PICTURES = 5
+SURE = 0.5
+"""How sure it must be what a joint is, before somebody's proposal is doubted for its force."""
 
 Progress = Callable[[str], None]
 
@@ -83,7 +88,13 @@ class Session:
         make_folder(folder)
         self._save()
         write_text(folder / "context.json", plain(self.context.model_dump_json(indent=2)) + "\n")
-        self.task = Task(self.context, library, self._pictures(), history.description)
+        self.task = Task(
+            self.context,
+            library,
+            self._pictures(),
+            history.description,
+            read_archetypes(self._templates),
+        )
         if self.turns and not self._finished():
             self._write(self.turns[-1])
 
@@ -218,10 +229,30 @@ class Session:
             behaviour=behaved,
             facts=behaved.describe(self.context),
             unmet=tuple(unmet([*wanted, *asked], behaved, self.context).values()),
-            notes=tuple(answer.notes),
+            notes=(*answer.notes, *self._implausible(behaved, answer)),
             usage=answer.usage,
+            recognised=answer.recognised,
         )
         return round, self._turn(round, profile)
+
+    def _implausible(self, behaved: Behaviour, answer: Answer) -> tuple[str, ...]:
+        """That opening takes another force than such joints do; of rules it is a wish of theirs."""
+        if answer.recognised is not None:
+            return ()
+        found = recognise(self.context, self.history.description, self.task.archetypes)[1]
+        if found.force is None or found.likely < SURE:
+            return ()
+        least, most = found.force.opening
+        instead = takes(Seen(behaved, self.context, least, most))
+        return (
+            (
+                f"It looks like a {found.title} ({found.likely:.0%}), which takes {least:g} to "
+                f"{most:g} N at the handle to open ({found.force.source or 'an estimate'}), but "
+                f"{instead}.",
+            )
+            if instead
+            else ()
+        )
 
     def _compiled(self, proposal: Proposal) -> Profile:
         return compile(proposal, self.context, templates=self._templates, key=self.history.key)

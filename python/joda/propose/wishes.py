@@ -22,8 +22,9 @@ class Wish:
     """A behaviour that can be wished for.
 
     Attributes:
-        says: the sentence that states it; {number} where it needs one.
-        phrases: regular expression of the ways to say it; a group `number` where it needs one.
+        says: the sentence that states it; {number} and {most} where it needs them.
+        phrases: regular expression of the ways to say it; groups `number` and `most`, or `about`
+            or `limit` alone, where it needs them.
         check: empty if the joint does it, else what it does instead.
         denies: whether it is said with a "not", which the phrases leave out.
     """
@@ -42,6 +43,9 @@ _COUNTS = (
     *("", "", "two", "three", "four", "five", "six"),
     *("seven", "eight", "nine", "ten", "eleven", "twelve"),
 )
+_REAL, _NEWTON = r"\d+(?:\.\d+)?", r"(?:n\b|newtons?\b)"
+_ROUND = 0.25
+"""How far off a force may be that somebody gives as "about", as a share of it."""
 _COUNT = rf"\d+|{'|'.join(_COUNTS[2:])}"
 WISHES: dict[str, Wish] = {
     "moves": Wish("can be opened and closed by hand", r"(?!)", checks.moves),
@@ -95,6 +99,16 @@ WISHES: dict[str, Wish] = {
         r"\blatch(?:es|ing)\b|\b(?:not|n't|to|must|should|never) latch\b|"
         r"needs? (?:a|an extra) push to",
         checks.latched,
+    ),
+    "falls_shut": Wish(
+        "falls shut from half-way open", r"falls? (?:back |down )?shut", checks.falls_shut
+    ),
+    "takes": Wish(
+        "takes {number} to {most} newtons at the handle to open",
+        rf"(?P<number>{_REAL}) ?(?:to|-|–) ?(?P<most>{_REAL}) ?{_NEWTON}|"
+        rf"(?:at most|no more than|less than|under|below|up to) (?P<limit>{_REAL}) ?{_NEWTON}|"
+        rf"(?P<about>{_REAL}) ?{_NEWTON}",
+        checks.takes,
     ),
     "stays_put": Wish(
         "stays wherever it is left",
@@ -166,15 +180,16 @@ NOT = re.compile(r"\b(?:not|never|no|without|cannot|nor|neither)\b|n't\b")
 
 @dataclass(frozen=True)
 class Wanted:
-    """A wish, with its number if it has one."""
+    """A wish, with its number, or its least and its most, if it has them."""
 
     name: str
-    number: int = 0
+    number: float = 0
+    most: float = 0
 
     @property
     def sentence(self) -> str:
         """What it says."""
-        return WISHES[self.name].says.format(number=self.number)
+        return WISHES[self.name].says.format(number=f"{self.number:g}", most=f"{self.most:g}")
 
 
 def read_wishes(text: str, *, refused: bool = False) -> list[Wanted]:
@@ -192,11 +207,17 @@ def read_wishes(text: str, *, refused: bool = False) -> list[Wanted]:
             if denied != (refused or wish.denies) or (refused and wish.denies):
                 continue
             if match := re.search(wish.phrases, clause):
-                groups = match.groupdict()
-                number = groups.get("number") or groups.get("number2") or "0"
-                count = _COUNTS.index(number) if number in _COUNTS else int(number)
-                found.setdefault(name, Wanted(name, count))
+                found.setdefault(name, Wanted(name, *_numbers(match.groupdict())))
     return list(found.values())
+
+
+def _numbers(groups: dict[str, str | None]) -> tuple[float, float]:
+    """The number of a wish, or its least and its most."""
+    number = groups.get("number") or groups.get("number2") or "0"
+    if about := groups.get("about"):
+        return float(about) * (1 - _ROUND), float(about) * (1 + _ROUND)
+    most = float(groups.get("most") or groups.get("limit") or 0)
+    return float(_COUNTS.index(number) if number in _COUNTS else number), most
 
 
 def state(wanted: Sequence[Wanted]) -> str:
@@ -217,6 +238,6 @@ def unmet(wanted: Sequence[Wanted], behaviour: Behaviour, context: Context) -> d
     """
     out = {}
     for wish in (Wanted("moves"), *wanted):
-        if instead := WISHES[wish.name].check(Seen(behaviour, context, wish.number)):
+        if instead := WISHES[wish.name].check(Seen(behaviour, context, wish.number, wish.most)):
             out[wish.name] = f"It {wish.sentence}: no, {instead}."
     return out

@@ -46,6 +46,13 @@ def mass_doubts(model: mujoco.MjModel, joint: int, inertia: float, driven: bool)
     return tuple(sentence for sentence in out if sentence)
 
 
+def solid_volume(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> float:
+    """Of geoms, m³, as the smaller of what collides and what is only seen encloses."""
+    collides = (model.geom_contype[geoms] != 0) | (model.geom_conaffinity[geoms] != 0)
+    sets = [part for part in (geoms[collides], geoms[~collides]) if len(part)]
+    return min(sum(_volumes(model, int(geom))[0] for geom in part) for part in sets)
+
+
 def _of_mass(name: str, mass: float, sizes: Array) -> str:
     """A sentence where the mass does not fit the size; empty where it may.
 
@@ -61,11 +68,15 @@ def _of_mass(name: str, mass: float, sizes: Array) -> str:
             if density < LIGHTEST
             else f"{faces.min():.2g} m², {mass / faces.min():.2g} kg/m², lighter than cardboard"
         )
-        return f"{said} of {what}: set the mass that was weighed (<inertial> or the geoms' mass)."
+        return (
+            f"{said} of {what}: set the mass that was weighed (<inertial> or the geoms' mass), or "
+            "have it estimated: joda weigh."
+        )
     if most > HEAVIEST:
         return (
             f"{said} within {1e3 * boxes.max():.3g} litres, {most:.3g} kg/m³, heavier than lead: "
-            "set the mass that was weighed (<inertial> or the geoms' mass), or mend the scale."
+            "set the mass that was weighed (<inertial> or the geoms' mass), have it estimated "
+            "(joda weigh), or mend the scale."
         )
     if mass <= SOLID:
         return ""

@@ -1,0 +1,109 @@
+"""Gives what a joint moves the mass that its size suggests, where the model's own cannot be."""
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from joda.errors import JodaError
+from joda.files import check_target, write_bytes
+from joda.scenes.masses import mass_doubts
+from joda.scenes.materials import Weight, estimate_weight
+from joda.scenes.model import find_joint, joint_name, load, load_model, moves_with, write_out
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What was made of a part's mass.
+
+    Attributes:
+        before: of what the joint moves in the model, kg.
+        estimate: from its size and material.
+        doubts: why the mass before cannot be, a sentence each; empty where it can.
+        output: the model with the estimate.
+    """
+
+    before: float
+    estimate: Weight
+    doubts: tuple[str, ...]
+    output: Path
+
+    def describe(self) -> str:
+        """The change in a line."""
+        return f"{self.before:.3g} kg became {self.estimate.mass:.3g} kg ({self.estimate.material})"
+
+
+def weigh(
+    model: str | Path,
+    joint: str,
+    output: str | Path,
+    *,
+    force: bool = False,
+) -> Weighed:
+    """Writes a model in which what a joint moves has an estimated mass.
+
+    Masses and inertias of all bodies that the joint moves are multiplied by one factor; centres of
+    mass stay. The estimate is rough: within a factor of two or three of what a scale would say.
+
+    Args:
+        model: MJCF or URDF file.
+        joint: its name or address, see `joda.scenes.model.find_joint`.
+        output: MJCF to write; MuJoCo writes it out, file references are adapted.
+        force: overwrite `output`; and replace a mass that can be.
+
+    Returns:
+        what was changed.
+
+    Raises:
+        JodaError: a file cannot be read or written, the joint does not exist, moves no geoms or no
+            mass, or its mass can be (without `force`).
+    """
+    source, target = Path(model), Path(output)
+    check_target(target, force)
+    spec, compiled = load(source)
+    number = find_joint(compiled, joint)
+    name, body = joint_name(compiled, number), int(compiled.jnt_bodyid[number])
+    before, estimate = float(compiled.body_subtreemass[body]), estimate_weight(compiled, number)
+    if estimate is None:
+        raise JodaError(f"{source}: joint '{name}' moves no geoms, so nothing tells its size.")
+    if before <= 0:
+        raise JodaError(f"{source}: joint '{name}' moves no mass; give its bodies one.")
+    doubts = mass_doubts(compiled, number, 1.0, True)
+    if not doubts and not force:
+        raise JodaError(
+            f"{source}: joint '{name}' moves {before:.3g} kg, which can be (by its size about "
+            f"{estimate.mass:.3g} kg); add --force to replace it all the same."
+        )
+    factor = estimate.mass / before
+    for index in np.flatnonzero(moves_with(compiled, body)):
+        part = spec.bodies[index]
+        part.explicitinertial = True
+        part.mass = float(compiled.body_mass[index]) * factor
+        part.inertia = compiled.body_inertia[index] * factor
+        part.ipos, part.iquat = compiled.body_ipos[index], compiled.body_iquat[index]
+        part.fullinertia = [np.nan] * 6
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+    text = _written(spec, source, target.parent)
+    write_bytes(target, text)
+    after = load_model(target)
+    found = float(after.body_subtreemass[after.jnt_bodyid[find_joint(after, joint)]])
+    if not np.isclose(found, estimate.mass, rtol=1e-3):
+        raise JodaError(f"{target}: MuJoCo wrote {found:.3g} kg, not {estimate.mass:.3g} kg.")
+    return Weighed(before, estimate, doubts, target)
+
+
+def _written(spec: mujoco.MjSpec, source: Path, folder: Path) -> bytes:
+    """The spec as MuJoCo writes it, for a file that will lie in a folder."""
+    found = {}
+    for kind in ("meshdir", "texturedir"):
+        absolute = (source.parent / (getattr(spec, kind) or "")).resolve()
+        setattr(spec, kind, str(absolute))  # while it is written, MuJoCo opens the files
+        found[kind] = absolute
+    text = write_out(spec, source).decode()
+    for kind, absolute in found.items():
+        near = Path(os.path.relpath(absolute, folder.resolve())).as_posix()
+        text = re.sub(rf'{kind}="[^"]*"', f'{kind}="{near}/"'.replace("\\", "/"), text)
+    return text.encode()

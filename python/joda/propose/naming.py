@@ -1,0 +1,68 @@
+"""What names say: the concepts of `words.toml` in them, in whatever language or convention."""
+
+import re
+import tomllib
+import unicodedata
+from collections.abc import Iterable
+from functools import cache
+from importlib.resources import files
+from typing import Literal
+
+Group = Literal["part", "object"]
+Concepts = frozenset[str]
+
+_BREAK = re.compile(r"(?<=[a-z])(?=[A-Z])|[\W\d_]+")
+_LONG, _MIDDLING = 5, 4
+"""Letters from which a word counts anywhere in a name, and at its beginning or end."""
+
+
+@cache
+def _vocabulary() -> dict[Group, dict[str, tuple[str, ...]]]:
+    text = (files("joda.propose") / "words.toml").read_text("utf-8")
+    return {
+        group: {concept: tuple(words) for concept, words in concepts.items()}  # type: ignore[misc]
+        for group, concepts in tomllib.loads(text).items()
+    }
+
+
+def concepts(texts: Iterable[str], group: Group) -> Concepts:
+    """The concepts that names speak of, such as "door" in "Kuehlschranktuer".
+
+    Args:
+        texts: names of joints, bodies, geoms, files.
+        group: of parts or of objects.
+    """
+    names = [text for text in texts if text]
+    words = {word for name in names for word in _words(name)}
+    letters = "".join(names)
+    return frozenset(
+        concept
+        for concept, known in _vocabulary()[group].items()
+        if any(_tells(one, words, letters) for one in known)
+    )
+
+
+def said(description: str, group: Group) -> Concepts:
+    """The concepts that a sentence names as things: what latches, or is to latch, is no latch."""
+    text = description.lower()
+    return frozenset(
+        concept
+        for concept, known in _vocabulary()[group].items()
+        if any(re.search(rf"(?<!to )\b{re.escape(word)}s?\b", text) for word in known)
+    )
+
+
+def _words(name: str) -> list[str]:
+    plain = unicodedata.normalize("NFKD", name.replace("ß", "ss"))
+    plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
+    return [word.lower() for word in _BREAK.split(plain) if word]
+
+
+def _tells(known: str, words: set[str], letters: str) -> bool:
+    if not known.isascii():
+        return known in letters
+    if len(known) >= _LONG:
+        return any(known in word for word in words)
+    if len(known) == _MIDDLING:
+        return any(word.startswith(known) or word.endswith(known) for word in words)
+    return known in words or f"{known}s" in words

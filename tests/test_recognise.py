@@ -1,0 +1,243 @@
+"""What a joint is taken for: by names in many languages, by its shape, by a table of one's own."""
+
+import json
+import secrets
+from pathlib import Path
+
+import pytest
+from articulated import objects
+from joint_table import judge, made
+
+from joda import context, generate, schema
+from joda.errors import JodaError
+from joda.propose import Task
+from joda.propose.archetype import forces, read_archetypes
+from joda.propose.history import History
+from joda.propose.naming import concepts, said
+from joda.propose.offline import Offline
+from joda.propose.recognise import recognise
+from joda.propose.wishes import Wanted, read_wishes, state
+from joda.template import read_templates
+
+MODELS = Path(__file__).parents[1] / "models"
+
+
+# --- names
+@pytest.mark.parametrize(
+    ("name", "group", "concept"),
+    [
+        ("Kuehlschranktuer", "part", "door"),
+        ("Kühlschranktür", "object", "refrigerator"),
+        ("porte_micro_ondes", "part", "door"),
+        ("cajonSuperior", "part", "drawer"),
+        ("hingecabinet_left", "object", "cabinet"),
+        ("StorageFurniture_45132", "object", "cabinet"),
+        ("抽屉_2", "part", "drawer"),
+        ("冷蔵庫", "object", "refrigerator"),
+        ("drzwi_lodowki", "part", "door"),
+        ("rotation_lid", "part", "lid"),
+        ("interruttore_luce", "part", "switch"),
+        ("link_0_knob", "part", "knob"),
+    ],
+)
+def test_names_in_many_languages_and_conventions_are_understood(name, group, concept):
+    assert concept in concepts([name], group)
+
+
+@pytest.mark.parametrize("name", ["link_0", "joint_3", "solid", "slide_rail", "base", "m"])
+def test_names_that_say_nothing_are_no_lids_and_no_doors(name):
+    assert not concepts([name], "part") & {"lid", "door", "tap", "key"}
+
+
+def test_what_is_to_latch_is_no_latch():
+    assert "lever" in said("a latch", "part")
+    assert "lever" not in said("It latches, and needs a push to latch.", "part")
+
+
+# --- the answer
+def test_the_answer_says_what_decided_how_sure_and_what_else_it_could_be():
+    _, found = recognise(context(MODELS / "dishwasher.xml", "door"))
+    assert found.title == "dishwasher door" and found.likely > 0.5
+    assert "the object is called dishwasher" in found.describe()
+    found = recognise(nameless("dishwasher", "door"))[1]
+    told = [one.feature.split()[0] for one in found.decided]
+    assert "covers" in told and "weight" in told
+    assert found.title in ("dishwasher door", "oven door")
+    assert sum(one.likely for one in found.others) <= 1 - found.likely + 0.05
+
+
+def nameless(model, joint):
+    found = context(MODELS / f"{model}.xml", joint)
+    return found.model_copy(update={"names": (), "around": ()})
+
+
+@pytest.mark.parametrize(
+    ("model", "joint", "wish"),
+    [
+        ("cabinet", "door", "opens_past"),
+        ("drawer", "drawer", "closes_near"),
+        ("knob", "knob", "clicks"),
+        ("laptop", "lid", "stays_put"),
+        ("lighter", "button", "closes_anywhere"),
+        ("oven", "door", "stays_half"),
+        ("refrigerator", "door", "held_shut"),
+        ("switch", "rocker", "two_sides"),
+    ],
+)
+def test_own_models_are_told_by_their_shape_alone(model, joint, wish):
+    assert wish in recognise(nameless(model, joint))[0].wishes
+
+
+HALF = {
+    "stays": {"stays_put", "stays_half", "clicks", "free"},
+    "closes": {"closes_anywhere", "falls_shut"},
+    "opens": {"opens_past"},
+}
+
+
+def test_objects_that_nobody_has_seen_are_told_by_their_shape_alone():
+    """By what they do half-way; drawn anew at each run, a third of the bar for bad luck."""
+    seed = secrets.randbelow(2**31)
+    rows = list(made(seed, named=False, rounds=1))
+    right = 0
+    for row in rows:
+        wishes = set(recognise(row.found)[0].wishes)
+        expected = HALF.get(row.expected.get("half", ""), {"two_sides"})
+        right += bool(wishes & expected)
+    assert right >= 0.75 * len(rows), f"seed {seed}: {right} of {len(rows)}"
+
+
+def test_what_is_made_of_objects_is_what_is_expected_of_them():
+    seed = secrets.randbelow(2**31)
+    rows = {row.part: row for row in made(seed, named=True, rounds=1)}
+    for part in ("dishwasher door", "rocker", "door lever"):
+        result = judge(rows[part])
+        assert all(result.met.values()), f"seed {seed}, {part}: {result.met}, {result.took}"
+
+
+def test_an_expectation_can_fail():
+    seed = 5
+    row = next(row for row in made(seed, named=True, rounds=1) if row.part == "laptop lid")
+    wrong = row._replace(expected={"half": "closes", "opens": "?", "force": (100, 200)})
+    assert not any(judge(wrong).met.values())
+
+
+def test_made_objects_have_one_joint_per_expectation_and_differ_by_seed():
+    first, other = objects(1, 1), objects(2, 1)
+    assert [one.category for one in first] == [one.category for one in other]
+    assert first[0].joints[0].limits != other[0].joints[0].limits
+
+
+# --- the table
+OWN = """
+[[archetype]]
+title = "hinged widget"
+evidence = "we made it"
+joint = "hinge"
+common = 30
+wishes = ["stays_put"]
+force = "room door"
+parts = [{ effect = "constant_friction_hinge", place = [0, 1], friction = "weak", reason = "rubs" }]
+shape.travel = [10, 200]
+"""
+
+
+def test_a_table_of_ones_own_goes_beside_templates(tmp_path):
+    (tmp_path / "mine.toml").write_text(OWN)
+    assert read_archetypes([tmp_path])[-1].title == "hinged widget"
+    result = generate(
+        MODELS / "laptop.xml", "lid", tmp_path / "out", proposer="offline",
+        templates=[tmp_path], rounds=1,
+    )  # fmt: skip
+    round = History.read(tmp_path / "out" / "history.json").rounds[0]
+    assert round.recognised is not None and round.recognised.title == "hinged widget"
+    assert round.recognised.force.opening == (0.5, 22.2)
+    assert result.history.rounds[0].proposal.joint_summary.motion_description.startswith("hinged")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("shape.travel = [10, 200]", "shape.tavel = 1", "shape.tavel is no feature; there are:"),
+        ("shape.travel = [10, 200]", 'shape.travel = "far"', "shape.travel must be a number"),
+        ("shape.travel = [10, 200]", "shape.travel = [9, 2]", "must be [least, most]"),
+        ('["stays_put"]', '["flies"]', "'flies' is none of"),
+        ('"room door"', '"barn door"', "'barn door' is none of"),
+        ("[[archetype]]", "[[archetype]", "is no TOML"),
+    ],
+)
+def test_a_mistake_in_a_table_is_one_sentence(tmp_path, old, new, said):
+    (tmp_path / "mine.toml").write_text(OWN.replace(old, new))
+    with pytest.raises(JodaError, match=r"mine\.toml") as raised:
+        read_archetypes([tmp_path])
+    assert said in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_the_format_of_the_table_is_a_schema():
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.Draft202012Validator.check_schema(schema("archetype"))
+    assert "evidence" in json.dumps(schema("archetype"))
+
+
+def test_every_archetype_has_its_force_and_effects_that_there_are():
+    names = read_templates()
+    for one in read_archetypes():
+        assert one.evidence and (one.force or one.unknown or one.driven)
+        for part in one.parts:
+            filled = part.effect.format(
+                closed="low_end", open="high_end", opening="positive", closing="negative"
+            )
+            assert filled == "detents" or filled in names
+
+
+def test_every_force_has_a_source_or_is_called_an_estimate():
+    assert {row.basis for row in forces().values()} == {"standard", "measured", "estimate"}
+    for row in forces().values():
+        assert 0 < row.opening[0] < row.opening[1] <= 100
+        assert bool(row.source) == (row.basis != "estimate")
+
+
+def test_the_page_has_the_table_of_forces():
+    page = (MODELS.parent / "docs" / "generation.md").read_text()
+    for row in forces().values():
+        least, most = row.opening
+        assert f"| {row.name} | {least:g} to {most:g} | {row.source or 'estimate'} |" in page
+
+
+# --- forces
+@pytest.mark.parametrize(
+    ("said", "least", "most"),
+    [
+        ("It takes 8 to 66.7 N at the handle to open.", 8, 66.7),
+        ("Opening it needs at most 22 N.", 0, 22),
+        ("It opens with about 20 newtons.", 15, 25),
+    ],
+)
+def test_a_force_at_the_handle_can_be_said(said, least, most):
+    wish = next(wish for wish in read_wishes(said) if wish.name == "takes")
+    assert (wish.number, wish.most) == pytest.approx((least, most))
+    assert read_wishes(state([Wanted("takes", least, most)])) == [Wanted("takes", least, most)]
+
+
+def test_a_wish_for_a_force_comes_true(tmp_path):
+    done = generate(
+        MODELS / "refrigerator.xml", "door", tmp_path / "out", proposer="offline",
+        describe="It takes 28 to 34 N at the handle to open.",
+    )  # fmt: skip
+    last = done.history.rounds[-1]
+    arm = context(MODELS / "refrigerator.xml", "door").lever_arm
+    assert not last.unmet and 28 <= last.behaviour.opening.steady / arm <= 34
+
+
+def test_somebody_elses_implausible_force_is_doubted(tmp_path):
+    task = Task(context(MODELS / "refrigerator.xml", "door"), read_templates())
+    proposal = Offline().propose(task, []).proposal
+    first = proposal.effect_proposals[0]
+    far = first.model_copy(update={"refineFactor": first.refineFactor.model_copy(
+        update={"conservative": 5.0})})  # fmt: skip
+    proposal = proposal.model_copy(update={"effect_proposals": (far,)})
+    (tmp_path / "p.json").write_text(proposal.to_json())
+    model = MODELS / "refrigerator.xml"
+    done = generate(model, "door", tmp_path / "out", proposer=tmp_path / "p.json")
+    (note,) = done.history.rounds[0].notes
+    assert "looks like a refrigerator door" in note and "16 CFR 1750" in note
