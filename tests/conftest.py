@@ -1,4 +1,5 @@
-"""Sweeps: of many cases of one test some are drawn anew in every session; `--whole` runs all."""
+"""Sweeps: of many cases of one test, and of the tests that take long, some are drawn anew in every
+session; `--whole` runs all."""
 
 import os
 import random
@@ -8,6 +9,8 @@ from collections import defaultdict
 # tests run side by side: threads within matrix products would only be in each other's way
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SEED = "JODA_SWEEPS"
+LONG, FEW = 0.35, 10
+"""Part of the long tests that a session of more than so many files draws."""
 
 
 def pytest_addoption(parser):
@@ -19,6 +22,7 @@ def pytest_configure(config):
         "markers",
         "sweep(count, group): cases of this test, or of all tests of a group, in a session",
     )
+    config.addinivalue_line("markers", "long: of the tests that take long a session draws a part")
     os.environ.setdefault(SEED, str(secrets.randbits(32)))  # the same in every worker
 
 
@@ -34,6 +38,9 @@ def pytest_collection_modifyitems(config, items):
         if mark := item.get_closest_marker("sweep"):
             count, *group = mark.args
             sweeps[group[0] if group else item.nodeid.partition("[")[0], count].append(item)
+    long = [item for item in items if item.get_closest_marker("long")]
+    if len({item.path for item in items}) > FEW:  # who asks for a file gets all of it
+        sweeps["long", round(LONG * len(long))] = long
     left = set()
     for (name, count), cases in sweeps.items():
         if len(cases) == len(items):  # they were asked for

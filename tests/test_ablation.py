@@ -19,6 +19,7 @@ def test_every_recorded_answer_can_be_used(name, run):
         assert (reader or (lambda text: parse_ablation(text, task)))(text) is not None
 
 
+@pytest.mark.long
 def test_the_table_has_every_object_and_adds_up(capsys):
     table = list(rows())
     assert [(row[0], row[1]) for row in table] == [

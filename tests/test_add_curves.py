@@ -56,6 +56,7 @@ def test_what_does_not_help_is_not_added(tmp_path):
     assert f"force {found.before.window:.3g} N·m" in told_added(found)[0]
 
 
+@pytest.mark.long
 def test_two_hidden_forces_are_added_one_after_the_other(tmp_path):
     def law(s, d):
         return LAWS["detent_internal"](s, d) + LAWS["spring_return_to_low_end"](s, d)

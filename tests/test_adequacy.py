@@ -41,6 +41,7 @@ def test_where_it_fails_is_found_in_the_whole_run_too(unclear):
     assert {"direction", "load", "time"} <= {place.by for place in unclear.failing}
 
 
+@pytest.mark.long
 def test_the_true_model_of_free_runs_is_cleared(tmp_path):
     rng = np.random.default_rng()
     seeds = rng.integers(2**31, size=6)

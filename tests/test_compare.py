@@ -134,6 +134,7 @@ def test_what_the_timestep_does_is_said(tmp_path, seed):
     assert not any("timestep" in note for note in said[1].notes)
 
 
+@pytest.mark.long
 def test_native_elements_are_replayed_like_their_profile(tmp_path, seed):
     runs = runs_of(door(), tmp_path, seed)
     native = write(tmp_path, SCENE.format(native='damping="0.5" frictionloss="0.3"'), "native.xml")

@@ -138,6 +138,7 @@ def test_the_page_needs_nothing_else(hidden):
     assert (hidden.folder / "d.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+@pytest.mark.long
 def test_adding_lowers_the_error_on_runs_that_nothing_has_seen(hidden):
     assert (hidden.added.returncode, hidden.added.stderr) == (0, "")
     added = json.loads(hidden.added.stdout)
@@ -155,6 +156,7 @@ def test_adding_lowers_the_error_on_runs_that_nothing_has_seen(hidden):
         assert (hidden.folder / name).exists()
 
 
+@pytest.mark.long
 def test_a_wrong_effect_never_raises_the_error(hidden):
     output = hidden.folder / "wrong.xml"
     added = add(
@@ -176,6 +178,7 @@ def test_a_wrong_effect_never_raises_the_error(hidden):
         assert np.isfinite(found.rmse_window)
 
 
+@pytest.mark.long
 def test_the_stairs_never_rise(hidden, monkeypatch):
     monkeypatch.setattr(improving, "MOST", 1)
     page = hidden.folder / "story.html"
@@ -192,6 +195,7 @@ def test_the_stairs_never_rise(hidden, monkeypatch):
     assert "://" not in text
 
 
+@pytest.mark.long
 def test_a_true_model_is_adequate_and_nothing_is_added(tmp_path):
     seed = int(np.random.default_rng().integers(2**31))
     print(seed)  # shown where the test fails
@@ -267,6 +271,7 @@ def test_a_mistake_is_one_sentence(mistaken, line, words):
     assert words in fails(*line.split(), cwd=mistaken)
 
 
+@pytest.mark.long
 def test_the_demo_opens_the_seal(tmp_path):
     said = []
     result = hidden_effect(tmp_path / "out", seed=SEED, position_only=True, say=said.append)

@@ -21,6 +21,9 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
+pytestmark = pytest.mark.long
+
+
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory) -> Path:
     """Two doors, one with two models, one whose run is no run."""

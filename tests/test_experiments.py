@@ -227,6 +227,7 @@ def test_spans_are_short():
     assert span([0.00001, 12.345]) == "< 0.001 to 12.3"
 
 
+@pytest.mark.long
 def test_the_command_leaves_a_gallery_whose_commands_run(tmp_path):
     result = joda("experiments", "switch", "--seeds", "1", "-o", "out", cwd=tmp_path)
     assert (result.returncode, result.stderr) == (0, "")

@@ -24,6 +24,7 @@ def test_nine_iterations_bring_the_papers_door_down_to_the_noise(seed):
     assert other.rms(first) ** 2 > 100 * other.rms(result.theta) ** 2
 
 
+@pytest.mark.long
 def test_a_planted_profile_with_a_barrier_is_recovered():
     seed = int(np.random.default_rng().integers(2**31))
     name = ("bistable_mechanism", "bistable_mechanism_internal")[seed % 2]
@@ -31,6 +32,7 @@ def test_a_planted_profile_with_a_barrier_is_recovered():
         assert rms < 0.05, (name, seed, channel)
 
 
+@pytest.mark.long
 def test_an_interruption_keeps_the_best_so_far():
     found, start, train, _ = cabinet(0)
     problem = problem_of(found, start, train)

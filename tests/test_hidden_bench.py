@@ -30,6 +30,7 @@ RUNS = range(0, 8, 2)
 """Half of the runs, in half of the time."""
 
 
+@pytest.mark.long
 def test_of_a_null_and_two_effects_at_most_one_is_wrong():
     master = secrets.randbits(32)
     print("master seed", master)
@@ -97,6 +98,7 @@ def test_the_families_line_has_every_effect_of_each_and_is_judged_by_the_seal(ca
     assert "| nothing: adequate | 0/2 |" in out
 
 
+@pytest.mark.long
 def test_a_curve_gets_as_many_control_points_as_the_data_support():
     """A template's five control points make no over-centre spring."""
     seed = secrets.randbits(31)

@@ -256,6 +256,7 @@ def test_slips_keep_a_loop_that_is_as_wide_as_masing_says():
     assert back - force[1998] == pytest.approx(-2 * first, rel=1e-2)
 
 
+@pytest.mark.long
 def test_backlash_lets_the_measured_part_move_alone_until_it_has_crossed():
     law = Behind(0.02, 0.8, 0.3, 0.0, 0.16 * 200.0**2, 2 * 0.5 * 0.16 * 200)
     truth = Truth(joint(), 0.3, 0.0, (law,))

@@ -487,6 +487,7 @@ def test_what_is_doubtful_is_said_and_used(name, door, good, tmp_path):
     assert any(noted in note for note in read_measured(door, "door", [path]).notes)
 
 
+@pytest.mark.long
 def test_where_no_window_can_be_replayed_no_nan_is_said(door, good, tmp_path):
     path = written(tmp_path, lambda g: replace(g, time=0.4 * np.arange(len(g.time))).text(), good)
     found = joda.compare(door, "door", [path])
@@ -552,6 +553,7 @@ def test_what_is_unusual_but_right_raises_no_doubt(name, tmp_path):
     assert found.rmse_window < 1e-2 * span
 
 
+@pytest.mark.long
 def test_a_million_samples_stay_within_the_memory_for_them(door, tmp_path):
     """The peak of the whole process, its imports included; a run of 20 s at 50 kHz."""
     path = tmp_path / "run.csv"

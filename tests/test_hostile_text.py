@@ -219,6 +219,7 @@ SAYS = {
 }
 
 
+@pytest.mark.long
 def test_a_name_of_several_lines_forges_none(forked, tmp_path):
     def quoted(text):
         return re.sub("[\x00-\x1f]", lambda m: f"&#{ord(m[0])};", quoteattr(text))

@@ -25,6 +25,7 @@ def train():
     return read(draw(492745320, BOTH[0], True, BOTH[1]))[0].changed(runs=[0, 2, 4])
 
 
+@pytest.mark.long
 def test_the_pair_that_explains_most_is_first(train, monkeypatch):
     monkeypatch.setattr(ahead, "AHEAD", 2)
     told = []

@@ -411,6 +411,7 @@ def test_another_version_of_mjx_is_refused():
 # --- docs/mjx.md
 
 
+@pytest.mark.long
 def test_the_example_of_the_docs(tmp_path):
     root = Path(__file__).parents[1]
     (code,) = re.findall(r"```python\n(.*?)```", (root / "docs/mjx.md").read_text(), re.DOTALL)

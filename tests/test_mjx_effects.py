@@ -160,6 +160,7 @@ def check_alone(scene, forces, found):
         assert np.abs(path.q - found[:, k]).max() < 2e-8 * SPANS[k]
 
 
+@pytest.mark.long
 def test_joints_with_different_effects_stand_side_by_side(folder):
     """Each does what it does beside one with the same effects; only what is there is computed."""
     forces = random_forces()
@@ -197,6 +198,7 @@ STOPPED = """
 </mujoco>""".replace("{geom}", '<geom size="0.1" mass="0.5" contype="0" conaffinity="0"/>')
 
 
+@pytest.mark.long
 def test_end_stops_among_other_rows_are_the_plugins():
     """Of two joints; others have limits and friction before and behind them."""
     model = mujoco.MjModel.from_xml_string(STOPPED)

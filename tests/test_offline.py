@@ -117,6 +117,7 @@ def test_every_joint_of_other_peoples_scenes_ends_with_its_wishes_met(name):
         good(loop(path, joint))
 
 
+@pytest.mark.long
 def test_joints_under_gravity_need_two_rounds_on_average():
     rounds = [len(own(name, key=key).turns) for name in GRAVITY for key in KEYS]
     assert sum(rounds) / len(rounds) <= 2.2

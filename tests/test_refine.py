@@ -229,6 +229,7 @@ class TestThePapersDoor:
         assert content(door.folder) == before
 
 
+@pytest.mark.long
 def test_inertia_and_bounce_are_found_and_end_in_the_joints_attributes(tmp_path):
     rng = np.random.default_rng(0)
     heavy = write(tmp_path, CABINET.replace(JOINT, JOINT[:-2] + ' armature="0.1"/>'), "heavy.xml")

@@ -191,6 +191,7 @@ def test_the_model_is_left_alone(tmp_path):
     assert path.read_bytes() == before
 
 
+@pytest.mark.long
 def test_overwrites_only_when_told(tmp_path):
     path = one(tmp_path)
     first = render(path, "lid", tmp_path, count=2)[1]

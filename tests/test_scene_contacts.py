@@ -225,6 +225,7 @@ def test_what_lies_in_a_contact_is_left_out_and_said(tmp_path):
     assert one["interval"][0] == pytest.approx(CORNER / 1.6, abs=1e-3)
 
 
+@pytest.mark.long
 def test_no_jam_becomes_an_effect(tmp_path):
     model, runs = jammed(tmp_path, 5)
     diagnosis = tmp_path / "d.json"
@@ -319,6 +320,7 @@ def swung(folder, name="swung.csv", noise=2e-4):
     return pushed(OPEN, "hinge", to_and_fro(1.5, 3.0), folder, name, 3.0, 0.05, noise)
 
 
+@pytest.mark.long
 def test_a_run_through_a_contact_is_a_fault_of_the_scene(tmp_path):
     path = write(tmp_path, GATE, "model.xml")
     run = swung(tmp_path)

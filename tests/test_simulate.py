@@ -232,6 +232,7 @@ def test_the_run_is_one_that_other_commands_read(microwave, tmp_path):
     assert "a hand takes it" in read_text(done.csv).splitlines()[0]
 
 
+@pytest.mark.long
 def test_a_film_shows_the_motion(microwave, tmp_path):
     from PIL import Image
 
@@ -251,6 +252,7 @@ def test_without_a_renderer_all_but_the_film_is_made(microwave, tmp_path, monkey
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.png"]
 
 
+@pytest.mark.long
 def test_the_command_writes_and_tells(microwave, tmp_path):
     result = joda("simulate", microwave, "--joint", "door", "--push", "-2", "--start", "0.5",
                   "--for", "0.3", "-o", "run.csv", cwd=tmp_path)  # fmt: skip

@@ -76,6 +76,7 @@ def test_two_seconds_under_random_forces_are_the_plugins(number, step):
     assert max(visited) >= hi or min(visited) <= lo  # an end of the range was hit
 
 
+@pytest.mark.long
 def test_a_second_under_random_forces_is_that_of_mjx():
     found = context(MODELS[0].with_stem("cabinet"), "#0")
     profile, force = profile_for(found, sorted(templates()).index("magnetic_return_to_low_end"))
@@ -123,6 +124,7 @@ def test_derivatives_are_those_of_central_differences(kind):
         assert error < 1e-5, (slot, error)
 
 
+@pytest.mark.long
 def test_the_profile_and_the_joint_have_the_same_curves():
     found = context(MODELS[0], "#0")
     profile, _ = profile_for(found, 6)

@@ -252,6 +252,7 @@ def test_a_joint_flies_through_its_play_and_shares_its_momentum_with_the_load():
     assert passage.side == -1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_added_inertia_slows_the_start(kind):
     joint = replace(joint_of(kind, "added_inertia", 0.001)[1], gravity=jnp.zeros(2))
@@ -294,6 +295,7 @@ def test_an_effect_that_a_joint_has_not_does_nothing():
 # --- the plugin
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", list(cases("hinge", 1, 1, 1)))
 @pytest.mark.parametrize("kind", KINDS)
 def test_two_seconds_under_random_forces_are_the_plugins(kind, case):
@@ -378,6 +380,7 @@ def test_derivatives_by_the_stops_are_those_of_central_differences(kind):
     assert path.min() < lo and path.max() > hi
 
 
+@pytest.mark.long
 def test_derivatives_at_rest_are_finite():
     both = [cases("hinge", 1.0, 1.0, 0.1)[case] for case in ("all", "backlash behind")]
 

@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from joints import DISCRETE, EULER_LIKE, SOLVERS, component, has, load, warnings
@@ -53,6 +54,7 @@ def cases(draw):
     ), draw(st.integers(0, 2**32 - 1))
 
 
+@pytest.mark.long
 @settings(
     max_examples=60,
     deadline=None,

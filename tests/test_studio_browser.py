@@ -221,6 +221,7 @@ class Page:
         self.click(".save-yes")
 
 
+@pytest.mark.long
 def test_the_joint_is_seen_and_moves(page):
     page.until(lambda: len(np.unique(page.view().reshape(-1, 3), axis=0)) > 20)
     before, told = page.view(), page.text(".view .number")
@@ -310,6 +311,7 @@ def test_runs_are_loaded_and_bad_ones_are_told(page, project):
     page.until(lambda: re.findall(number, page.text(".numbers")) == [tuple(wanted)])
 
 
+@pytest.mark.long
 def test_an_effect_is_diagnosed_added_and_saved_as_on_the_command_line(page, project):
     told = diagnose(project.model, "lid", project.runs, json=project.folder / "d.json")
     added = add(

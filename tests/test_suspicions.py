@@ -349,6 +349,7 @@ MISTAKES = {
 FATAL = {"degrees", "millimetres", "sign", "zero", "short"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", MISTAKES)
 def test_a_mistake_is_found_and_named(kind, rng):
     mistake, choice = MISTAKES[kind]

@@ -4,6 +4,7 @@ import secrets
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hidden_bench import said
 from hidden_cases import case_of, dice, job_of, read
 from hidden_coverage import pulls
@@ -26,6 +27,7 @@ def found(seed, effect, forced=True):
     return case, ranking.asked, ranking.guesses[0]
 
 
+@pytest.mark.long
 def test_the_true_size_and_place_lie_within_what_is_said():
     master = secrets.randbits(32)
     print("master seed", master)
@@ -47,6 +49,7 @@ def test_the_true_size_and_place_lie_within_what_is_said():
     assert np.mean(ends > 2) <= 0.5
 
 
+@pytest.mark.long
 def test_of_a_known_law_the_size_is_as_uncertain_as_linear_least_squares_says():
     """Of quadratic drag: the inverse of the normal matrix, by hand, is the least of the three."""
     _, begun, guess = found(6, "quadratic_damping")
