@@ -9,7 +9,7 @@ from collections import defaultdict
 # tests run side by side: threads within matrix products would only be in each other's way
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SEED = "JODA_SWEEPS"
-LONG, FEW = 0.35, 10
+LONG, FEW = 0.25, 10
 """Part of the long tests that a session of more than so many files draws."""
 
 

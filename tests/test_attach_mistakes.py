@@ -90,7 +90,7 @@ def test_a_mistake_is_told_in_a_sentence_and_nothing_is_written(
 
 def test_another_plugin_in_the_body_is_told(tmp_path, monkeypatch):
     _, after, _ = attached(tmp_path)
-    monkeypatch.setattr("joda.scenes.scene.PLUGIN", "another")  # MuJoCo brings none for bodies
+    monkeypatch.setattr("joda.scenes.scene.slot", lambda: -1)  # as if it were another's
     with pytest.raises(JodaError) as error:
         attach(after, profile(), tmp_path / "new.xml")
     assert str(error.value) == (

@@ -77,7 +77,7 @@ def test_the_commands_are_told_in_one_line_each_on_a_narrow_terminal():
 
 
 def test_it_says_which_version_it_is():
-    version = f"joda {metadata.version('joda')} for MuJoCo {mujoco.__version__}\n"
+    version = f"joda {metadata.version('joda')} with MuJoCo {mujoco.__version__}\n"
     assert joda("--version").stdout == version
 
 

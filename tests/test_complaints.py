@@ -78,6 +78,7 @@ def test_a_closing_pull_that_is_too_strong_becomes_weaker_and_all_else_remains()
     assert profiles[0].damping == profiles[1].damping
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize(
     ("name", "complaint", "effect", "channel", "stronger"),
     [

@@ -60,6 +60,7 @@ def my_door(tmp_path_factory):
     return folder, [run(command, folder) for command in commands]
 
 
+@pytest.mark.long
 def test_the_tutorial_finds_the_closer_and_mends_the_model(my_door):
     _, told = my_door
     assert masked("".join(blocks("my_door.md", "text"))) <= masked("\n".join(told))

@@ -450,6 +450,7 @@ def test_what_can_only_be_meant_in_one_way_is_read_so(name, door, good, tmp_path
     if run.forced:
         np.testing.assert_allclose(run.force[1:], good.force[1:], rtol=1e-12)
     notes = read_measured(door, "door", [path]).notes
+    notes = [note for note in notes if "something drove it" not in note]  # its force is not read
     assert len(notes) == bool(noted)
     assert all(noted in note for note in notes)
 

@@ -10,7 +10,8 @@ import mujoco
 import pytest
 
 import joda
-from joda import making
+from joda import JodaError, making
+from joda.scenes.engine import require
 
 SOURCES = Path(joda.__file__).parent / "cpp"
 VERSION = mujoco.__version__
@@ -80,3 +81,9 @@ def test_a_cache_that_cannot_be_written(cache, monkeypatch):
 def test_no_sources(cache, tmp_path):
     with pytest.raises(joda.JodaError, match="install a wheel of joda"):
         making.make(tmp_path / "nothing", VERSION)
+
+
+def test_what_needs_a_newer_mujoco_says_so():
+    with pytest.raises(JodaError, match="fields needs MuJoCo 99.0.0 or newer, and"):
+        require((99, 0, 0), "fields")
+    require((3, 3, 0), "anything")

@@ -101,7 +101,7 @@ def good(done: Loop) -> None:
     assert done.last.behaviour.opening.arrived and done.last.behaviour.closing.arrived
 
 
-@pytest.mark.sweep(20)
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("key", KEYS)
 @each
 def test_every_own_model_ends_with_its_wishes_met_whatever_is_drawn(name, key):
@@ -110,6 +110,7 @@ def test_every_own_model_ends_with_its_wishes_met_whatever_is_drawn(name, key):
     assert read_wishes(done.last.proposal.whole_motion_descrptn)
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_joint_of_other_peoples_scenes_ends_with_its_wishes_met(name):
     path = asset(name)
@@ -219,6 +220,7 @@ def test_what_latches_is_not_taken_for_a_latch(tmp_path):
 
 
 # --- what the user says comes true
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize(
     ("name", "description", "wishes"),
     [
@@ -253,6 +255,7 @@ def test_what_the_user_says_of_a_joint_comes_true(name, description, wishes):
     does(done.context, done.last.behaviour, *wishes.split())
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("key", KEYS)
 @pytest.mark.parametrize("count", [2, 3, 5, 9])
 def test_a_knob_clicks_into_as_many_positions_as_are_said(count, key):
@@ -313,6 +316,7 @@ def effects(done: Loop):
 
 
 # --- the answer is a function of the question
+@pytest.mark.sweep(3)
 @each
 def test_the_same_question_gets_the_same_bytes(name):
     path, joint = MODELS / f"{name}.xml", OWN[name][0]
@@ -365,6 +369,7 @@ def test_a_mirrored_joint_gets_the_mirrored_proposal(name):
         )  # fmt: skip
 
 
+@pytest.mark.sweep(3)
 @each
 def test_a_mirrored_joint_ends_with_its_wishes_met(name):
     found = context(MODELS / f"{name}.xml", OWN[name][0])
@@ -374,6 +379,7 @@ def test_a_mirrored_joint_ends_with_its_wishes_met(name):
 
 
 # --- rounds
+@pytest.mark.sweep(3)
 @each
 def test_mending_changes_strengths_and_not_what_was_proposed(name):
     for key in KEYS:

@@ -11,7 +11,7 @@ from joint_table import judge, made
 from joda import context, generate, schema
 from joda.errors import JodaError
 from joda.propose import Task
-from joda.propose.archetype import forces, read_archetypes
+from joda.propose.archetype import Force, forces, read_archetypes
 from joda.propose.history import History
 from joda.propose.naming import concepts, said
 from joda.propose.offline import Offline
@@ -95,6 +95,7 @@ HALF = {
 }
 
 
+@pytest.mark.long
 def test_objects_that_nobody_has_seen_are_told_by_their_shape_alone():
     """By what they do half-way; drawn anew at each run, a third of the bar for bad luck."""
     seed = secrets.randbelow(2**31)
@@ -163,7 +164,7 @@ def test_a_table_of_ones_own_goes_beside_templates(tmp_path):
         ("shape.travel = [10, 200]", "shape.travel = [9, 2]", "must be [least, most]"),
         ('["stays_put"]', '["flies"]', "'flies' is none of"),
         ('"room door"', '"barn door"', "'barn door' is none of"),
-        ("[[archetype]]", "[[archetype]", "is no TOML"),
+        ("[[archetype]]", "[[archetype]", ": is no TOML: "),
     ],
 )
 def test_a_mistake_in_a_table_is_one_sentence(tmp_path, old, new, said):
@@ -171,6 +172,11 @@ def test_a_mistake_in_a_table_is_one_sentence(tmp_path, old, new, said):
     with pytest.raises(JodaError, match=r"mine\.toml") as raised:
         read_archetypes([tmp_path])
     assert said in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_a_force_without_a_source_is_an_estimate():
+    with pytest.raises(ValueError, match="a source is needed, but for an estimate"):
+        Force(name="lid", opening=(1.0, 2.0), basis="standard", source="")
 
 
 def test_the_format_of_the_table_is_a_schema():

@@ -133,6 +133,7 @@ def test_the_door_from_closed_to_open(tmp_path):
     check(paths)
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(("name", "joint"), THIRD_PARTY)
 def test_third_party(tmp_path, name, joint):
     check(render(asset(name), joint, tmp_path))

@@ -55,7 +55,6 @@ def test_what_was_given_is_among_the_rest():
     ("y", "interval", "where"),
     [
         ((0.0, 1.0, 0.0), (0.2, 0.7), (0.25, 0.65)),  # a fifth of a triangle and more
-        ((2.0, 3.0, 2.0), (0.0, 1.0), (0.1, 0.9)),  # of what rises above the rest
         ((2.0, 2.0, 2.0), (0.0, 1.0), (0.0, 1.0)),  # alike everywhere
         ((2.0, 2.0, 2.0), (0.0, 0.4), (0.0, 0.4)),
     ],
@@ -69,13 +68,24 @@ def test_where_an_effect_acts_in_closed_form(y, interval, where):
         assert places(profile, "detent_internal")[0] == pytest.approx(where, abs=0.005)
 
 
+def test_what_rises_above_a_level_acts_everywhere_and_there():
+    x = tuple(np.linspace(0, 1, 81))
+    part = Component(
+        label="detent_internal", interval=(0, 1), x=x, y=tuple(np.interp(x, (0, 0.5, 1), (2, 3, 2)))
+    )
+    found = places(Profile(joint=JOINT).with_component("friction", part), "detent_internal")
+    assert found[:3] == [(0.0, 1.0)] * 3
+    assert found[3] == pytest.approx((0.1, 0.9), abs=0.005)
+
+
 def test_a_pull_that_runs_out_slowly_acts_from_a_twentieth_on():
     x = np.linspace(0, 1, 81)
     part = Component(
         label="magnetic_return_to_low_end", interval=(0, 1), x=tuple(x), y=tuple(-np.exp(-10 * x))
     )
     profile = Profile(joint=JOINT).with_component("conservative", part)
-    for (low, high), level in zip(places(profile, part.label), (0.2, 0.1, 0.05), strict=True):
+    own = places(profile, part.label)[:3]
+    for (low, high), level in zip(own, (0.2, 0.1, 0.05), strict=True):
         assert (low, high) == pytest.approx((0.0, -np.log(level) / 10), abs=0.005)
 
 

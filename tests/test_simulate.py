@@ -270,7 +270,7 @@ def test_the_command_writes_and_tells(microwave, tmp_path):
     ("alone", "says"),
     [
         (["--release"], "let go at 0.96 rad"),
-        (["--push"], "pushed with 3.45 N·m"),
+        (["--push"], "pushed with 3.19 N·m"),
         (["--impulse"], "an impulse of 0.135"),
         (["--hand"], "from 0 rad (0.0 degrees) to 1.92 rad (110.0 degrees), then to 0 rad"),
     ],

@@ -119,6 +119,7 @@ def test_what_a_version_lacks_is_refused_in_a_sentence(python, tmp_path):
         assert "Traceback" not in result.stderr
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.skipif(not util.find_spec("uv"), reason="uv is not installed")
 @pytest.mark.parametrize("package", BESIDE)
 def test_a_package_that_uses_mujoco_resolves_beside_joda(package, tmp_path):

@@ -192,6 +192,7 @@ def test_every_wish_has_its_two_joints():
     assert CASES.keys() == WISHES.keys()
 
 
+@pytest.mark.sweep(12)
 @pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize("name", CASES)
 def test_a_wish_is_met_by_a_joint_that_does_it_and_not_by_one_that_does_not(tmp_path, name, mirror):

@@ -66,7 +66,8 @@ def fill(folder: Path) -> None:
     (folder / "curve.csv").write_text(re.sub("^[^,]*,", "", RUN, flags=re.MULTILINE))
     (folder / "robot.csv").write_text("time,arm_pan\n0,0\n1,0.5\n")
     effect = {
-        "effect": "quadratic_damping", "interval": [0, 1], "probability": 0.9, "direction": "both",
+        "effect": "constant_damping_hinge", "interval": [0, 1], "probability": 0.9,
+        "direction": "both",
         "magnitude": 0.2, "unit": "", "explanation": "", "held_out_error_before": 1,
         "held_out_error_after": 0.5, "indistinguishable_from": [],
     }  # fmt: skip

@@ -58,8 +58,8 @@ def weigh(
         what was changed.
 
     Raises:
-        JodaError: a file cannot be read or written, the joint does not exist, moves no geoms or no
-            mass, or its mass can be (without `force`).
+        JodaError: a file cannot be read or written, the joint does not exist, moves no geoms,
+            or its mass can be (without `force`).
     """
     source, target = Path(model), Path(output)
     check_target(target, force)
@@ -69,8 +69,6 @@ def weigh(
     before, estimate = float(compiled.body_subtreemass[body]), estimate_weight(compiled, number)
     if estimate is None:
         raise JodaError(f"{source}: joint '{name}' moves no geoms, so nothing tells its size.")
-    if before <= 0:
-        raise JodaError(f"{source}: joint '{name}' moves no mass; give its bodies one.")
     doubts = mass_doubts(compiled, number, 1.0, True)
     if not doubts and not force:
         raise JodaError(

@@ -195,7 +195,7 @@ def force_noise(position: Array, force: Array, direction: Array) -> float:
 
 def _between_ways(position: Array, force: Array, direction: Array) -> float:
     """Noise by the difference or the sum of both ways at the same places, which friction or a force
-    by position are not in; infinite for fewer than 5 places.
+    by position are not in; infinite for fewer than 5 places, or half of those of one way.
 
     Places are the same within a part of the usual distance of one way's samples.
     """
@@ -210,7 +210,7 @@ def _between_ways(position: Array, force: Array, direction: Array) -> float:
     at -= position[up] - position[down[at - 1]] < position[down[at]] - position[up]
     same = np.abs(position[down[at]] - position[up]) <= SAME * usual
     x = position[up[same]] + 1e-9 * usual * np.arange(same.sum())
-    if len(x) < LEAST or not usual > 0:
+    if 2 * len(x) < len(up) or len(x) < LEAST or not usual > 0:
         return np.inf
     there, back = force[up[same]], force[down[at[same]]]
     return min(_second_differences(x, y) for y in (there - back, there + back)) / 2**0.5
