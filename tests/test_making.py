@@ -84,6 +84,6 @@ def test_no_sources(cache, tmp_path):
 
 
 def test_what_needs_a_newer_mujoco_says_so():
-    with pytest.raises(JodaError, match="fields needs MuJoCo 99.0.0 or newer, and"):
+    with pytest.raises(JodaError, match=r"fields needs MuJoCo 99\.0\.0 or newer, and"):
         require((99, 0, 0), "fields")
     require((3, 3, 0), "anything")
