@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gauging import FRICTION, LAWS, SCENE, gauged
 
-from joda import compare, diagnose
+from joda import add, compare, diagnose
 from joda.diagnosis.findings import Diagnosis
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.comparison import Comparison, sentences
@@ -137,3 +137,8 @@ def test_a_force_in_grams_is_doubted(tmp_path):
     assert any("in another unit" in note for note in measured.notes)
     told = diagnosed(measured).diagnosis
     assert told.summary.startswith("Best guess") and "see to its unit first" in told.summary
+    (tmp_path / "said.json").write_text(told.to_json())
+    line = tmp_path / "model.xml", "door", tmp_path / "said.json", [tmp_path / "curve.csv"]
+    refused = add(*line, tmp_path / "new.xml")
+    assert not refused.added and "its unit is in doubt" in refused.reason
+    assert add(*line, tmp_path / "new.xml", effect=told.effects[0].effect).added

@@ -23,6 +23,8 @@ from joda.diagnosis.share import places
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together
+from joda.measured.gauge import OTHER_UNIT
+from joda.measured.reading import Measured
 from joda.measured.visited import unvisited_part
 from joda.pictures.changes import changes
 from joda.pictures.style import png
@@ -118,7 +120,7 @@ def add(
     if told.get("joint", own.name) != own.name:
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
     train, held = parted(measured)
-    if reason := _no_help(told, name):
+    if reason := _no_help(told, name) or (None if effect else _doubtful_unit(measured)):
         before = error(held)
         mended = Mended(train.profile, None, before, before, reason)
     else:
@@ -184,6 +186,18 @@ def _chosen(
     check_effect(effect)
     said = found.get(effect, {})
     return effect, said.get("direction"), _interval(said.get("interval"), path)
+
+
+def _doubtful_unit(measured: Measured) -> str | None:
+    """Why nothing is added before somebody asks for it by name, a clause; None if nothing is
+    doubtful."""
+    times = max((curve.times_the_model for curve in measured.curves), default=0.0)
+    if measured.runs or times < OTHER_UNIT:
+        return None
+    return (
+        f"the measured force is up to {times:.0f} times the model's, so that its unit is in doubt; "
+        "--effect adds it all the same"
+    )
 
 
 def _no_help(told: dict[str, Any], effect: str) -> str | None:
