@@ -23,7 +23,6 @@ from joda.diagnosis.share import places
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together
-from joda.measured.gauge import OTHER_UNIT
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited_part
 from joda.pictures.changes import changes
@@ -191,8 +190,7 @@ def _chosen(
 def _doubtful_unit(measured: Measured) -> str | None:
     """Why nothing is added before somebody asks for it by name, a clause; None if nothing is
     doubtful."""
-    times = max((curve.times_the_model for curve in measured.curves), default=0.0)
-    if measured.runs or times < OTHER_UNIT:
+    if not (times := measured.doubtful_unit):
         return None
     return (
         f"the measured force is up to {times:.0f} times the model's, so that its unit is in doubt; "

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from joda._generate_all import find_jobs
+from joda._generate_all import MODELS, find_jobs
 from joda.distributed.pool import by_processes, by_ray
 from joda.distributed.task import Result, Task, What, folder_of
 from joda.errors import JodaError
@@ -15,7 +15,6 @@ from joda.files import make_folder, occupied, write_together
 
 RESULT = "result.json"
 """In the folder of each joint, once all else is there."""
-MODELS = (".xml", ".urdf")
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,9 @@ from joda.scenes.model import load_model
 Advance = Callable[[int, int, str], None]
 Results = dict[str, Generated | JodaError]
 
+MODELS = (".xml", ".urdf")
+"""How names of models end."""
+
 
 class Job(NamedTuple):
     """A joint, and the folder for it."""
@@ -174,7 +177,7 @@ def _models(source: Path, target: Path) -> Iterator[tuple[Path, str, bool]]:
     texts = {
         path: _text(path)
         for path in sorted(source.rglob("*"))
-        if path.suffix.lower() in (".xml", ".urdf") and made not in path.resolve().parents
+        if path.suffix.lower() in MODELS and made not in path.resolve().parents
     }
     includes = re.compile(r"<include\s[^<>]*\bfile\s*=\s*[\"']([^\"']*)")
     parts = {Path(file).name for text in texts.values() for file in includes.findall(text)}

@@ -8,7 +8,6 @@ from joda.diagnosis.findings import Finding
 from joda.diagnosis.guessing import Array, Guess
 from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.weighing import MUCH, Weighed
-from joda.measured.gauge import OTHER_UNIT
 from joda.measured.reading import Measured
 
 MOST = 50.0
@@ -63,8 +62,7 @@ def one_factor(base: Base, guess: Guess) -> str:
 
 def other_unit(measured: Measured) -> str:
     """That the force of a curve may be in another unit, as a further sentence; nothing if not."""
-    times = max((curve.times_the_model for curve in measured.curves), default=0.0)
-    if measured.runs or times < OTHER_UNIT:
+    if not (times := measured.doubtful_unit):
         return ""
     return f" But the measured force is up to {times:.0f} times the model's: see to its unit first."
 

@@ -13,7 +13,7 @@ from joda.errors import JodaError
 from joda.joints.single import Single, single
 from joda.measured import smoothing
 from joda.measured.driven import read_logs
-from joda.measured.gauge import Gauged, gauged
+from joda.measured.gauge import OTHER_UNIT, Gauged, gauged
 from joda.measured.obstructed import Clear, clear_of_contacts
 from joda.measured.replay import Replayer
 from joda.measured.runs import QuasiStatic, Run
@@ -99,6 +99,13 @@ class Measured:
         """Of what a model misses: position, or force where there are only curves."""
         joint = self.profile.joint
         return joint.unit if self.runs else joint.force_unit
+
+    @property
+    def doubtful_unit(self) -> float:
+        """How many times the model's largest force that of a curve is, where that is so much that
+        its unit is in doubt; else 0, and where there are runs, beside which curves are not used."""
+        times = max((c.times_the_model for c in self.curves if not self.runs), default=0.0)
+        return times if times > OTHER_UNIT else 0.0
 
     def paths(self) -> list[Array]:
         """Predicted positions of all runs, rad or m; NaN from where the force is not known."""

@@ -36,8 +36,8 @@ def driven(run: Run, position: Array, sigma: float, unit: str) -> str:
             continue
         found = smoothing.smooth(run.time, position, time, sigma)
         speed, error = np.abs(found.velocity), found.velocity_error
-        slowest = np.minimum.accumulate(speed)
         first = np.array([int(np.argmin(speed[: k + 1])) for k in range(len(speed))])
+        slowest = speed[first]
         doubt = np.hypot(error, error[first])
         gain = speed - np.maximum(FASTER * slowest, slowest + CLEARLY * doubt)
         k = int(np.argmax(gain))
