@@ -9,7 +9,7 @@ from collections import defaultdict
 # tests run side by side: threads within matrix products would only be in each other's way
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SEED = "JODA_SWEEPS"
-LONG, FEW = 0.25, 10
+LONG, FEW = 0.2, 10
 """Part of the long tests that a session of more than so many files draws."""
 
 
@@ -22,7 +22,10 @@ def pytest_configure(config):
         "markers",
         "sweep(count, group): cases of this test, or of all tests of a group, in a session",
     )
-    config.addinivalue_line("markers", "long: of the tests that take long a session draws a part")
+    config.addinivalue_line(
+        "markers",
+        "long(group): of the tests that take long a session draws a part; those of a group together",
+    )
     os.environ.setdefault(SEED, str(secrets.randbits(32)))  # the same in every worker
 
 
@@ -33,20 +36,22 @@ def pytest_report_header(config):
 def pytest_collection_modifyitems(config, items):
     if config.getoption("--whole"):
         return
-    sweeps = defaultdict(list)
+    sweeps, long = defaultdict(list), defaultdict(list)
     for item in items:
         if mark := item.get_closest_marker("sweep"):
             count, *group = mark.args
-            sweeps[group[0] if group else item.nodeid.partition("[")[0], count].append(item)
-    long = [item for item in items if item.get_closest_marker("long")]
+            sweeps[group[0] if group else item.nodeid.partition("[")[0], count].append([item])
+        if mark := item.get_closest_marker("long"):
+            long[mark.args[0] if mark.args else item.nodeid].append(item)
     if len({item.path for item in items}) > FEW:  # who asks for a file gets all of it
-        sweeps["long", round(LONG * len(long))] = long
+        sweeps["long", round(LONG * len(long))] = list(long.values())
     left = set()
     for (name, count), cases in sweeps.items():
         if len(cases) == len(items):  # they were asked for
             continue
         dice = random.Random(f"{os.environ[SEED]} {name}")
-        left |= {item.nodeid for item in dice.sample(cases, max(len(cases) - count, 0))}
+        for dropped in dice.sample(cases, max(len(cases) - count, 0)):
+            left |= {item.nodeid for item in dropped}
     if left:
         config.hook.pytest_deselected(items=[item for item in items if item.nodeid in left])
         items[:] = [item for item in items if item.nodeid not in left]

@@ -70,13 +70,14 @@ def compared(folder: Path, law, **kind) -> Comparison:
 @pytest.mark.parametrize("per_click", [2.3, 3.0, 4.0])
 @pytest.mark.parametrize("apart", [0.0, 0.3])
 def test_clicks_as_narrow_as_the_samples_are_no_noise(tmp_path, per_click, apart):
+    """Found where the way back is at the same places; elsewhere they may be noise: no all-clear."""
     kind = {"noise": 0.01, "samples": 60, "apart": apart}
     found = compared(tmp_path, clicks(per_click, 60), **kind)
-    assert found.curves_adequacy == "beyond_noise"
+    assert found.curves_adequacy in {"beyond_noise", "not_enough_data" if apart else None}
     assert "no fault of the model" not in " ".join(sentences(found))
     assert not [place for place in found.failing_force if place.by == "direction"]
     told = said(tmp_path, clicks(per_click, 60), **kind)
-    assert told.verdict == "unexplained"
+    assert told.verdict in {"unexplained", "insufficient_data" if apart else None}
     assert "leaves less than" not in told.summary
 
 

@@ -286,6 +286,7 @@ def test_a_wish_leaves_what_it_does_not_touch():
     does(done.context, done.last.behaviour, "closes_near", "held_shut", "stays_put", "stays_open")
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize(("name", "degrees"), [("refrigerator", 20), ("microwave", 50)])
 def test_a_door_closes_from_the_angle_that_is_said(name, degrees, mirror):
@@ -298,6 +299,7 @@ def test_a_door_closes_from_the_angle_that_is_said(name, degrees, mirror):
     assert names.count("magnetic_return_to_low_end") == 1, "instead of what shuts it usually"
 
 
+@pytest.mark.sweep(2)
 @pytest.mark.parametrize("key", KEYS)
 def test_a_catch_gives_way_and_the_door_moves_on_freely(key):
     said = "A catch keeps it shut, past it the door moves on with hardly any resistance."

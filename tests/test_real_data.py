@@ -95,6 +95,7 @@ def drive(tmp_path_factory):
     return examined(tmp_path_factory.mktemp("drive"), DRIVE, ["emps/emps_estimation"])
 
 
+@pytest.mark.long("the drive")
 def test_the_drive_is_damped_more_in_one_direction(drive):
     assert drive.told.verdict == "missing_effect"
     assert drive.first.effect == "direction_dependent_damping"
@@ -103,10 +104,12 @@ def test_the_drive_is_damped_more_in_one_direction(drive):
     assert 60 < drive.first.magnitude < 90  # published: 240.4 - 166.7
 
 
+@pytest.mark.long("the drive")
 def test_the_drives_offset_is_named_but_less_likely(drive):
     assert 0 < probability(drive, *OFFSETS) < 0.5 * drive.first.probability
 
 
+@pytest.mark.long("the drive")
 def test_the_mended_drive_predicts_the_force(drive):
     run = drive.measured.runs[0]
     cut = 3 * len(run.time) // 4
@@ -129,6 +132,7 @@ def test_the_mended_drive_predicts_the_force(drive):
     assert model < offset < bare
 
 
+@pytest.mark.long("the drive")
 def test_force_errors_are_as_published(drive):
     """What the figures above are worth: the published symmetric model's error is 4.0834 %."""
     error = force_error(drive.measured.runs[0], drive.measured.profile, OFFSET)
@@ -167,6 +171,7 @@ def pendulum(tmp_path_factory):
     return examined(tmp_path_factory.mktemp("pendulum"), PENDULUM, names)
 
 
+@pytest.mark.long("the pendulum")
 def test_the_pendulum_lacks_dry_friction(pendulum):
     # its clock is uneven: what that makes is left, and said to be unexplained
     assert pendulum.told.verdict in ("missing_effect", "unexplained")
@@ -175,6 +180,7 @@ def test_the_pendulum_lacks_dry_friction(pendulum):
     assert pendulum.first.held_out_error_after < pendulum.first.held_out_error_before
 
 
+@pytest.mark.long("the pendulum")
 def test_the_pendulum_has_no_quadratic_drag(pendulum):
     assert probability(pendulum, "quadratic_damping") <= 0.1
 
@@ -190,15 +196,18 @@ def door(request, tmp_path_factory):
     return examined(tmp_path_factory.mktemp(request.param), DOOR, names)
 
 
+@pytest.mark.long("the door")
 def test_the_doors_resist_by_position(door):
     assert door.told.verdict in ("missing_effect", "unexplained")  # and are uneven besides
     assert door.first.effect in BY_PLACE
 
 
+@pytest.mark.long("the door")
 def test_what_is_named_lowers_the_error_held_out(door):
     assert door.first.held_out_error_after < door.first.held_out_error_before
 
 
+@pytest.mark.long("the door")
 def test_of_one_direction_both_readings_are_named(door):
     likely = {door.first.effect, *door.first.indistinguishable_from}
     assert likely & set(RESISTING)
@@ -206,6 +215,7 @@ def test_of_one_direction_both_readings_are_named(door):
     assert "one direction only" in door.told.summary
 
 
+@pytest.mark.long("the door")
 def test_the_doors_are_to_be_pushed_both_ways_slowly(door):
     if not door.measured.runs:  # one slow push: a quasi-static curve
         assert door.told.next_experiment == "Measure the way back too, as slowly."
@@ -215,6 +225,7 @@ def test_the_doors_are_to_be_pushed_both_ways_slowly(door):
     assert "force" in door.told.next_experiment
 
 
+@pytest.mark.long("the lab door")
 @pytest.mark.parametrize("door", ["lab"], indirect=True)
 def test_the_mended_lab_door_is_held_where_the_real_one_is(door):
     mended = mend(*parted(door.measured), door.first.effect)

@@ -65,6 +65,7 @@ def python(request, tmp_path_factory):
     return call
 
 
+@pytest.mark.sweep(2)
 def test_the_plugins_physics(python):
     """The plugin is compiled once, and then all is as in the newest MuJoCo."""
     code = "import joda, mujoco; print(mujoco.__version__, joda.plugin_path().name)"

@@ -20,6 +20,7 @@ def test_a_run_counts_up_to_where_the_joint_comes_to_an_end():
     assert len(_free(run, 1.0, (0.0, 1.0)).time) == 7
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("forced", [True, False])
 def test_errors_explain_the_runs_of_a_right_model_and_not_those_of_a_wrong_one(forced):
     seed = int(np.random.default_rng().integers(2**31))
