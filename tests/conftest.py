@@ -24,7 +24,7 @@ def pytest_configure(config):
     )
     config.addinivalue_line(
         "markers",
-        "long(group): of the tests that take long a session draws a part; those of a group together",
+        "long(group): of the tests that take long a session draws a part, groups as a whole",
     )
     os.environ.setdefault(SEED, str(secrets.randbits(32)))  # the same in every worker
 
