@@ -141,5 +141,5 @@ def test_a_force_in_grams_is_doubted(tmp_path):
     (tmp_path / "said.json").write_text(told.to_json())
     line = tmp_path / "model.xml", "door", tmp_path / "said.json", [tmp_path / "curve.csv"]
     refused = add(*line, tmp_path / "new.xml")
-    assert not refused.added and "its unit is in doubt" in refused.reason
+    assert not refused.added and "see to its unit first" in refused.reason
     assert add(*line, tmp_path / "new.xml", effect=told.effects[0].effect).added

@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import pytest
+from test_compare import door, runs_of, scene_of
 
-from joda import diagnose
+from joda import add, diagnose
 from joda._hidden_effect import _judged
 from joda.diagnosis import verdict
 from joda.diagnosis.findings import Diagnosis, Finding
@@ -13,6 +14,7 @@ from joda.diagnosis.summary import summarised
 from joda.diagnosis.weighing import Weighed
 from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
+from joda.measured.runs import read_run, write_run
 from joda.profile import Joint
 
 DETENT = Finding(
@@ -159,3 +161,18 @@ def test_what_no_run_visited_is_said_where_it_can_be_read(away, said):
     told = explained("detent_internal", "both", (0.1, 0.8), away, size, errors, "rad", joint)
     assert ("No run visited" in told) == bool(said)
     assert not said or said in told
+
+
+@pytest.mark.long
+def test_a_recorded_force_that_is_off_by_a_factor_is_no_missing_inertia(tmp_path):
+    model, runs = scene_of(door(), tmp_path), runs_of(door(), tmp_path, 4)
+    for path in runs:
+        run = read_run(path)
+        write_run(path, replace(run, force=1.6 * run.force))
+    told = diagnose(model, "joint", runs)
+    assert told.doubt and "by one factor, about 1.6" in told.doubt
+    assert told.summary.startswith("Best guess")
+    (tmp_path / "said.json").write_text(told.to_json())
+    refused = add(model, "joint", tmp_path / "said.json", runs, tmp_path / "new.xml")
+    assert not refused.added and told.doubt in refused.reason
+    assert not (tmp_path / "new.xml").exists()

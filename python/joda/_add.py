@@ -23,7 +23,6 @@ from joda.diagnosis.share import places
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together
-from joda.measured.reading import Measured
 from joda.measured.visited import unvisited_part
 from joda.pictures.changes import changes
 from joda.pictures.style import png
@@ -119,7 +118,7 @@ def add(
     if told.get("joint", own.name) != own.name:
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
     train, held = parted(measured)
-    if reason := _no_help(told, name) or (None if effect else _doubtful_unit(measured)):
+    if reason := _no_help(told, name) or (None if effect else _in_doubt(told)):
         before = error(held)
         mended = Mended(train.profile, None, before, before, reason)
     else:
@@ -187,17 +186,6 @@ def _chosen(
     return effect, said.get("direction"), _interval(said.get("interval"), path)
 
 
-def _doubtful_unit(measured: Measured) -> str | None:
-    """Why nothing is added before somebody asks for it by name, a clause; None if nothing is
-    doubtful."""
-    if not (times := measured.doubtful_unit):
-        return None
-    return (
-        f"the measured force is up to {times:.0f} times the model's, so that its unit is in doubt; "
-        "--effect adds it all the same"
-    )
-
-
 def _no_help(told: dict[str, Any], effect: str) -> str | None:
     """Why an effect need not be tried, a clause: the diagnosis itself found it no better."""
     for one in told["effects"]:
@@ -209,6 +197,13 @@ def _no_help(told: dict[str, Any], effect: str) -> str | None:
                 f"({before:.2g} → {after:.2g})"
             )
     return None
+
+
+def _in_doubt(told: dict[str, Any]) -> str | None:
+    """Why nothing is added before somebody asks for it by name, a clause; None if nothing is in
+    doubt."""
+    doubt = told.get("doubt")
+    return f"{doubt}; --effect adds it all the same" if isinstance(doubt, str) else None
 
 
 def _interval(said: Any, path: Path) -> tuple[float, float] | None:

@@ -71,6 +71,8 @@ class Diagnosis:
         next_experiment: that would decide what is open; None if nothing is.
         notes: what is suspicious about the data.
         contacts: of the scene that resist the joint where it was measured.
+        doubt: why the first effect may be none however well it explains the runs, a clause: then it
+            is added only if it is asked for by name. None if nothing speaks for that.
     """
 
     joint: str
@@ -83,6 +85,7 @@ class Diagnosis:
     next_experiment: str | None
     notes: tuple[str, ...]
     contacts: tuple[Contact, ...]
+    doubt: str | None = None
 
     def to_json(self) -> str:
         """The diagnosis as JSON."""

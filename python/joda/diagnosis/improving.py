@@ -73,6 +73,9 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
             told("diagnose")
             asked = diagnosed(_with(parts, steps[-1].profile)[0])
             steps[-1] = replace(steps[-1], diagnosis=asked.diagnosis)
+            if asked.diagnosis.doubt:
+                why = asked.diagnosis.summary
+                break
             if not (more := _next(parts, steps[-1], asked, told)):
                 known = asked.diagnosis.verdict == "missing_effect"
                 why = NOTHING_HELPS if known else asked.diagnosis.summary

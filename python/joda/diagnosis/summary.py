@@ -43,28 +43,28 @@ def strengths_beside(base: Base, guess: Guess) -> str:
     return f" The model's own numbers are off besides: {factors}." if factors else ""
 
 
-def one_factor(base: Base, guess: Guess) -> str:
-    """That more inertia and all the model's strengths are one factor, as a further sentence: then
-    it may be that of the recorded force. Nothing if that is not so."""
+def one_factor(base: Base, guess: Guess) -> str | None:
+    """That more inertia and all the model's strengths are one factor, a clause: then it may be that
+    of the recorded force. None if that is not so."""
     if guess.hypothesis.effect != "added_inertia" or not base.places:
-        return ""
+        return None
     inertia = 1 + guess.hypothesis.magnitude(guess.x) / base.single.inertia
     factors = np.array([inertia, *guess.fit.x[: len(base.places)]])
     mean = float(factors.mean())
     if mean < 1 + ALIKE or np.abs(factors / mean - 1).max() > ALIKE:
-        return ""
+        return None
     return (
-        f" But inertia and all of the model's own numbers are too small by one factor, about "
+        f"inertia and all of the model's own numbers are too small by one factor, about "
         f"{mean:.2g}: the recorded force may be so many times too large (its unit, a lever arm), "
-        "and nothing be missing."
+        "and nothing be missing"
     )
 
 
-def other_unit(measured: Measured) -> str:
-    """That the force of a curve may be in another unit, as a further sentence; nothing if not."""
+def other_unit(measured: Measured) -> str | None:
+    """That the force of a curve may be in another unit, a clause; None if not."""
     if not (times := measured.doubtful_unit):
-        return ""
-    return f" But the measured force is up to {times:.0f} times the model's: see to its unit first."
+        return None
+    return f"the measured force is up to {times:.0f} times the model's: see to its unit first"
 
 
 def _factors(base: Base, x: Array, least: float) -> str:
@@ -87,7 +87,7 @@ def summarised(
     floor: float,
     one_way: bool,
     bouncy: bool,
-    scaled: str = "",
+    doubt: str | None = None,
 ) -> str:
     """The verdict in a sentence, where something is missing.
 
@@ -100,7 +100,7 @@ def summarised(
         floor: noise of the measurement, in the unit of the errors held out.
         one_way: whether the joint was moved in one direction only.
         bouncy: of the ends, as in `Ranking`.
-        scaled: of `one_factor` or `other_unit`: then it is a guess.
+        doubt: of `one_factor` or `other_unit`: then it is a guess.
     """
     name = phrases.named(first.effect)
     others = " or ".join(map(phrases.named, first.indistinguishable_from))
@@ -116,7 +116,7 @@ def summarised(
         )
     blind = first.held_out_error_before < floor
     probability = _sum(first, weighed) if others else first.probability
-    head = "Best guess:" if blind or scaled or probability <= EVEN else "Missing is"
+    head = "Best guess:" if blind or doubt or probability <= EVEN else "Missing is"
     more = BLIND if blind else ""
     if others:
         why = SAME if one_way else ": these data cannot tell which"

@@ -164,11 +164,11 @@ def diagnosed(
     helps = first.held_out_error_after < first.held_out_error_before
     verdict = weighed.verdict if helps else "unexplained"
     base, guess = ranking.asked.base, ranking.guesses[sized[0]]
-    scaled = one_factor(base, guess) or other_unit(measured)
-    summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy, scaled)
-    summary += scaled or strengths_beside(base, guess)
+    doubt = one_factor(base, guess) or other_unit(measured)
+    summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy, doubt)
+    summary += f" But {doubt}." if doubt else strengths_beside(base, guess)
     likely = tuple(one for one in findings if one.probability >= WORTH_NAMING)
-    said = _said(measured, verdict, summary, likely, experiment)
+    said = replace(_said(measured, verdict, summary, likely, experiment), doubt=doubt)
     return Diagnosed(said, profile if likely else None, findings, puzzling)
 
 
