@@ -268,6 +268,17 @@ def interrupted(one, run, rng):
     return resampled(run, np.r_[:at, at + long : n])
 
 
+def strayed(one, run, rng):
+    """Single values that a bus or an encoder got wrong, by 10 % of what was visited or more."""
+    n, visited = len(run.position), np.ptp(run.position)
+    position = run.position.copy()
+    wrong = rng.choice(np.arange(5, n - 5, 4), rng.integers(1, 4), replace=False)
+    lo, hi = one.found.joint.range
+    way = np.where(position[wrong] > (lo + hi) / 2, -1, 1)
+    position[wrong] += way * rng.uniform(0.3, 0.5, len(wrong)) * visited
+    return replace(run, position=position)
+
+
 def turned_force(one, run, rng):
     return replace(run, force=-run.force)
 
@@ -334,6 +345,7 @@ MISTAKES = {
     "sign": (mirrored, dict(accept=lambda one: from_zero(one) and full(one))),
     "zero": (shifted, {}),
     "outside": (cut_off, {}),
+    "stray": (strayed, {}),
     "uneven_time": (dropped, {}),
     "gap": (interrupted, {}),
     "force_sign": (turned_force, dict(kinds=("pushed",), accept=full)),

@@ -12,7 +12,7 @@ from joda.measured.suspicions.clock import too_slow, wrong_clock
 from joda.measured.suspicions.columns import counted, unread
 from joda.measured.suspicions.energy import driven
 from joda.measured.suspicions.force import balance_of_curve, balance_of_run, too_large, wrong_sign
-from joda.measured.suspicions.position import coarse, hardly_moved, noise, placed
+from joda.measured.suspicions.position import coarse, hardly_moved, noise, placed, strays
 from joda.measured.suspicions.timing import gapped, repeated, slowly_sampled, uneven
 from joda.measured.suspicions.velocity import wrong_velocity
 
@@ -42,6 +42,8 @@ def suspicions(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
     found, position = placed(run, context)
     step, sigma = resolution(position), noise(run, position)
     sentences: dict[Kind, str] = {"unread": unread(run)}
+    if isinstance(run, Run):
+        sentences["stray"], position = strays(run, position, sigma, unit)
     if still := hardly_moved(position, context, step, sigma):
         sentences |= {"still": still}
     elif isinstance(run, Run):

@@ -13,6 +13,7 @@ Kind = Literal[
     "sign",
     "zero",
     "outside",
+    "stray",
     "resolution",
     "clock",
     "origin",

@@ -17,6 +17,9 @@ ROOM, SOFTNESS, MOST_ROOM = 0.02, 0.015, 0.1
 seconds at its highest speed, for a soft stop; as a share of the range, at most."""
 FEW = 0.02
 """Share of samples, beyond the range, that may be single wrong values."""
+STRAY, APART, FAR = 5.0, 20.0, 0.02
+"""How much farther than usual moves a stray sample lies from both its neighbours; from them, in
+noises, and as a share of what was visited, at least."""
 MOSTLY = 0.3
 """Share of samples beyond the range from which on they are no single wrong values."""
 STEPS = 40
@@ -55,6 +58,35 @@ def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], A
         )
         return [*found, suspect(run, "zero", told)], position + shift
     return [*found, *_outside(run, position, context)[0]], position
+
+
+def strays(run: Run, position: Array, sigma: float, unit: str) -> tuple[str, Array]:
+    """Speaks where a single sample lies far from both its neighbours, which are close together;
+    and the positions with such samples between these.
+
+    Args:
+        run: whose samples they are.
+        position: rad or m, shape (n,), n at least 5.
+        sigma: its noise, rad or m.
+        unit: of the positions.
+    """
+    move = np.diff(position)
+    out, back = move[1:-2], -move[2:-1]  # of the samples 2 to n - 3: from before, and to behind
+    jump = np.where(out * back > 0, np.minimum(np.abs(out), np.abs(back)), 0.0)
+    usual = np.max(np.abs([move[:-3], move[3:], out - back]), axis=0)
+    least = max(APART * sigma, FAR * float(np.ptp(position)))
+    stray = 2 + np.flatnonzero(jump > np.maximum(least, STRAY * usual))
+    if not 0 < len(stray) <= max(FEW * len(position), 3):
+        return "", position
+    worst = stray[np.argmax(jump[stray - 2])]
+    cleaned = position.copy()
+    cleaned[stray] = (position[stray - 1] + position[stray + 1]) / 2
+    told = (
+        f"{len(stray)} of {len(position)} samples {'lie' if len(stray) > 1 else 'lies'} far from "
+        f"both neighbours, by {jump[worst - 2]:.3g} {unit} at {run.time[worst]:.4g} s; take such "
+        "single wrong values out"
+    )
+    return told, cleaned
 
 
 def _unit(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], Array]:
