@@ -13,6 +13,9 @@ namespace {
 // MuJoCo's mjMINIMP, mjMAXIMP and mjMINVAL.
 constexpr double kLeastImpedance = 0.0001, kMostImpedance = 0.9999, kLeastWidth = 1e-15;
 
+// Runs that are replayed at once.
+constexpr size_t kSideBySide = 2;
+
 // Friction: force = offset - stiff a, within +-bound.
 struct Friction {
   double offset, stiff, bound;
@@ -108,26 +111,60 @@ void Solo::Restart(const Start& start, bool fresh, State* state) const {
   state->v = start.v;
 }
 
+// Runs do not depend on one another: side by side, a step of one hides the latency of another's.
 void Solo::Replay(double h, const double* force, std::int64_t n, const std::vector<Start>& starts,
                   double* before, double* after) const {
-  State state;
-  bool lost = true;
-  for (size_t i = 0; i < starts.size(); ++i) {
-    Restart(starts[i], starts[i].fresh || lost, &state);
-    lost = false;
-    const std::int64_t end = i + 1 < starts.size() ? starts[i + 1].step : n;
-    std::int64_t k = starts[i].step;
-    for (; k < end && !lost; ++k) {
-      before[k] = state.q;
-      Advance(h, force[k], &state);
-      after[k] = state.q;
-      lost = !IsFinite(state);
-    }
-    if (lost) {
-      constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-      after[k - 1] = kNan;
-      std::fill(before + k, before + end, kNan);
-      std::fill(after + k, after + end, kNan);
+  struct Run {
+    size_t start, last;  // the current one, and the first of the next run
+    std::int64_t k = 0, end = 0;
+    bool lost = true;
+    State state = {};
+  };
+  size_t next = 0;
+  const auto begin = [&] {
+    Run run = {next, next + 1};
+    while (run.last < starts.size() && !starts[run.last].fresh) ++run.last;
+    next = run.last;
+    return run;
+  };
+  const auto restart = [&](Run* run) {
+    const Start& start = starts[run->start++];
+    Restart(start, start.fresh || run->lost, &run->state);
+    run->lost = false;
+    run->k = start.step;
+    run->end = run->start < starts.size() ? starts[run->start].step : n;
+  };
+  const auto lose = [&](Run* run) {
+    constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+    after[run->k - 1] = kNan;
+    std::fill(before + run->k, before + run->end, kNan);
+    std::fill(after + run->k, after + run->end, kNan);
+    run->lost = true;
+    run->k = run->end;
+  };
+
+  std::vector<Run> runs;
+  while (next < starts.size() && runs.size() < kSideBySide) runs.push_back(begin());
+  while (!runs.empty()) {
+    for (size_t i = 0; i < runs.size(); ++i) {
+      Run& run = runs[i];
+      if (run.k == run.end) {
+        if (run.start == run.last) {
+          if (next < starts.size()) {
+            run = begin();
+          } else {
+            run = runs.back();
+            runs.pop_back();
+            --i;
+            continue;
+          }
+        }
+        restart(&run);
+      }
+      before[run.k] = run.state.q;
+      Advance(h, force[run.k], &run.state);
+      after[run.k++] = run.state.q;
+      if (!IsFinite(run.state)) lose(&run);
     }
   }
 }

@@ -6,8 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda._templates import templates
-from joda.diagnosis.baseline import Base, base_of, single_for, units_of, usable, windows_for
-from joda.diagnosis.guessing import Begin, Guess, begins, finished, guessed, moved, rough
+from joda.diagnosis.baseline import (
+    Base,
+    base_of,
+    joined,
+    single_for,
+    units_of,
+    usable,
+    windows_for,
+)
+from joda.diagnosis.guessing import (
+    Begin,
+    Guess,
+    begins,
+    finished,
+    guessed,
+    moved,
+    rough,
+    searched,
+)
 from joda.diagnosis.hypotheses import Hypothesis, hypotheses
 from joda.diagnosis.judge import Fit, Judge
 from joda.diagnosis.knocks import knock_guess
@@ -51,20 +68,28 @@ class Asked:
         return knock_guess(self.judge, self.base, self.given, self.fit, hypothesis, surely)
 
     def rough(self, hypothesis: Hypothesis) -> "Rough":
-        """The hypothesis fitted roughly to windows without knocks."""
-        return Rough(hypothesis, rough(self.judge, self.base, self.begins, hypothesis))
+        """The hypothesis fitted roughly, in longer steps, to windows without knocks."""
+        judge, base = self.judge.coarser(), self.base.coarser()
+        return Rough(hypothesis, rough(judge, base, self.begins, hypothesis))
 
     def finished(self, found: "Rough") -> Guess:
         """The same fitted to the end."""
         return finished(self.judge, self.base, found.hypothesis, found.fits)
 
     def taken(self, found: "Rough") -> Guess:
-        """The same as it is."""
-        return guessed(self.judge, found.hypothesis, found.best)
+        """The same as it is, in usual steps."""
+        make, unknowns = joined(self.base, found.hypothesis)
+        x, start = found.best.x, found.best.start
+        fit = self.judge.fit(make, unknowns, x, start, iterations=0)
+        return guessed(self.judge, found.hypothesis, fit)
 
     def moved(self, found: Guess) -> Guess:
         """The guess with its numbers tried elsewhere."""
         return moved(self.judge, self.base, found)
+
+    def searched(self, found: Guess) -> Guess:
+        """The guess after a search without derivatives."""
+        return searched(self.judge, self.base, found)
 
 
 @dataclass(frozen=True)
@@ -94,10 +119,11 @@ def asked(measured: Measured, length: float | None = None, near: Array | None = 
     base = base_of(measured.profile, single_for(measured, windows.h), windows.h)
     ones = np.ones(len(base.places))
     given = replace(judge.started(base.solo(ones)), x=ones)
-    begun = [(ones, windows.start), (ones, given.start)]
+    tried = [(ones, windows.start), (ones, given.start)]
     if near is not None:
-        begun.append((near, judge.started(base.solo(near)).start))
-    fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in begun]
+        tried.append((near, judge.started(base.solo(near)).start))
+    fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in tried]
     fit = judge.refit(base.solo, base.unknowns, min(fits, key=lambda f: f.loss))
     every = hypotheses(units_of(windows, measured), templates(), measured.profile)
-    return Asked(judge, base, measured.single, fit, begins(judge, base, given, fit), tuple(every))
+    begun = begins(judge.coarser(), base.coarser(), given, fit)
+    return Asked(judge, base, measured.single, fit, begun, tuple(every))

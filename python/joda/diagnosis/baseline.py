@@ -10,7 +10,7 @@ from joda.diagnosis.cutting import windows_of
 from joda.diagnosis.hypotheses import Hypothesis, Units
 from joda.diagnosis.judge import Make, Unknowns
 from joda.diagnosis.static import Still, curve_windows
-from joda.diagnosis.windows import Windows
+from joda.diagnosis.windows import GRID, Windows
 from joda.joints.single import Single
 from joda.measured.reading import Measured
 from joda.profile import CHANNELS, Profile
@@ -62,6 +62,10 @@ class Base:
         return self.profile.model_copy(
             update={"channels": self.profile.channels.model_copy(update=channels)}
         )
+
+    def coarser(self) -> "Base":
+        """The same for `GRID` times longer steps."""
+        return replace(self, h=GRID * self.h)
 
     def solo(self, x: Array) -> Solo:
         """The joint with its factors."""

@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
-from joda.diagnosis.windows import LOOSE, Array, Integers, Windows, rows_of
+from joda.diagnosis.windows import GRID, LOOSE, Array, Integers, Windows, rows_of
 from joda.measured import smoothing
 from joda.measured.runs import Run, known
 
@@ -30,6 +29,8 @@ HOP = 0.25
 """How far a joint must fall back to an end to knock there, in units of that."""
 APPROACH = 8
 """Samples before a knock that belong to it."""
+SHARED = 1e-3
+"""Variance, in units of a sample's own, above which a window's samples share it."""
 CLEAR = 1.5
 """How much larger the noise of fast samples must be to count as such."""
 
@@ -66,9 +67,10 @@ def windows_of(
         for piece in known(run):
             time, position = run.time[piece], run.position[piece]
             steps = int(np.ceil((time[-1] - time[0]) / h - 1e-9)) + 1
+            steps = GRID * -(-steps // GRID)
             each = max(round(length / h), 1)
             many = max(round(steps / each), 1)
-            begins = np.round(np.arange(many) * steps / many).astype(int)
+            begins = GRID * np.round(np.arange(many) * steps / many / GRID).astype(int)
             place = (time - time[0]) / h
             index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
             spread = _spread(time, position, sigma)
@@ -108,7 +110,8 @@ def windows_of(
         time=time,
         run=run_of,
         rows=rows,
-        whitener=_whitener(rows, time, spread, push / inertia),
+        sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
+        shared=_shared(rows, time, spread, push / inertia),
         knocks=_knocks(rows, (position - lo) / span, spread / span),
         rests=_rests(rows, (position - lo) / span, spread / span),
     )
@@ -171,25 +174,30 @@ def _spread(time: Array, position: Array, sigma: float) -> Array:
     return np.asarray(np.hypot(sigma, late * smooth))
 
 
-def _whitener(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
-    """Inverse Cholesky factors of the windows' covariances.
+def _shared(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
+    """What of the noise a window's samples share, see `Windows`.
 
     Besides the position's noise there is that of the force: an error of acceleration `push`, from
-    one sample to the next, moves a free joint by that time, and on at the speed that it got.
+    one sample to the next, moves a free joint by that time, and on at the speed that it got. In
+    units of the position's noise the covariance is 1 + sum of l u uᵀ over few directions u, and its
+    inverse root 1 - sum of (1 - 1 / sqrt(1 + l)) u uᵀ.
     """
-    m, most = rows.shape
-    out = np.zeros((m, most, most))
-    for k, row in enumerate(rows):
+    found = []
+    for row in rows:
         own = row[row >= 0]
-        if not len(own):
+        if not push[own].any():
+            found.append(np.zeros((len(own), 0)))
             continue
         t = time[own] - time[own[0]]
         gaps = np.diff(t, append=t[-1])
         moved = np.maximum(t[:, None] - t - 0.5 * gaps, 0.0) * (gaps * push[own])
-        covariance = moved @ moved.T
-        covariance[np.diag_indices(len(own))] += sigma[own] ** 2
-        factor = np.linalg.cholesky(covariance)
-        out[k, : len(own), : len(own)] = solve_triangular(factor, np.eye(len(own)), lower=True)
+        moved /= sigma[own][:, None]
+        size, way = np.linalg.eigh(moved @ moved.T)
+        much = size > SHARED
+        found.append(way[:, much] * np.sqrt(1 - 1 / np.sqrt(1 + size[much])))
+    out = np.zeros((*rows.shape, max((one.shape[1] for one in found), default=0)))
+    for ways, one in zip(out, found, strict=True):
+        ways[: len(one), : one.shape[1]] = one
     return out
 
 
@@ -202,7 +210,7 @@ def _before_knocks(begins: Integers, index: Integers, s: Array, noise: Array) ->
         if knock is not None and before < FEWEST:  # a short stroke: up to the knock itself
             before = knock
         if before >= smoothing.LEAST:
-            more.append(index[row[before]])
+            more.append(index[row[before]] // GRID * GRID)
     return np.unique(np.append(begins, np.array(more, int)))
 
 

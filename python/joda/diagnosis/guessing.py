@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from joda.diagnosis.baseline import Base, joined
 from joda.diagnosis.hypotheses import Hypothesis
@@ -18,6 +19,10 @@ MOVES = (0.1, 0.04, 0.015)
 """How far ends of intervals are moved on trial, in normalised position."""
 FAR = 10.0
 """How far other numbers are moved, in their steps."""
+WIDE = 2.0
+"""How far a search begins to look, in those."""
+SEARCHED, SETTLING = 15, 4
+"""Models that it tries for each number, and iterations that fit the starts of one."""
 FEW = 4
 """Iterations after that."""
 ROUGH = 6
@@ -200,6 +205,25 @@ def moved(judge: Judge, base: Base, found: Guess) -> Guess:
             if trial.loss < best.loss - 1:
                 best = judge.fit(make, unknowns, trial.x, trial.start)
     return guessed(judge, found.hypothesis, judge.refit(make, unknowns, best))
+
+
+def searched(judge: Judge, base: Base, found: Guess) -> Guess:
+    """The guess after a search without derivatives (Nelder and Mead 1965), in which every window's
+    start is fitted anew: where a joint sticks and slips, the loss is jagged."""
+    make, unknowns = joined(base, found.hypothesis)
+    scale, k = FAR * unknowns.step, len(unknowns.step)
+
+    def at(z: Array) -> Array:
+        return np.clip(found.fit.x + scale * z, unknowns.low, unknowns.high)
+
+    def loss(z: Array) -> float:
+        return judge.started(make(at(z)), SETTLING).loss + unknowns.penalty(at(z))
+
+    simplex = np.vstack([np.zeros(k), WIDE * np.eye(k)])
+    options = {"maxfev": SEARCHED * k, "initial_simplex": simplex}
+    x = at(minimize(loss, np.zeros(k), method="Nelder-Mead", options=options).x)
+    fit = judge.refit(make, unknowns, judge.fit(make, unknowns, x, judge.started(make(x)).start))
+    return guessed(judge, found.hypothesis, min(found.fit, fit, key=lambda one: one.loss))
 
 
 def guessed(judge: Judge, hypothesis: Hypothesis, fit: Fit) -> Guess:

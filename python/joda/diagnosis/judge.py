@@ -193,6 +193,10 @@ class Judge:
         """How many samples count."""
         return float(self.windows.count[self.counts].sum())
 
+    def coarser(self) -> "Judge":
+        """The same in longer steps, see `Windows.coarser`."""
+        return replace(self, windows=self.windows.coarser())
+
     def squares(self, solo: Solo, start: Array) -> tuple[Array, Array]:
         """Residuals, and with the starts' prior their sum of squares by window."""
         windows = self.windows

@@ -128,7 +128,7 @@ def rebounds(windows: Windows, base: Base, ends: Sequence[int]) -> Array:
         own = row[row >= 0]
         near = max(own[0] - AROUND, 0), min(own[-1] + 1 + 2 * AROUND, len(windows.time))
         t, y = windows.time[slice(*near)], windows.position[slice(*near)]
-        noise = 1 / float(windows.whitener[k, 0, 0])
+        noise = 1 / float(windows.sharpness[k, 0])
         away = hi - y if sides[k] > 0 else y - lo
         inside = away > CLEAR * noise
         if inside.all():  # the knock is between two samples

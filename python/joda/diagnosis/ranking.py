@@ -18,6 +18,8 @@ POLISHED, NEAR = 4, 3.0
 """Of how many effects the numbers are tried elsewhere, and up to which part of the least loss."""
 QUICK = 1200
 """Samples up to which they are tried whatever their loss; of more, up to that part of the own."""
+SEARCHED, FEW = 2, 8
+"""Of how many effects they are searched without derivatives, and of how many numbers at most."""
 ENOUGH, FAR = 1.5, 5.0
 """Loss per sample at which nothing more can be found, and from how many times the least a rough fit
 is then left as it is."""
@@ -76,6 +78,7 @@ def rank(
         if not roughly:
             guesses += _beside(begun, tried, guesses, work)
             guesses += _polished(begun, guesses, work)
+            guesses += _searched(begun, guesses, work)
         begun = _unstuck(begun, guesses)
         ends = [guess for h in bouncy if (guess := begun.restitution(h))]
         guesses += [guess for guess in ends if not silent]
@@ -140,6 +143,16 @@ def _polished(begun: Asked, guesses: Sequence[Guess], work: _Work) -> list[Guess
     near = [one for one in others if one.fit.loss < most]
     work.total = work.done + len(near)
     return moved + work.all(begun.moved, near)
+
+
+def _searched(begun: Asked, guesses: Sequence[Guess], work: _Work) -> list[Guess]:
+    """The best effects where they leave more than noise, searched without derivatives."""
+    best = _best(guesses)[:SEARCHED]
+    least = min((one.fit.loss for one in best), default=0.0)
+    if least < ENOUGH * begun.judge.samples:
+        return []
+    near = [one for one in best if one.fit.loss < NEAR * least and len(one.fit.x) <= FEW]
+    return work.all(begun.searched, near)
 
 
 def _unstuck(begun: Asked, guesses: Sequence[Guess]) -> Asked:

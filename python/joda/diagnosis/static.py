@@ -28,6 +28,10 @@ class CurveWindows(Windows):
 
     model: Callable[[Profile], Array]
 
+    def coarser(self) -> "CurveWindows":
+        """Themselves: nothing moves."""
+        return self
+
     def misfit(self, solo: Any, start: Array) -> Array:
         """The model's minus the measured force; `solo` is the profile."""
         return np.asarray(self.model(solo) - self.position)
@@ -56,7 +60,7 @@ def curve_windows(measured: Measured) -> CurveWindows:
         count += pieces
     at, force, direction, doubt, window, run = (np.concatenate(x) for x in zip(*parts, strict=True))
     rows = rows_of(window, count)
-    n, most = len(force), rows.shape[1]
+    n = len(force)
     weight = gravity(measured.context, at)
 
     def model(profile: Profile) -> Array:
@@ -80,7 +84,8 @@ def curve_windows(measured: Measured) -> CurveWindows:
         time=np.arange(float(n)),
         run=run[rows[:, 0]],
         rows=rows,
-        whitener=np.einsum("mi,ij->mij", 1 / spread, np.eye(most)),
+        sharpness=1 / spread,
+        shared=np.zeros((*rows.shape, 0)),
         knocks=np.zeros(count, bool),
         rests=np.zeros(count, bool),
         model=model,

@@ -6,7 +6,7 @@ from window to window. Noise of the recorded force moves the joint too; residual
 the covariance of both noises.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from joda._core import Solo
 Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
+GRID = 3
+"""Windows begin at multiples of so many steps: they can be simulated in as many times longer ones.
+"""
 LOOSE = 10.0
 """How much further than its measurement's error a start may be from the measured one."""
 
@@ -36,7 +39,10 @@ class Windows:
         time: s, shape (n,).
         run: number of each window's run, shape (m,).
         rows: sample of each place, -1 for filling; shape (m, most samples).
-        whitener: turns each window's misfit into residuals of variance 1, shape (m, most, most).
+        sharpness: one by the standard deviation of each sample's own noise, 0 for filling; shape
+            (m, most samples).
+        shared: what of the noise, in those deviations, a window's samples share: directions V, so
+            that (1 - V Vᵀ) leaves residuals of variance 1; shape (m, most samples, r).
         knocks: whether the joint hits an end of its range there, shape (m,).
         rests: whether it only rests at one, which tells of the stop and not of the joint.
     """
@@ -53,7 +59,8 @@ class Windows:
     time: Array
     run: Integers
     rows: Integers
-    whitener: Array
+    sharpness: Array
+    shared: Array
     knocks: NDArray[np.bool_]
     rests: NDArray[np.bool_]
 
@@ -67,6 +74,19 @@ class Windows:
     def count(self) -> Integers:
         """Samples of each window, shape (m,)."""
         return np.asarray((self.rows >= 0).sum(axis=1))
+
+    def coarser(self) -> "Windows":
+        """The same in steps that are `GRID` times longer; the force is the mean over each."""
+        mean = np.add.reduceat(self.force, np.arange(0, len(self.force), GRID))
+        each = np.diff(np.append(np.arange(0, len(self.force), GRID), len(self.force)))
+        return replace(
+            self,
+            h=GRID * self.h,
+            force=mean / each,
+            at=self.at // GRID,
+            step=self.step // GRID,
+            share=(self.step % GRID + self.share) / GRID,
+        )
 
     def misfit(self, solo: Solo, start: Array) -> Array:
         """Predicted minus measured positions, rad or m, shape (n,)."""
@@ -84,8 +104,9 @@ class Windows:
             shape (m, most samples) or (m, most samples, k).
         """
         each = misfit.reshape(len(misfit), -1)
-        padded = np.where((self.rows >= 0)[:, :, None], each[self.rows], 0.0)
-        out = np.nan_to_num(np.clip(np.matmul(self.whitener, padded), -HUGE, HUGE), nan=HUGE)
+        own = self.sharpness[:, :, None] * each[self.rows]
+        own -= self.shared @ (self.shared.transpose(0, 2, 1) @ own)
+        out = np.nan_to_num(np.clip(own, -HUGE, HUGE), nan=HUGE)
         return np.asarray(out.reshape(*self.rows.shape, *misfit.shape[1:]))
 
 
@@ -123,7 +144,6 @@ def evenly(
     start = np.stack([path[at], np.where(free[at], speed[at], velocity[at])], axis=1)
     window = np.searchsorted(at, np.arange(n), side="right") - 1
     rows = rows_of(window, len(at))
-    most = rows.shape[1]
     return Windows(
         h=h,
         force=force,
@@ -137,7 +157,8 @@ def evenly(
         time=np.asarray(h * np.arange(n)),
         run=np.zeros(len(at), int),
         rows=rows,
-        whitener=np.tile(np.eye(most) / sigma, (len(at), 1, 1)),
+        sharpness=np.where(rows >= 0, 1 / sigma, 0.0),
+        shared=np.zeros((*rows.shape, 0)),
         knocks=np.zeros(len(at), bool),
         rests=np.zeros(len(at), bool),
     )
