@@ -19,6 +19,8 @@ MOVES = (0.1, 0.04, 0.015)
 """How far ends of intervals are moved on trial, in normalised position."""
 FAR = 10.0
 """How far other numbers are moved, in their steps."""
+AS_GOOD = 1.0
+"""How much more loss is as good."""
 WIDE = 2.0
 """How far a search begins to look, in those."""
 SEARCHED, SETTLING = 15, 4
@@ -176,7 +178,7 @@ def finished(judge: Judge, base: Base, hypothesis: Hypothesis, near: Sequence[Fi
     found = guessed(judge, hypothesis, min(fits, key=lambda f: f.loss))
     wider = hypothesis.unknowns.widened()
     if not hypothesis.unknowns.pressed(found.x) or wider is hypothesis.unknowns:
-        return found
+        return _free(judge, base, found)
     return finished(judge, base, replace(hypothesis, unknowns=wider), [found.fit])
 
 
@@ -204,7 +206,17 @@ def moved(judge: Judge, base: Base, found: Guess) -> Guess:
             trial = judge.fit(make, unknowns, x, best.start, FEW)
             if trial.loss < best.loss - 1:
                 best = judge.fit(make, unknowns, trial.x, trial.start)
-    return guessed(judge, found.hypothesis, judge.refit(make, unknowns, best))
+    return _free(judge, base, guessed(judge, found.hypothesis, judge.refit(make, unknowns, best)))
+
+
+def _free(judge: Judge, base: Base, found: Guess) -> Guess:
+    """The guess off the bounds that its numbers are pressed against, if it is as good there."""
+    hypothesis = found.hypothesis
+    if not hypothesis.unknowns.pressed(found.x):
+        return found
+    make, unknowns = joined(base, replace(hypothesis, unknowns=hypothesis.unknowns.inside()))
+    fit = judge.fit(make, unknowns, found.fit.x, found.fit.start)
+    return guessed(judge, hypothesis, fit) if fit.loss < found.fit.loss + AS_GOOD else found
 
 
 def searched(judge: Judge, base: Base, found: Guess) -> Guess:

@@ -71,6 +71,14 @@ class Unknowns:
         low, high = wide = np.where(np.isnan(self.widest), now, self.widest)
         return self if np.array_equal(wide, now) else replace(self, low=low, high=high)
 
+    def inside(self) -> "Unknowns":
+        """With bounds at which no number is pressed."""
+        if self.widest is None:
+            return self
+        low, high = ~np.isnan(self.widest)
+        off = 2 * self.step
+        return replace(self, low=self.low + low * off, high=self.high - high * off)
+
     def and_(self, other: "Unknowns") -> "Unknowns":
         """Both, one after the other."""
         pairs = zip(_parts(self), _parts(other), strict=True)
@@ -194,8 +202,9 @@ class Judge:
         return float(self.windows.count[self.counts].sum())
 
     def coarser(self) -> "Judge":
-        """The same in longer steps, see `Windows.coarser`."""
-        return replace(self, windows=self.windows.coarser())
+        """The same in longer steps, see `Windows.coarser`; starts that were fitted in shorter ones
+        are only where a window begins."""
+        return replace(self, windows=self.windows.coarser(), apart=True)
 
     def squares(self, solo: Solo, start: Array) -> tuple[Array, Array]:
         """Residuals, and with the starts' prior their sum of squares by window."""
