@@ -11,8 +11,9 @@ from test_compare import door, flat, runs_of, scene_of
 
 from joda import JodaError, compare
 from joda.hidden import draw, write
-from joda.measured.adequacy import EXPLAINED, MULTIPLE, WINDOWS, residual_pattern
+from joda.measured.adequacy import WINDOWS, residual_pattern
 from joda.measured.comparison import sentences
+from joda.measured.errors import EXPLAINED, MULTIPLE
 from joda.measured.failing import COLUMNS, FORCE
 from joda.measured.runs import Run, write_run
 

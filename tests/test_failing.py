@@ -51,7 +51,18 @@ def rows(force, doubt, ways=(1.0, -1.0), count=60):
 def test_a_force_that_may_be_none_is_not_blamed(force, doubt, blamed):
     found = failing(rows(force, doubt))
     assert found and all(place.force == pytest.approx(blamed) for place in found)
-    assert ("direction" in {place.by for place in found}) == (blamed is not None)
+    ways = [place for place in found if place.by == "direction"]
+    assert len(ways) == 2 * (blamed is not None)  # each for itself, with its share
+    assert all(place.share == pytest.approx(0.5) for place in ways)
+
+
+def test_a_force_that_explains_no_misfit_is_not_blamed():
+    """Within each window the force changes its sign: a constant one explains a tenth."""
+    whole, uneven = rows(0.7, 0.02), rows(0.7, 0.02)
+    whole[:, 10:12] = 4000.0, 40.0
+    uneven[:, 10:12] = 4000.0, 3600.0
+    assert all(place.force == pytest.approx(0.7) for place in failing(whole))
+    assert failing(uneven) and all(place.force is None for place in failing(uneven))
 
 
 @pytest.mark.parametrize(

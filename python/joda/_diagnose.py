@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.outcome import read_runs
-from joda.diagnosis.phrases import NAMES, named
+from joda.diagnosis.phrases import NAMES, named, percent
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
 from joda.files import check_targets, write_together
@@ -89,7 +89,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 def _candidate(found: Finding) -> str:
     alike = " or ".join(map(named, found.indistinguishable_from))
     told = f" These data cannot tell it from {alike}." if alike else ""
-    return f"{100 * found.probability:.0f} % {found.effect}: {found.explanation}{told}"
+    return f"{percent(found.probability)} {found.effect}: {found.explanation}{told}"
 
 
 def _after(diagnosis: Diagnosis) -> list[str]:
@@ -118,7 +118,7 @@ def _row(found: Finding, unit: str) -> tuple[str, ...]:
         named(found.effect),
         f"s = {a:.2f} to {b:.2f}",
         f"{found.magnitude:.3g} \u00b1 {found.magnitude_error:.2g}{of}",
-        f"{100 * found.probability:.0f} %",
+        percent(found.probability),
         f"{found.held_out_error_before:.2g} → {found.held_out_error_after:.2g} {unit}",
     )
 

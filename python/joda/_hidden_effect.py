@@ -13,7 +13,7 @@ from joda._compare import compare
 from joda._diagnose import diagnose
 from joda._diagnose import sentences as of_diagnosis
 from joda.diagnosis.findings import Diagnosis, Finding
-from joda.diagnosis.phrases import named
+from joda.diagnosis.phrases import named, percent
 from joda.diagnosis.share import overlap
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied
@@ -187,7 +187,7 @@ def _judged(
         return "Not the first one named, but one of those that these data cannot tell apart.", False
     if effect in said:
         one = diagnosis.effects[said.index(effect)]
-        share = f"{100 * one.probability:.0f} %"
+        share = percent(one.probability)
         return f"Wrong: the hidden effect was named too, with {share}.", False
     return "Wrong: the hidden effect was not among those named.", False
 

@@ -5,7 +5,7 @@ from typing import Any
 from nicegui import ui
 
 from joda._studio.shared import Shared, told
-from joda.diagnosis.phrases import named
+from joda.diagnosis.phrases import named, percent
 
 
 class Lacks:
@@ -77,7 +77,7 @@ class Lacks:
         for found in diagnosis["effects"]:
             with ui.element("article").classes("candidate"):
                 with ui.element("div").classes("line"):
-                    ui.label(f"{100 * found['probability']:.0f} %").classes("probability")
+                    ui.label(percent(found["probability"])).classes("probability")
                     ui.label(named(found["effect"])).classes("name").tooltip(found["effect"])
                     ui.element("div").classes("space")
                     before, after = found["held_out_error_before"], found["held_out_error_after"]

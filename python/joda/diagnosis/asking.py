@@ -1,6 +1,7 @@
 """A model fitted to measured runs, and what it may lack, fitted together with it."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,14 @@ class Asked:
     fit: Fit
     begins: tuple[Begin, ...]
     hypotheses: tuple[Hypothesis, ...]
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the fitted factors, with what is left over as noise; shape (k, k)."""
+        judge, base, fit = self.judge, self.base, self.fit
+        H = judge.linear(base.solo, base.unknowns, fit.x, fit.start).normal()[0]
+        noise = judge.overdispersion(fit.squares)
+        return np.asarray(noise * np.linalg.inv(H + np.diag(base.unknowns.doubt**-2.0)))
 
     def tell(self, hypothesis: Hypothesis) -> Guess | None:
         """The hypothesis fitted; None if the data cannot tell of it."""

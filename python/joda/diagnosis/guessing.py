@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from joda.diagnosis.baseline import Base, joined
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypotheses.base import FREE_CURVE
-from joda.diagnosis.judge import BEND, Fit, Judge, Linear
+from joda.diagnosis.judge import BEND, Fit, Judge, Linear, Make, Unknowns
 from joda.profile import Profile
 
 Array = NDArray[np.float64]
@@ -159,13 +159,21 @@ def rough(
         trials = (
             np.concatenate([begin.fit.x, x]) for x in screened(judge, base, begin, hypothesis)
         )
-        fits = [judge.fit(make, unknowns, x, begin.fit.start, ROUGH, begin.bend) for x in trials]
+        fits = [_leaving(judge, make, unknowns, x, begin) for x in trials]
         near = [
             replace(fit, loss=judge.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in fits
         ]
         return sorted(near, key=lambda f: f.loss)[: hypothesis.kept]
 
     return tuple(fit for begin in begun for fit in fitted(begin))
+
+
+def _leaving(judge: Judge, make: Make, unknowns: Unknowns, x: Array, begin: Begin) -> Fit:
+    """A rough fit; where no step from x is better as a whole, each window's start stays if that is
+    better."""
+    line = make, unknowns, x, begin.fit.start, ROUGH, begin.bend
+    fit = judge.fit(*line)
+    return replace(judge, apart=True).fit(*line) if np.array_equal(fit.x, x) else fit
 
 
 def finished(judge: Judge, base: Base, hypothesis: Hypothesis, near: Sequence[Fit]) -> Guess:

@@ -202,9 +202,8 @@ class Judge:
         return float(self.windows.count[self.counts].sum())
 
     def coarser(self) -> "Judge":
-        """The same in longer steps, see `Windows.coarser`; starts that were fitted in shorter ones
-        are only where a window begins."""
-        return replace(self, windows=self.windows.coarser(), apart=True)
+        """The same in longer steps, see `Windows.coarser`."""
+        return replace(self, windows=self.windows.coarser())
 
     def squares(self, solo: Solo, start: Array) -> tuple[Array, Array]:
         """Residuals, and with the starts' prior their sum of squares by window."""

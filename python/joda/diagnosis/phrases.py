@@ -54,9 +54,18 @@ WAYS = {"positive": "towards +q", "negative": "towards \N{MINUS SIGN}q"}
 assert set(NAMES) >= {*EFFECTS, *CHANNEL_EFFECTS}
 
 
+SUREST = 0.99
+"""Highest probability that is said."""
+
+
 def named(effect: str) -> str:
     """The effect in a few words."""
     return NAMES[effect]
+
+
+def percent(probability: float) -> str:
+    """Of an effect, never said to be certain."""
+    return f"{100 * min(probability, SUREST):.0f} %"
 
 
 def placed(interval: tuple[float, float], joint: Joint) -> str:

@@ -5,7 +5,7 @@ import numpy as np
 from joda.diagnosis import phrases
 from joda.diagnosis.baseline import Base
 from joda.diagnosis.findings import Finding
-from joda.diagnosis.guessing import Array, Guess
+from joda.diagnosis.guessing import Guess
 from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.weighing import MUCH, Weighed
 from joda.measured.reading import Measured
@@ -16,6 +16,8 @@ ALIKE = 0.12
 """By how much factors may differ that are one."""
 OFF, FAR_OFF = 0.05, 0.3
 """By how much a strength must be off to be worth a word; and where something else is missing."""
+CLEARLY = 3.0
+"""And by so many of its standard errors."""
 EVEN = 0.5
 """Probability above which an answer is more likely than not."""
 SAME = (
@@ -27,19 +29,28 @@ BLIND = (
     " What the model misses is less than what was taken for noise, part of which may be what the "
     "joint does between two samples: record faster."
 )
-SUREST = 0.99
-"""Highest probability that is said."""
 
 
 def strengths_off(ranking: Ranking) -> str:
-    """Which of the model's own strengths are off, as a further sentence."""
-    factors = _factors(ranking.asked.base, ranking.asked.fit.x, OFF)
+    """Which of the model's own strengths are off, as a further sentence: by more than 5 % and than
+    three of their standard errors."""
+    base, x = ranking.asked.base, ranking.asked.fit.x
+    errors = np.sqrt(np.diag(ranking.asked.covariance))
+    factors = ", ".join(
+        f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.2f} ± {error:.2g}"
+        for place, factor, error in zip(base.places, x, errors, strict=True)
+        if abs(factor - 1) > max(OFF, CLEARLY * error)
+    )
     return f" Its own numbers are off: {factors}." if factors else ""
 
 
 def strengths_beside(base: Base, guess: Guess) -> str:
     """Which of them are far off with an effect, as a further sentence."""
-    factors = _factors(base, guess.fit.x[: len(base.places)], FAR_OFF)
+    factors = ", ".join(
+        f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.2f}"
+        for place, factor in zip(base.places, guess.fit.x, strict=False)
+        if abs(factor - 1) > FAR_OFF
+    )
     return f" The model's own numbers are off besides: {factors}." if factors else ""
 
 
@@ -65,14 +76,6 @@ def other_unit(measured: Measured) -> str | None:
     if not (times := measured.doubtful_unit):
         return None
     return f"the measured force is up to {times:.0f} times the model's: see to its unit first"
-
-
-def _factors(base: Base, x: Array, least: float) -> str:
-    return ", ".join(
-        f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.2f}"
-        for place, factor in zip(base.places, x, strict=True)
-        if abs(factor - 1) > least
-    )
 
 
 def _label(base: Base, place: tuple[str, int]) -> str:
@@ -108,7 +111,7 @@ def summarised(
     helps = first.held_out_error_after < first.held_out_error_before
     if weighed.verdict == "unexplained":
         return _unexplained(either if one_way else name, weighed, one_way, bouncy)
-    likely = f"probability {100 * min(first.probability, SUREST):.0f} %"
+    likely = f"probability {phrases.percent(first.probability)}"
     if not helps:
         return (
             f"Something is missing that no known effect explains. Best guess: {name} ({likely}); "

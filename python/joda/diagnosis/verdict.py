@@ -26,9 +26,8 @@ from joda.diagnosis.summary import (
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, excess_of, weigh
 from joda.diagnosis.whole import BEYOND, worst
-from joda.measured.adequacy import MULTIPLE
 from joda.measured.curves import curves_verdict, failing_force
-from joda.measured.errors import worst_missed
+from joda.measured.errors import MULTIPLE, worst_missed
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
@@ -204,9 +203,10 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
         return _said(measured, "unexplained", UNEVEN, (), GAUGE_AGAIN)
     if (left := worst(measured, ranking.asked)) > BEYOND:
         return _said(measured, "unexplained", DRIFTING.format(left), (), AGAIN)
-    off, missed = strengths_off(ranking), worst_missed(measured)
+    off, worst_run = strengths_off(ranking), worst_missed(measured)
+    missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
-    if off and missed > MULTIPLE:
+    if off and worst_run and worst_run.fault:
         summary = WITH_THESE.format(missed, off, noise)
     else:
         summary = f"The model is adequate: {noise} that an effect would explain.{off}"

@@ -57,13 +57,11 @@ def worst(measured: Measured, asked: Asked) -> float:
 
 def _drawn(asked: Asked) -> Array:
     """Strengths within the errors of the fitted ones, shape (draws, k)."""
-    judge, base, fit = asked.judge, asked.base, asked.fit
-    if not len(fit.x):
+    base, x = asked.base, asked.fit.x
+    if not len(x):
         return np.zeros((0, 0))
-    H = judge.linear(base.solo, base.unknowns, fit.x, fit.start).normal()[0]
-    noise = judge.overdispersion(fit.squares)
-    covariance = noise * np.linalg.inv(H + np.diag(base.unknowns.doubt**-2.0))
-    drawn = np.random.default_rng(0).multivariate_normal(fit.x, covariance, DRAWS, method="svd")
+    rng = np.random.default_rng(0)
+    drawn = rng.multivariate_normal(x, asked.covariance, DRAWS, method="svd")
     return np.clip(drawn, base.unknowns.low, base.unknowns.high)
 
 

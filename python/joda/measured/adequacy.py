@@ -13,24 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest, norm
 
-from joda.measured.errors import Errors, Missed
+from joda.measured.errors import MULTIPLE, Errors, Missed
 from joda.measured.failing import FORCE, LENGTHS
 from joda.measured.reading import Measured
+from joda.measured.runs import Run
 
 Array = NDArray[np.float64]
 Adequate = Literal["within_noise", "beyond_noise", "not_enough_data"]
 
-MULTIPLE = 3.0
-"""Largest RMS error of a whole run or of a segment that an all-clear allows, in units of the
-noise."""
-EXPLAINED = 3.0
-"""So many times what errors of the measured start and force make may be these errors' still."""
 CHANCE = 0.005
 """Probability, for a true model, of a pattern in the residual as clear as one that is told."""
 SEGMENT = LENGTHS[0]
 """Length of the windows whose residual force may have a pattern, s."""
 SAMPLES = 30
 """Fewest samples that tell anything."""
+LOUD = 0.3
+"""Share of the noise in a run's motion from which on nothing is cleared."""
 WINDOWS, MOVES = 4, 8.0
 """Fewest windows in which the joint moves by so many times the noise that tell anything."""
 
@@ -46,6 +44,8 @@ class Adequacy:
         pattern: probability that a true model leaves as clear a pattern of residual force (Wald and
             Wolfowitz's runs test and a sign test, Bonferroni-corrected); None with too few windows.
         whole: whether all that acts on the joint in its scene is replayed, and all of the runs.
+        loudness: the largest share of the noise in a run's motion, both RMS: from 0.3 on the noise
+            may be motion between two samples.
         barred: where the scene would not have let the joint, a sentence; empty if nowhere: else the
             model is beyond the noise however well the rest is replayed.
     """
@@ -55,6 +55,7 @@ class Adequacy:
     segment: Missed | None
     pattern: float | None
     whole: bool
+    loudness: float
     barred: str
 
 
@@ -68,38 +69,33 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     """
     whole = [one for one in found.missed if one.time is None]
     pieces = [one for one in found.missed if one.time is not None]
-    run, segment = (max(some, key=_beyond, default=None) for some in (whole, pieces))
+    run, segment = (max(some, key=lambda one: one.order, default=None) for some in (whole, pieces))
     pattern = residual_pattern(rows)
     samples = sum(len(run.time) for run in measured.runs)
+    pairs = zip(measured.runs, measured.sigma, strict=True)
+    loudness = max((_loudness(run, sigma) for run, sigma in pairs), default=0.0)
     complete = len(whole) == len(measured.runs) and bool(pieces)
     verdict: Adequate = "within_noise"
     if measured.barred:
         verdict = "beyond_noise"
     elif samples < SAMPLES or not found.missed:
         verdict = "not_enough_data"
-    elif any(map(_fault, found.missed)) or (pattern is not None and pattern < CHANCE):
+    elif any(one.fault for one in found.missed) or (pattern is not None and pattern < CHANCE):
         verdict = "beyond_noise"
     elif (
         not (complete and measured.whole)
-        or max(map(_multiple, found.missed)) >= MULTIPLE
+        or max(one.multiple for one in found.missed) >= MULTIPLE
+        or loudness >= LOUD
         or pattern is None
         or _moving(measured) < WINDOWS
     ):
         verdict = "not_enough_data"
-    return Adequacy(verdict, run, segment, pattern, measured.whole, measured.barred)
+    return Adequacy(verdict, run, segment, pattern, measured.whole, loudness, measured.barred)
 
 
-def _multiple(one: Missed) -> float:
-    return one.multiple
-
-
-def _beyond(one: Missed) -> tuple[bool, float]:
-    return _fault(one), one.multiple
-
-
-def _fault(one: Missed) -> bool:
-    """Whether it is missed by more than the measurement's own errors make."""
-    return one.multiple >= MULTIPLE and one.multiple > EXPLAINED * one.explained
+def _loudness(run: Run, sigma: float) -> float:
+    """Share of a run's noise in how far its positions are spread."""
+    return min(sigma / max(float(np.std(run.position)), 1e-300), 1.0)
 
 
 def _moving(measured: Measured) -> int:

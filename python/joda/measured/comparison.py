@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from json import dumps
 
-from joda.measured.adequacy import MULTIPLE, Adequacy, Adequate
+from joda.measured.adequacy import LOUD, Adequacy, Adequate
 from joda.measured.curves import CurveError, FailingForce, told
-from joda.measured.errors import Missed, RunError
+from joda.measured.errors import MULTIPLE, Missed, RunError
 from joda.measured.failing import Failing
 from joda.plain import plain
 from joda.scenes.contacts import Contact
@@ -112,6 +112,8 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
             "Not enough to tell whether the model is right: nothing in what is replayed is beyond "
             "the noise, but not all is replayed (below)."
         )
+    elif found.verdict == "not_enough_data" and found.loudness >= LOUD:
+        yield f"Not enough to tell whether the model is right: {_loud(found)}"
     elif found.verdict == "not_enough_data":
         yield (
             "Not enough to tell whether the model is right: too few samples, or too little motion "
@@ -120,13 +122,24 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
     elif found.verdict == "beyond_noise" and worst:
         yield f"Beyond the noise: {', and '.join(map(_worst, worst))}."
     elif found.verdict == "beyond_noise" and not found.barred and found.pattern is not None:
+        every = "every run and window" if found.segment else "every run"
+        small = "Beyond noise" if found.loudness >= LOUD else "Small, but not noise"
         yield (
-            f"Small, but not noise: every run and window is missed by less than {MULTIPLE:g} times "
-            "the noise, yet the signs of the residual force have a pattern that noise makes in "
+            f"{small}: {every} is missed by less than {MULTIPLE:g} times the noise, yet the signs "
+            "of the residual force have a pattern that noise makes in "
             f"{_rarely(found.pattern)}."
         )
+        if found.loudness >= LOUD:
+            yield f"How far beyond these runs cannot tell: {_loud(found)}"
     if found.verdict == "beyond_noise" and not (found.barred or comparison.failing):
         yield "The data do not show where in position, speed, direction, load or time it fails."
+
+
+def _loud(found: Adequacy) -> str:
+    return (
+        f"what was taken for noise is {100 * found.loudness:.0f} % of the motion, and part of it "
+        "may be what the joint does between two samples; record faster."
+    )
 
 
 def _worst(one: Missed) -> str:

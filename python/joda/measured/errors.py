@@ -15,6 +15,11 @@ Array = NDArray[np.float64]
 
 ASTRAY = 1e9
 """Error, in units of the noise, of a simulation that is not finite."""
+MULTIPLE = 3.0
+"""Largest RMS error of a whole run or of a window that an all-clear allows, in units of the
+noise."""
+EXPLAINED = 3.0
+"""So many times what errors of the measured start and force make may be these errors' still."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,16 @@ class Missed:
     multiple: float
     explained: float = 0.0
     time: tuple[float, float] | None = None
+
+    @property
+    def fault(self) -> bool:
+        """Whether it is missed by more than the measurement's own errors make."""
+        return self.multiple >= MULTIPLE and self.multiple > EXPLAINED * self.explained
+
+    @property
+    def order(self) -> tuple[bool, float]:
+        """What is the model's fault counts more than what is missed by more."""
+        return self.fault, self.multiple
 
 
 @dataclass(frozen=True)
@@ -119,9 +134,11 @@ def errors(
     )
 
 
-def worst_missed(measured: Measured) -> float:
-    """By how many times its noise the worst whole run is missed; 0 where nothing is replayed."""
-    return max((one.multiple for one in errors(measured, windows=False).missed), default=0.0)
+def worst_missed(measured: Measured) -> Missed | None:
+    """The whole run that is missed by most, those first that are the model's fault; None where
+    nothing is replayed."""
+    missed = errors(measured, windows=False, explained=True).missed
+    return max(missed, key=lambda one: one.order, default=None)
 
 
 def _multiple(error: float, sigma: float) -> float:

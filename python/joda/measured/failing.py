@@ -35,7 +35,9 @@ AGREE = 0.8
 """Part of the evidence that must have the sign of the mean force for that force to be told."""
 FORCE = 8
 """Column of the rows: residual force; the next is its standard deviation."""
-COLUMNS = 10
+COLUMNS = 12
+LEFT = 0.5
+"""Part of what is beyond the noise that a mean force must explain to be told."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,7 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
 
     Columns: normalised position, velocity, direction / 2, time, load; RMS misfit, samples, sum of
     squares in units of the noise (the position's, and what the force's makes of it), residual
-    force, its standard deviation.
+    force, its standard deviation, sums of squares from the best start without and with that force.
     """
     rows = []
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
@@ -169,7 +171,8 @@ def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[flo
     square = float(np.sum(window.misfit**2) / (sigma**2 + window.pushed**2))
     place = (middle - lo) / (hi - lo)
     row = [place, speed, 0.5 * float(np.sign(speed)), float(run.time[ends].mean()), load]
-    return [*row, rms(window.misfit), len(window.misfit), square, window.force, window.doubt]
+    size = rms(window.misfit), len(window.misfit), square
+    return [*row, *size, window.force, window.doubt, *window.squares]
 
 
 def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
@@ -178,10 +181,11 @@ def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
         return []
     out = []
     for interval, inside in places(
-        _edges(by, values), values, found, apart=by in ("velocity", "load")
+        _edges(by, values), values, found, apart=by in ("velocity", "load", "direction")
     ):
         rows = found[inside]
-        force = _force(rows[:, 3], rows[:, 4])
+        force = None if _uneven(rows) else _force(rows[:, 3], rows[:, 4])
+        share = float(beyond[inside].sum() / beyond.sum())
         if by == "direction" and force is None:
             continue  # what changes its sign within a direction is not the direction's
         out.append(
@@ -190,11 +194,18 @@ def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
                 interval=interval,
                 error=float(np.sqrt(np.average(rows[:, 0] ** 2, weights=rows[:, 1]))),
                 force=force,
-                share=float(beyond[inside].sum() / beyond.sum()),
+                share=share,
                 significant=True,
             )
         )
     return out
+
+
+def _uneven(rows: Array) -> bool:
+    """Whether a force that does not change explains hardly any of what is beyond the noise."""
+    count = float(rows[:, 1].sum())
+    without, with_force = (float(rows[:, k].sum()) - count for k in (5, 6))
+    return without > CLEAR * (2 * count) ** 0.5 and with_force > LEFT * without
 
 
 def _force(force: Array, doubt: Array) -> float | None:

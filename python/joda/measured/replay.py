@@ -71,6 +71,7 @@ class Window:
             makes no motion, as the joint sticks.
         scatter: RMS by which errors of the start alone move the replay, rad or m.
         pushed: the same of errors of the recorded force.
+        squares: sums of squared misfits, in noises, from the best start, and with that force too.
     """
 
     samples: NDArray[np.intp]
@@ -79,6 +80,7 @@ class Window:
     doubt: float
     scatter: float = 0.0
     pushed: float = 0.0
+    squares: tuple[float, float] = (0.0, 0.0)
 
     @property
     def explained(self) -> float:
@@ -358,12 +360,14 @@ def _fitted(
     inverse = np.linalg.pinv(rows.T @ rows)
     all_three = -inverse @ rows.T @ wanted
     moves = float(np.mean(slopes[:, 2] ** 2)) > STUCK
+    two, three = (rows[: len(misfit), : len(x)] @ x + misfit / sigma for x in (start, all_three))
     return start, Window(
         samples=samples,
         misfit=misfit,
         force=float(-push * all_three[2]) if moves else 0.0,
         doubt=float(push * np.sqrt(inverse[2, 2])) if moves else np.inf,
         scatter=float(sigma * np.sqrt(np.mean(np.sum(slopes[:, :2] ** 2, axis=1)))),
+        squares=(float(two @ two), float(three @ three)),
     )
 
 

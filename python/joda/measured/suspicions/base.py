@@ -18,6 +18,7 @@ Kind = Literal[
     "clock",
     "origin",
     "unread",
+    "level",
     "ticks",
     "force_size",
     "uneven_time",
