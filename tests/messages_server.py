@@ -285,10 +285,10 @@ class Handler(BaseHTTPRequestHandler):
 
 
 @contextmanager
-def serve():
+def serve(handler=Handler):
     """A server on a free port of loopback, closed at the end."""
     state = Server()
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
     server.state = state
     state.url = f"http://127.0.0.1:{server.server_port}"
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})

@@ -6,7 +6,19 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from joda.cli.options import Folder, Force, Joint, Json, Key, Model, Scene, Templates, Vlm
+from joda.cli.options import (
+    BaseUrl,
+    Efforts,
+    Folder,
+    Force,
+    Joint,
+    Json,
+    Key,
+    Model,
+    Scene,
+    Templates,
+    Vlm,
+)
 from joda.cli.progress import progress_bar, spinner
 from joda.cli.say import say
 from joda.cli.tell import (
@@ -110,7 +122,7 @@ def generate(
     proposer: Annotated[
         str | None,
         typer.Option(
-            help="anthropic, offline or a proposal.json [default: anthropic where "
+            help="anthropic, openai, offline or a proposal.json [default: anthropic where "
             "ANTHROPIC_API_KEY is set, else offline]."
         ),
     ] = None,
@@ -121,6 +133,8 @@ def generate(
     templates: Templates = None,
     key: Key = "",
     vlm: Vlm = None,
+    base_url: BaseUrl = None,
+    effort: Efforts = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with what the folder holds.")
     ] = False,
@@ -140,7 +154,8 @@ def generate(
 
     options: dict[str, Any] = {
         "proposer": proposer, "rounds": rounds, "describe": describe, "templates": templates or (),
-        "key": key, "vlm": vlm, "resume": resume, "force": force,
+        "key": key, "vlm": vlm, "base_url": base_url, "effort": effort, "resume": resume,
+        "force": force,
     }  # fmt: skip
     if model.is_dir():
         with progress_bar() as bar:
@@ -168,9 +183,11 @@ def revise(
         str, typer.Option(help="What is wrong or wanted, in words.", show_default=False)
     ],
     proposer: Annotated[
-        str | None, typer.Option(help="anthropic or offline [default: as for generate].")
+        str | None, typer.Option(help="anthropic, openai or offline [default: as for generate].")
     ] = None,
     vlm: Vlm = None,
+    base_url: BaseUrl = None,
+    effort: Efforts = None,
     force: Annotated[
         bool, typer.Option("--force", help="Although composed.json was edited by hand since.")
     ] = False,
@@ -185,7 +202,10 @@ def revise(
     from joda import revise as run
 
     with spinner("revise") as progress:
-        result = run(folder, feedback, proposer=proposer, vlm=vlm, force=force, progress=progress)
+        result = run(
+            folder, feedback, proposer=proposer, vlm=vlm, base_url=base_url, effort=effort,
+            force=force, progress=progress,
+        )  # fmt: skip
     if as_json:
         last = result.history.rounds[-1].model_dump(mode="json")
         print_json({"changes": result.changes, "picture": str(result.picture), "round": last})

@@ -75,8 +75,12 @@ class Tally:
         """Counts a request, retries too."""
         self._grow(requests=self.usage.requests + 1)
 
-    def pay(self, spent: Tokens, factor: float = 1.0) -> None:
-        """Adds an answer's tokens, at `factor` times the price."""
+    def pay(self, spent: Tokens | None, factor: float = 1.0) -> None:
+        """Adds an answer's tokens, at `factor` times the price; None: nobody knows how many."""
+        if spent is None:
+            self.price = None
+            self._grow(dollars=None)
+            return
         before = self.usage
         if self.price:
             into, out, cached = self.price
