@@ -141,7 +141,7 @@ def _joint(task: Task, cached: Block, references: bool) -> list[Block]:
 def _gravity(context: Context) -> str:
     """Gravity along the range, where it acts."""
     if context.gravity_scale == 0:
-        return "gravity at s:  none anywhere"
+        return "gravity at s: none anywhere"
     last = len(context.positions) - 1
     picked = [round(k * last / 4) for k in range(5)]
     return "gravity at s: " + ", ".join(
@@ -157,7 +157,7 @@ def _references(context: Context) -> str:
         for scale in scales
     )
     other = f", or {without} if gravity_can_be_ignored" if without != with_gravity else ""
-    return f"reference:   {with_gravity}{other}"
+    return f"reference:    {with_gravity}{other}"
 
 
 def _round(number: int, turn: Turn) -> str:
