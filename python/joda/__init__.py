@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from joda._diagnose import diagnose
     from joda._distribute import distribute
     from joda._doctor import doctor
+    from joda._evaluate import evaluate
     from joda._experiments import experiments
     from joda._export import export
     from joda._generate import generate
@@ -56,6 +57,7 @@ __all__ = [
     "diagnose",
     "distribute",
     "doctor",
+    "evaluate",
     "experiments",
     "export",
     "generate",
@@ -87,6 +89,7 @@ COMMANDS = (
     "diagnose",
     "distribute",
     "doctor",
+    "evaluate",
     "experiments",
     "export",
     "generate",

@@ -15,6 +15,8 @@ from joda.cli.options import (
     Json,
     Key,
     Model,
+    Proposer,
+    Rounds,
     Scene,
     Templates,
     Vlm,
@@ -119,14 +121,8 @@ def generate(
             "joints of this name.",
         ),
     ] = None,
-    proposer: Annotated[
-        str | None,
-        typer.Option(
-            help="anthropic, openai, offline or a proposal.json [default: anthropic where "
-            "ANTHROPIC_API_KEY is set, else offline]."
-        ),
-    ] = None,
-    rounds: Annotated[int, typer.Option(min=1, help="At most so many proposals.")] = 3,
+    proposer: Proposer = None,
+    rounds: Rounds = 3,
     describe: Annotated[
         str, typer.Option(help="What the joint should do, in words.", show_default=False)
     ] = "",

@@ -44,3 +44,11 @@ Efforts = Annotated[
     Literal["low", "medium", "high", "xhigh", "max"] | None,
     typer.Option("--effort", help="How much the model puts in [default: as it does by itself]."),
 ]
+Proposer = Annotated[
+    str | None,
+    typer.Option(
+        help="anthropic, openai, offline or a proposal.json [default: anthropic where "
+        "ANTHROPIC_API_KEY is set, else offline]."
+    ),
+]
+Rounds = Annotated[int, typer.Option(min=1, help="At most so many proposals.")]
