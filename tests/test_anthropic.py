@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from io import BytesIO
@@ -14,7 +15,9 @@ from messages_server import able, error, message, serve
 from PIL import Image
 from test_prompts import TEMPLATES, answers, blank, images, task, texts, turn
 
+import joda
 from joda import JodaError
+from joda.cli import main
 from joda.pictures.sheet import sheet as previews
 from joda.pictures.style import png
 from joda.profile import Profile
@@ -26,6 +29,7 @@ from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.prompt import MAX_TOKENS
 
 MODEL = "claude-sonnet-5-5"
+MODELS = Path(__file__).parents[1] / "models"
 
 
 @pytest.fixture
@@ -608,3 +612,52 @@ def test_a_wrong_key_for_a_batch_is_one_sentence(server, asks, tmp_path, monkeyp
 def test_nothing_to_ask_asks_nothing(server, tmp_path):
     assert batch(server, [], tmp_path / "batch.json") == {}
     assert not server.paths
+
+
+# What it will cost
+
+
+def test_an_estimate_counts_rounds_and_joints_and_asks_nobody(server, tmp_path):
+    """In a batch it is half of a file's, per joint."""
+    for name in ("oven", "refrigerator"):
+        shutil.copy(MODELS / f"{name}.xml", tmp_path)
+    options = {"proposer": "anthropic", "vlm": MODEL, "base_url": server.url}
+    one = joda.estimate(tmp_path / "oven.xml", **options)
+    both = joda.estimate(tmp_path, **options)
+    assert (one.joints, both.joints) == (1, 2) and not server.requests
+    assert (one.least.requests, one.most.requests, both.most.requests) == (1, 3, 6)
+    assert both.least.dollars == pytest.approx(one.least.dollars)
+    assert both.least.input_tokens == 2 * one.least.input_tokens
+    # Sonnet 5.5: 2 and 10 dollars per million
+    spent = one.most
+    assert spent.dollars == pytest.approx((2 * spent.input_tokens + 10 * spent.output_tokens) / 1e6)
+    assert joda.estimate(tmp_path / "oven.xml", proposer="offline") is None
+
+
+def test_the_estimate_bounds_what_is_asked(server, tmp_path):
+    """Tokens as the upper estimate counts them in the requests that are sent."""
+    pictures = [blank(960, 720)] * 5
+    expected = Anthropic(MODEL, server.url).estimate(task("oven", pictures=pictures), 3)
+    server.script[:] = [reply("oven")]
+    for turns in ([], [turn("oven")], [turn("oven"), turn("oven", number=0)]):
+        ask(server, reply("oven"), turns=turns, asked=task("oven", pictures=pictures))
+    sent = sum(price.tokens(asked) for asked in server.requests)
+    assert 0.8 * expected.input_tokens < sent <= expected.input_tokens
+
+
+def test_the_command_says_what_it_will_cost(server, tmp_path, monkeypatch, capsys):
+    def say(*options):
+        command = ["generate", str(MODELS / "oven.xml"), "-o", str(tmp_path / "o"), *options]
+        monkeypatch.setattr(sys, "argv", ["joda", *command, "--estimate"])
+        with pytest.raises(SystemExit) as end:
+            main()
+        assert end.value.code == 0 and not (tmp_path / "o").exists()
+        return capsys.readouterr().out
+
+    asked = ("--proposer", "anthropic", "--vlm", MODEL)
+    assert re.search(r"joints: 1, .*: 1 to 3 requests, .* 0\.0\d+ to 0\.\d+ dollars\.", say(*asked))
+    told = json.loads(say(*asked, "--json"))
+    assert told["most"]["requests"] == 3 and told["proposer"] == f"anthropic:{MODEL}"
+    assert "price unknown (JODA_VLM_PRICE sets it)" in say(*asked[:3], "claude-of-tomorrow")
+    assert "Nobody would be asked" in say("--proposer", "offline")
+    assert not server.requests

@@ -87,7 +87,7 @@ def generate(
     """
     check_rounds(rounds)
     folder, source = Path(output), Path(model)
-    name = joint if joint is not None else _only_joint(source)
+    name = joint if joint is not None else only_joint(source)
     further = [Path(path) for path in templates]
     if not resume or not (folder / "history.json").is_file():
         _check_free(folder, force)
@@ -204,7 +204,7 @@ def _check_free(folder: Path, force: bool) -> None:
     raise JodaError(f"{folder}: exists already; choose another folder with -o, add --force{more}.")
 
 
-def _only_joint(path: Path) -> str:
+def only_joint(path: Path) -> str:
     """The model's only hinge or slide with a range; raises JodaError if it has several or none."""
     names = ranged(load_model(path))
     if len(names) == 1:

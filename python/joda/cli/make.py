@@ -30,6 +30,7 @@ from joda.cli.tell import (
     tell_changes,
     tell_cost,
     tell_doors,
+    tell_estimate,
     tell_files,
     tell_nearest,
     tell_round,
@@ -134,6 +135,9 @@ def generate(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with what the folder holds.")
     ] = False,
+    estimate: Annotated[
+        bool, typer.Option("--estimate", help="Only say what asking a model will about cost.")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -148,11 +152,19 @@ def generate(
     from joda import generate as run
     from joda import generate_all as run_all
 
-    options: dict[str, Any] = {
+    asked: dict[str, Any] = {
         "proposer": proposer, "rounds": rounds, "describe": describe, "templates": templates or (),
-        "key": key, "vlm": vlm, "base_url": base_url, "effort": effort, "resume": resume,
-        "force": force,
+        "vlm": vlm, "base_url": base_url, "effort": effort,
     }  # fmt: skip
+    if estimate or not (as_json or resume):
+        from joda._estimate import estimate as cost
+
+        expected = cost(model, joint, output, **asked)
+        if estimate or expected:
+            tell_estimate(expected, as_json)
+        if estimate:
+            return
+    options = {**asked, "key": key, "resume": resume, "force": force}
     if model.is_dir():
         with progress_bar() as bar:
             done = run_all(model, output, joint=joint, progress=bar, **options)

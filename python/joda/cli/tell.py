@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from joda._bench import Row
     from joda._demo import Demo
     from joda._doctor import Check
+    from joda._estimate import Estimate
     from joda._evaluate import Evaluation
     from joda._generate import Generated
     from joda._refine import Refined
@@ -94,6 +95,33 @@ def tell_cost(usage: "Usage") -> None:
             f"Asked {usage.requests} times: {usage.input_tokens} tokens in "
             f"({usage.cache_read_tokens} from the cache), {usage.output_tokens} out, {price}."
         )
+
+
+def tell_estimate(estimated: "Estimate | None", as_json: bool) -> None:
+    """What a generation will about cost."""
+    if as_json:
+        print_json(estimated and estimated.model_dump(mode="json"))
+        return
+    if estimated is None:
+        say("Nobody would be asked who costs anything.")
+        return
+    least, most = estimated.least, estimated.most
+    dollars = (
+        "price unknown (JODA_VLM_PRICE sets it)"
+        if least.dollars is None or most.dollars is None
+        else f"{_span(least.dollars, most.dollars, '.2g')} dollars"
+    )
+    say(
+        f"Estimate, joints: {estimated.joints}, with {estimated.proposer}: "
+        f"{_span(least.requests, most.requests)} requests, "
+        f"{_span(least.input_tokens, most.input_tokens)} tokens in, "
+        f"{_span(least.output_tokens, most.output_tokens)} out, {dollars}."
+    )
+
+
+def _span(low: float, high: float, form: str = "d") -> str:
+    ends = f"{low:{form}}", f"{high:{form}}"
+    return " to ".join(dict.fromkeys(ends))
 
 
 def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None:

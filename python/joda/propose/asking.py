@@ -17,7 +17,7 @@ from joda.errors import JodaError
 from joda.profile import Profile
 from joda.propose import Answer, Task, Turn, Usage, replies
 from joda.propose import prompt as prompts
-from joda.propose.price import Tally, price
+from joda.propose.price import Tally, Tokens, price, tokens
 from joda.template import Template
 
 T = TypeVar("T")
@@ -26,6 +26,9 @@ Request = dict[str, Any]
 
 Effort = Literal["low", "medium", "high", "xhigh", "max"]
 MAX_RETRIES = 4
+ROUND, ANSWER = 1_500, 4_000
+"""Tokens by which a round makes the next request longer, and of an answer, reasoning included: an
+estimate, on the high side."""
 
 
 class ProposalFailed(JodaError):
@@ -106,6 +109,17 @@ class VisionModel(ABC):
                 self.model, send, asked, tally, lambda text: replies.parse(text, task, turns)
             )
         return Answer(proposal, tally.usage, tally.notes)
+
+    def estimate(self, task: Task, rounds: int, factor: float = 1.0) -> Usage:
+        """What so many rounds will about cost, at `factor` times the price; nobody is asked.
+
+        Of later rounds and of answers only the usual size is known; the cache is left out.
+        """
+        tally, first = Tally(self.price), tokens(self.request(task, ()))
+        for k in range(rounds):
+            tally.sent()
+            tally.pay(Tokens(first + k * ROUND, ANSWER), factor)
+        return tally.usage
 
     def ablate(self, task: Task) -> tuple[Profile, Usage]:
         """A profile as the model draws it without templates: the paper's ablation.
