@@ -112,7 +112,7 @@ def evaluate(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Count which expected behaviours a proposer brings about, and what it costs.
+    """Count what a proposer gets right, and its cost.
 
     Example:
 
