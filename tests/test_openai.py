@@ -228,6 +228,7 @@ FAILURES = {
     "a page": ("page", 1, "does not answer as the chat API does; check --base-url"),
     "a list": ([1], 1, "does not answer as the chat API does"),
     "a half": ({"status": 200, "headers": {}, "body": b'{"id": ['}, 1, "does not answer as"),
+    "brackets": ({"status": 200, "headers": {}, "body": b"[" * 10**5}, 1, "does not answer as"),
     "no choices": (completion("x") | {"choices": None}, 1, "does not answer as"),
     "nested": (completion("[" * 10**5), 2, "It is not JSON"),
     "a long error": (refusal(403, "e" * 10**6), 1, "use another key"),

@@ -170,7 +170,7 @@ class Anthropic(VisionModel):
                 raise ProposalFailed(self._sentence(error, client), Usage()) from None
         except APIError as error:
             raise ProposalFailed(self._sentence(error, client), Usage()) from None
-        except ValueError:  # JSON that is cut off
+        except (ValueError, RecursionError):  # JSON that is cut off, or brackets too deep
             pass
         return Abilities()
 
@@ -188,7 +188,7 @@ class Anthropic(VisionModel):
             raise ProposalFailed(self._sentence(error, client), tally.usage) from None
         except KeyboardInterrupt:
             raise ProposalInterrupted(tally.usage) from None
-        except ValueError:  # JSON that is cut off
+        except (ValueError, RecursionError):  # JSON that is cut off, or brackets too deep
             message = None
         if not _usable(message):  # a web page, say
             told = "does not answer as the Messages API does; check ANTHROPIC_BASE_URL."

@@ -152,7 +152,7 @@ class OpenAI(VisionModel):
         effort = {"reasoning_effort": self._effort} if self._effort else {}
         try:
             answer: Any = client.chat.completions.create(**translated(asked, manner), **effort)
-        except ValueError:  # JSON that is cut off
+        except (ValueError, RecursionError):  # JSON that is cut off, or brackets too deep
             answer = None
         choice = next(iter(_list(getattr(answer, "choices", None))), None)
         said = getattr(choice, "message", None)
