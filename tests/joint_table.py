@@ -3,6 +3,8 @@
     python tests/joint_table.py                    made objects of the seed that the rules were
                                                    written with, and those of other people
     python tests/joint_table.py --seed fresh       made objects that nobody has seen
+    python tests/joint_table.py --write FOLDER     the made objects as models with expectations, for
+                                                   joda evaluate proposer FOLDER
 
 Each joint is given its behaviour by `joda generate`'s loop (rules, at most three rounds, no
 pictures), once with its names and once with all names removed; `articulated.py` says what each
@@ -10,6 +12,7 @@ expectation means. Other people's files are used where they are to be had (`asse
 """
 
 import argparse
+import json
 import secrets
 import tempfile
 from collections.abc import Iterator
@@ -195,6 +198,55 @@ def holds(key: str, value: Any, behaved: Behaviour, arm: float) -> bool:
     raise KeyError(key)
 
 
+FREE = '<mujoco><option><flag contact="disable"/></option></mujoco>'
+"""Made objects overlap here and there, which is not what is to be judged."""
+SENTENCES = {
+    "near": "closes by itself when nearly closed",
+    "shut": "stays shut until it is pulled",
+    "clicks": "has clicks",
+    "sides": "has two stable sides and flips over between them",
+    "middle": "returns to the middle when let go",
+}
+HALF = {
+    "stays": "holds half-way open",
+    "closes": "falls shut from half-way open",
+    "opens": "opens by itself from half-way on",
+}
+
+
+def written(found: Context, expected: Expected, arm: float) -> dict[str, Any]:
+    """The same expectations as sentences; a force is one at the handle that the context sees."""
+    out: dict[str, Any] = {"behaviours": []}
+    for key, value in expected.items():
+        if key == "opens":
+            out["opens"] = value
+        elif key == "half":
+            out["behaviours"].append(HALF[value])
+        elif key == "force":
+            least, most = (round(force * arm / found.lever_arm, 3) for force in value)
+            out["behaviours"].append(f"takes {least} to {most} newtons at the handle to open")
+        else:
+            out["behaviours"].append(SENTENCES[key])
+    return out
+
+
+def write(folder: Path, seed: int, named: bool, rounds: int) -> int:
+    """Writes made objects and what is expected of them; how many joints there are."""
+    folder.mkdir()
+    names, count = np.random.default_rng(seed), 0
+    for number, made_one in enumerate(objects(seed, rounds)):
+        path = folder / f"object_{number}.urdf"
+        head, tail = made_one.urdf(named, names).split(">", 1)
+        path.write_text(f"{head}>{FREE}{tail}")
+        joints = {
+            joint.name: written(context(path, joint.name), joint.expected, joint.arm)
+            for joint in made_one.joints
+        }
+        path.with_suffix(".expected.json").write_text(json.dumps({"joints": joints}, indent=2))
+        count += len(joints)
+    return count
+
+
 def share(results: list[Result]) -> tuple[int, int]:
     """How many expectations are met, of how many."""
     met = [value for result in results for value in result.met.values()]
@@ -207,10 +259,15 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="objects of each kind")
     parser.add_argument("--only", choices=("named", "anonymous"))
     parser.add_argument("--made", action="store_true", help="made objects only")
+    parser.add_argument("--write", type=Path, help="folder to make")
     arguments = parser.parse_args()
     fresh = arguments.seed == "fresh"
     seed = secrets.randbelow(2**31) if fresh else int(arguments.seed)
     print(f"seed {seed}")
+    if arguments.write:
+        named = arguments.only != "anonymous"
+        print(write(arguments.write, seed, named, arguments.rounds), "joints")
+        return
     for named in (True, False):
         if arguments.only == ("anonymous" if named else "named"):
             continue

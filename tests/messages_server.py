@@ -15,6 +15,7 @@ KEYWORDS = {
     *("anyOf", "allOf", "$ref", "$defs", "description", "title"),
 }
 KEY = "sk-test"
+ADAPTIVE = {"type": "adaptive"}
 
 
 def message(text, stop_reason="end_turn", **usage):
@@ -44,6 +45,25 @@ def error(status, kind, text, **headers):
     }
 
 
+def able(adaptive, *efforts):
+    """What the service tells of a model."""
+
+    def supported(yes):
+        return {"supported": yes}
+
+    levels = ("low", "medium", "high", "xhigh", "max")
+    thinking = {"supported": True, "types": {"adaptive": supported(adaptive)}}
+    effort = {"supported": bool(efforts), **{one: supported(one in efforts) for one in levels}}
+    return {
+        "id": "claude-test",
+        "type": "model",
+        "display_name": "Test",
+        "created_at": "2026-11-01T00:00:00Z",
+        "lifecycle": "active",
+        "capabilities": {"thinking": thinking, "effort": effort},
+    }
+
+
 class Wrong(Exception):
     """What the real service would answer with 400."""
 
@@ -55,7 +75,7 @@ def need(condition, text):
 
 def check(asked):
     """Raises Wrong where the real service would refuse the request."""
-    allowed = {"model", "max_tokens", "messages", "system", "output_config"}
+    allowed = {"model", "max_tokens", "messages", "system", "output_config", "thinking"}
     need(not asked.keys() - allowed, f"unexpected: {sorted(asked.keys() - allowed)}")
     need(isinstance(asked.get("model"), str) and asked["model"], "model: field required")
     need(isinstance(asked.get("max_tokens"), int), "max_tokens: field required")
@@ -79,7 +99,13 @@ def check(asked):
             picture(block)
     cached = [block["cache_control"] for block in blocks if "cache_control" in block]
     need(len(cached) <= 4, "at most 4 blocks with cache_control")
-    need(all(each == {"type": "ephemeral"} for each in cached), "cache_control: unknown")
+    lives = [each.pop("ttl", "5m") for each in map(dict, cached)]
+    need(all(each["type"] == "ephemeral" for each in cached), "cache_control: unknown")
+    need(all(life in ("5m", "1h") for life in lives), "cache_control: unknown ttl")
+    need(lives == sorted(lives), "cache_control: a longer ttl must come before a shorter one")
+    need(asked.get("thinking", ADAPTIVE) == ADAPTIVE, "thinking: unknown")
+    effort = asked["output_config"].get("effort", "high")
+    need(effort in ("low", "medium", "high", "xhigh", "max"), "output_config.effort: unknown")
     form = asked["output_config"]["format"]
     need(form["type"] == "json_schema", "output_config.format.type")
     schema(form["schema"])
@@ -126,6 +152,7 @@ class Server:
         batches: bodies of the requests for a batch.
         results: function of a batch's entry to its result.
         looks: how many looks at a batch it takes until it has ended.
+        models: what is told of a model, by its name; 404 for others.
         deaf: whether it hangs up on whoever looks at a batch.
     """
 
@@ -134,7 +161,7 @@ class Server:
         self.requests, self.batches = [], []
         self.looks, self.seen, self.paths = 0, 0, []
         self.results = lambda entry: {"type": "succeeded", "message": message("{}")}
-        self.deaf = False
+        self.models, self.deaf = {}, False
         self.released = threading.Event()
         self.url = ""
 
@@ -196,6 +223,14 @@ class Handler(BaseHTTPRequestHandler):
 
     def do_GET(self):
         state = self.server.state
+        if model := re.fullmatch(r"/v1/models/(.*)", self.path):
+            if not self.entitled():
+                return
+            if model[1] in state.models:
+                self.reply(200, state.models[model[1]])
+            else:
+                self.refuse(404, "not_found_error", "no such model")
+            return
         state.paths.append(self.path)
         if state.deaf:
             self.close_connection = True
@@ -250,10 +285,10 @@ class Handler(BaseHTTPRequestHandler):
 
 
 @contextmanager
-def serve():
+def serve(handler=Handler):
     """A server on a free port of loopback, closed at the end."""
     state = Server()
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
     server.state = state
     state.url = f"http://127.0.0.1:{server.server_port}"
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from io import BytesIO
@@ -10,22 +11,25 @@ from pathlib import Path
 
 import anthropic
 import pytest
-from messages_server import error, message, serve
+from messages_server import able, error, message, serve
 from PIL import Image
 from test_prompts import TEMPLATES, answers, blank, images, task, texts, turn
 
+import joda
 from joda import JodaError
+from joda.cli import main
 from joda.pictures.sheet import sheet as previews
 from joda.pictures.style import png
 from joda.profile import Profile
 from joda.proposal import Proposal
-from joda.propose import Ask, BatchProposer, price
+from joda.propose import Ask, BatchProposer, asking, price, prompt
 from joda.propose import anthropic as proposer
 from joda.propose import batch as batches
 from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.prompt import MAX_TOKENS
 
 MODEL = "claude-sonnet-5-5"
+MODELS = Path(__file__).parents[1] / "models"
 
 
 @pytest.fixture
@@ -168,9 +172,9 @@ def test_no_answer_in_time_is_a_sentence(server, monkeypatch):
 @pytest.mark.parametrize(
     "status,kind,says",
     [
-        (400, "invalid_request_error", "JODA_VLM"),
+        (400, "invalid_request_error", "--vlm"),
         (402, "billing_error", "credit"),
-        (403, "permission_error", "JODA_VLM"),
+        (403, "permission_error", "--vlm"),
         (404, "not_found_error", f"another model than '{MODEL}'"),
     ],
 )
@@ -286,13 +290,13 @@ def test_tokens_survive_a_failure_after_them(server):
 
 def test_tokens_survive_an_interruption_after_them(server, monkeypatch):
     def hear(asked, text, wrong):
-        monkeypatch.setattr(proposer.Tally, "sent", stop)
+        monkeypatch.setattr(asking.Tally, "sent", stop)
         return asked
 
-    def stop(tally, request, send):
+    def stop(tally):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(proposer.prompts, "repair", hear)
+    monkeypatch.setattr(prompt, "repair", hear)
     with pytest.raises(KeyboardInterrupt) as stopped:
         ask(server, message("{"))
     assert stopped.value.usage.input_tokens == 1000
@@ -303,7 +307,7 @@ def test_another_service_is_a_sentence(server):
 
 
 def test_the_server_refuses_a_bad_request(server, monkeypatch):
-    monkeypatch.setattr(proposer.prompts, "CACHED", {"cache_control": {"type": "forever"}})
+    monkeypatch.setattr(prompt, "CACHED", {"cache_control": {"type": "forever"}})
     assert "cache_control: unknown" in str(fails(server, reply()))
 
 
@@ -317,6 +321,48 @@ def test_the_ablation_yields_a_profile(server):
     profile, usage = Anthropic(MODEL, server.url).ablate(task())
     assert isinstance(profile, Profile) and usage.requests == 1
     assert profile.channels.damping.components[0].y == (0.5, 0.5)
+
+
+# What the model can do
+
+
+@pytest.mark.parametrize("adaptive", [True, False])
+def test_a_model_thinks_where_it_decides_how_much_by_itself(server, adaptive):
+    server.models[MODEL] = able(adaptive)
+    ask(server, reply())
+    (sent,) = server.requests
+    assert sent.get("thinking") == ({"type": "adaptive"} if adaptive else None)
+    assert "effort" not in sent["output_config"]
+
+
+def test_of_a_model_that_the_service_does_not_know_nothing_is_assumed(server):
+    assert "thinking" not in (ask(server, reply()), *server.requests)[1]
+
+
+def test_effort_is_what_was_asked_for(server):
+    server.models[MODEL] = able(True, "low", "high")
+    ask(server, reply(), effort="low")
+    assert server.requests[0]["output_config"]["effort"] == "low"
+    assert "format" in server.requests[0]["output_config"]
+    with pytest.raises(JodaError, match=r"takes no effort 'max'; it takes low, high\."):
+        ask(server, reply(), effort="max")
+    server.models[MODEL] = able(True)
+    with pytest.raises(JodaError, match="leave --effort out"):
+        ask(server, reply(), effort="low")
+    assert len(server.requests) == 1
+
+
+@pytest.mark.parametrize("nonsense", [[], {}, {"capabilities": 3}, {"capabilities": {"effort": 1}}])
+def test_nonsense_about_a_model_is_none(server, nonsense):
+    server.models[MODEL] = nonsense
+    assert ask(server, reply()).proposal == proposed()
+    assert "thinking" not in server.requests[0]
+
+
+def test_a_refusal_says_why_if_the_service_does(server):
+    why = {"type": "refusal", "category": "bio", "explanation": "Looks like a pump."}
+    failure = fails(server, message("", "refusal") | {"stop_details": why})
+    assert "declined to answer (Looks like a pump); describe" in str(failure)
 
 
 # Batches
@@ -356,6 +402,25 @@ def test_a_batch_answers_every_ask_at_half_the_price(server, asks, tmp_path):
     assert slept == [0.001, 0.0015]
     assert len(server.batches) == 1 and not server.requests and not store.exists()
     assert [each["params"]["model"] for each in server.batches[0]] == [MODEL] * 2
+
+
+def test_a_batch_caches_what_all_joints_share_for_an_hour(server, asks, tmp_path):
+    """Writing for an hour costs 2 times the input, for 5 minutes 1.25 times, in a batch half."""
+    counts = {
+        "cache_creation_input_tokens": 8_000,
+        "cache_creation": {"ephemeral_1h_input_tokens": 6_000, "ephemeral_5m_input_tokens": 2_000},
+    }
+    server.results = lambda entry: {"type": "succeeded", "message": reply(**counts)}
+    got = batch(server, asks[:1], tmp_path / "batch.json")["fridge"].usage
+    assert got.cache_write_tokens == 8_000 and got.input_tokens == 9_000
+    assert got.dollars == pytest.approx((0.002 + 0.024 + 0.005 + 0.002) / 2)
+    batch(server, asks[1:], tmp_path / "batch.json")
+    for (entry,) in server.batches:
+        asked = entry["params"]
+        blocks = [*asked["system"], *(b for m in asked["messages"] for b in m["content"])]
+        cached = [b["cache_control"] for b in blocks if "cache_control" in b]
+        assert cached == [{"type": "ephemeral", "ttl": "1h"}] * 2
+        assert [block["type"] for block in blocks if "cache_control" in block] == ["text", "image"]
 
 
 def test_an_interrupted_batch_is_picked_up_and_not_paid_twice(server, asks, tmp_path):
@@ -427,13 +492,13 @@ import sys
 sys.path.insert(0, sys.argv[1])
 from test_prompts import answers, task, turn
 from joda.propose.anthropic import Anthropic, _key
-asked = Anthropic("claude-sonnet-5-5")._request(task("oven"), [turn("oven")])
+asked = Anthropic("claude-sonnet-5-5").request(task("oven"), [turn("oven")])
 print(_key("oven", asked))
 """
     (tmp_path / "matplotlibrc").write_text(
         "savefig.bbox: tight\nfont.size: 30\nfigure.dpi: 30\nsavefig.facecolor: red\n"
     )
-    here = proposer._key("oven", Anthropic(MODEL)._request(task("oven"), [turn("oven")]))
+    here = proposer._key("oven", Anthropic(MODEL).request(task("oven"), [turn("oven")]))
     run = subprocess.run(
         [sys.executable, "-c", code, str(Path(__file__).parent)],
         capture_output=True,
@@ -547,3 +612,52 @@ def test_a_wrong_key_for_a_batch_is_one_sentence(server, asks, tmp_path, monkeyp
 def test_nothing_to_ask_asks_nothing(server, tmp_path):
     assert batch(server, [], tmp_path / "batch.json") == {}
     assert not server.paths
+
+
+# What it will cost
+
+
+def test_an_estimate_counts_rounds_and_joints_and_asks_nobody(server, tmp_path):
+    """In a batch it is half of a file's, per joint."""
+    for name in ("oven", "refrigerator"):
+        shutil.copy(MODELS / f"{name}.xml", tmp_path)
+    options = {"proposer": "anthropic", "vlm": MODEL, "base_url": server.url}
+    one = joda.estimate(tmp_path / "oven.xml", **options)
+    both = joda.estimate(tmp_path, **options)
+    assert (one.joints, both.joints) == (1, 2) and not server.requests
+    assert (one.least.requests, one.most.requests, both.most.requests) == (1, 3, 6)
+    assert both.least.dollars == pytest.approx(one.least.dollars)
+    assert both.least.input_tokens == 2 * one.least.input_tokens
+    # Sonnet 5.5: 2 and 10 dollars per million
+    spent = one.most
+    assert spent.dollars == pytest.approx((2 * spent.input_tokens + 10 * spent.output_tokens) / 1e6)
+    assert joda.estimate(tmp_path / "oven.xml", proposer="offline") is None
+
+
+def test_the_estimate_bounds_what_is_asked(server, tmp_path):
+    """Tokens as the upper estimate counts them in the requests that are sent."""
+    pictures = [blank(960, 720)] * 5
+    expected = Anthropic(MODEL, server.url).estimate(task("oven", pictures=pictures), 3)
+    server.script[:] = [reply("oven")]
+    for turns in ([], [turn("oven")], [turn("oven"), turn("oven", number=0)]):
+        ask(server, reply("oven"), turns=turns, asked=task("oven", pictures=pictures))
+    sent = sum(price.tokens(asked) for asked in server.requests)
+    assert 0.8 * expected.input_tokens < sent <= expected.input_tokens
+
+
+def test_the_command_says_what_it_will_cost(server, tmp_path, monkeypatch, capsys):
+    def say(*options):
+        command = ["generate", str(MODELS / "oven.xml"), "-o", str(tmp_path / "o"), *options]
+        monkeypatch.setattr(sys, "argv", ["joda", *command, "--estimate"])
+        with pytest.raises(SystemExit) as end:
+            main()
+        assert end.value.code == 0 and not (tmp_path / "o").exists()
+        return capsys.readouterr().out
+
+    asked = ("--proposer", "anthropic", "--vlm", MODEL)
+    assert re.search(r"joints: 1, .*: 1 to 3 requests, .* 0\.0\d+ to 0\.\d+ dollars\.", say(*asked))
+    told = json.loads(say(*asked, "--json"))
+    assert told["most"]["requests"] == 3 and told["proposer"] == f"anthropic:{MODEL}"
+    assert "price unknown (JODA_VLM_PRICE sets it)" in say(*asked[:3], "claude-of-tomorrow")
+    assert "Nobody would be asked" in say("--proposer", "offline")
+    assert not server.requests

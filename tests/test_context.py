@@ -186,3 +186,42 @@ def test_it_is_json(tmp_path):
     found = context(write(tmp_path, LID), "lid")
     content = json.loads(found.model_dump_json())
     assert content["joint"] == {"name": "lid", "type": "hinge", "range": [0, 2], "unit": "rad"}
+
+
+COUPLED = """
+<mujoco><compiler angle="radian"/><option viscosity="0.01"/><worldbody>
+  <geom name="wall" type="box" size=".02 .3 .3" pos="-.1 .6 0"/>
+  <body name="door"><joint name="door" axis="0 0 1" range="0 2" damping=".5" frictionloss=".2"
+      stiffness="1.5" springref=".3" armature=".04"/>
+    <geom name="leaf" type="box" size=".02 .4 .3" pos="0 .4 0" mass="5"/></body>
+  <body name="twin" pos="3 0 0"><joint name="twin" axis="0 0 1" range="0 2"/>
+    <geom type="box" size=".02 .4 .3" pos="0 .4 0" mass="5"/></body>
+</worldbody>
+<equality><joint name="linked" joint1="door" joint2="twin"/></equality>
+<actuator><motor name="opener" joint="door"/></actuator></mujoco>"""
+
+
+def test_what_the_model_itself_gives_a_joint(tmp_path):
+    """The leaf, 2 cm thick on either side, meets the wall's face, 8 cm before it, on its way."""
+    found = context(write(tmp_path, COUPLED), "door")
+    own = found.native
+    assert (own.damping, own.frictionloss, own.armature) == (0.5, 0.2, 0.04)
+    assert (own.stiffness, own.springref) == (1.5, 0.3)
+    assert own.besides == ("equality 'linked'", "a medium (<option density viscosity wind>)")
+    first = own.contacts[0]
+    assert (first.geom, first.other, first.stop) == ("leaf", "wall", False)
+    # its corner at (-0.02, 0.8) reaches the face x = -0.08 at asin(0.08 / r) - asin(0.02 / r)
+    r = np.hypot(0.8, 0.02)
+    meets = np.arcsin(0.08 / r) - np.arcsin(0.02 / r)
+    assert first.interval[0] == pytest.approx(meets / 2, abs=2e-3)
+    told = found.describe()
+    assert "own elements: damping 0.5 N·m·s/rad, friction 0.2 N·m, a spring of 1.5 N·m/rad" in told
+    assert "also acting:  equality 'linked'" in told and "driven by:    opener" in told
+    assert "contacts:     leaf meets wall from s = 0.0" in told
+    assert json.loads(found.model_dump_json())["native"]["springref"] == 0.3
+
+
+def test_a_plain_joint_has_no_elements_of_its_own(tmp_path):
+    found = context(write(tmp_path, LID), "lid")
+    assert "own elements: none" in found.describe()
+    assert not found.native.contacts and not found.native.besides

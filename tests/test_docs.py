@@ -1,6 +1,8 @@
 """The site is built without a warning, and what its tutorial and how-to pages show runs."""
 
+import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,12 +10,16 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from chat_server import Chat, completion, words
+from messages_server import serve
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores, get_typestore
+from test_prompts import answers
 from test_readme import shell
 
 from joda.measured.runs import read_run
 from joda.profile import ATTRIBUTES
+from joda.propose.expected import Expectations
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -112,6 +118,33 @@ def test_templates_effects_and_proposers_of_ones_own(my_door):
     (folder / "offline" / "proposal.json").rename(folder / "proposal.json")
     run("python mine.py", folder)
     assert (folder / "generated" / "scene.xml").exists()
+
+
+def test_a_server_of_ones_own(tmp_path, monkeypatch):
+    """The pages' commands, with a server at another address."""
+    for name in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "JODA_VLM", "JODA_VLM_PRICE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+    write_files("my_door.md", tmp_path)
+    for name in ("oven.xml", "switch.xml", "switch.expected.json"):
+        folder = tmp_path / "models" if name.startswith("switch") else tmp_path
+        folder.mkdir(exist_ok=True)
+        shutil.copy(ROOT / "models" / name, folder)
+    asked, estimating = blocks("howto/proposer.md", "sh")[0], blocks("generation.md", "sh")[0]
+    with serve(Chat) as server:
+        reply, done = answers("refrigerator")[0], {"status": "complete", "proposal": None}
+        server.script[:] = [completion(json.dumps(each)) for each in (reply, done, reply)]
+        commands = [
+            line.replace("http://127.0.0.1:8000", server.url)
+            for line in [*asked.splitlines(), *estimating.splitlines()]
+        ]
+        told = [run(command, tmp_path) for command in commands]
+    assert [sent["model"] for sent in server.requests] == ["qwen3-vl"] * 3
+    assert "it closes too hard" in words(server.requests[-1]) and "Estimate" in told[-1]
+    page = (DOCS / "generation.md").read_text("utf-8")
+    (command,) = re.findall(r"`(joda evaluate proposer models .+?)`", page)
+    assert "offline, 1 joints" in run(command, tmp_path)
+    Expectations.model_validate_json(blocks("generation.md", "json")[0])
 
 
 def test_steps_in_mjx(tmp_path):

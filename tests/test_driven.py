@@ -85,7 +85,7 @@ def test_the_context_names_the_actuators(tmp_path):
     path = write(tmp_path, ARM.format(actuator=SERVO))
     found = context(path, "elbow")
     assert found.driven and found.actuators == ("servo",)
-    assert "driven by:   servo" in found.describe()
+    assert "driven by:    servo" in found.describe()
 
 
 def swung(folder, name="run.csv", forced=True, seconds=5.0):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -260,7 +261,11 @@ def proposal_file(tmp_path, **changed):
     "joint,more,says",
     [
         ("dor", (), "joint 'dor' not found; hinges and slides of the model: 'door'."),
-        ("door", ("--proposer", "gpt"), "gpt: no such proposer or file; give anthropic, offline"),
+        (
+            "door",
+            ("--proposer", "gpt"),
+            "gpt: no such proposer or file; give anthropic, openai, offline",
+        ),
         ("door", ("--proposer", "anthropic"), "ANTHROPIC_API_KEY is not set"),
         ("door", ("--proposer", "BAD"), "effect_proposals[0].start_ratio: "),
         ("door", ("--templates", "no"), "no: no such folder of templates."),
@@ -516,7 +521,11 @@ def test_ctrl_c_stops_at_once_and_it_can_be_resumed(joda, server, tmp_path):
         time.sleep(0.02)
     running.send_signal(signal.SIGINT)
     out, err = running.communicate(timeout=30)
-    assert (running.returncode, out) == (130, "") and err in ("", "joda: interrupted.\n")
+    assert (
+        running.returncode == 130
+        and re.fullmatch("Estimate, .*\n", out)
+        and err in ("", "joda: interrupted.\n")
+    )
     kept = whole(tmp_path / "out")
     assert len(kept.rounds) == 1 and not kept.complete and kept.pictures == ()
     assert [(f.reason, f.usage.requests) for f in kept.failures] == [("interrupted", 1)]

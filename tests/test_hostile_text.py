@@ -514,8 +514,9 @@ ANSWERS = {
     "no counts": (message("", output_tokens=None), NO_MESSAGE),
     "fewer than none": (message("", output_tokens=-1), NO_MESSAGE),
     "JSON that is cut off": ({"status": 200, "headers": {}, "body": b'{"id": ['}, NO_MESSAGE),
+    "brackets too deep": ({"status": 200, "headers": {}, "body": b"[" * 10**5}, NO_MESSAGE),
     "a list": ([1], NO_MESSAGE),
-    "a long error": (error(400, "x", "e" * 10**6), "choose another with JODA_VLM."),
+    "a long error": (error(400, "x", "e" * 10**6), "choose another model with --vlm."),
     "an error that acts": (error(400, "x", "\x1b[2J\r\n[/]"), "\\u001b[2J\\r [/]"),
     "an error that is none": ({"status": 400, "headers": {}, "body": None}, "no reason given"),
 }

@@ -30,7 +30,7 @@ LAYERS = [
     {"_add", "_refine", "propose"},
     {"_generate", "_hidden_effect", "_schema"},
     {"_generate_all", "_revise", "_demo", "cases", "distributed"},
-    {"_experiments", "_studio", "_distribute"},
+    {"_experiments", "_studio", "_distribute", "_evaluate", "_estimate"},
     {"cli"},
     {"__main__"},
 ]

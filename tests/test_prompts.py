@@ -236,7 +236,7 @@ def test_the_joint_is_described_with_its_gravity_and_references():
         [oven.context.gravity_force[k] for k in (0, 5, 10, 15, 20)], rel=0.01
     )
     assert "if gravity_can_be_ignored" in text
-    assert "gravity at s:  none" in texts(prompt.request(task(), []))
+    assert "gravity at s: none" in texts(prompt.request(task(), []))
 
 
 def test_a_picture_that_is_none_is_one_sentence():

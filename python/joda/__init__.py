@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from joda._diagnose import diagnose
     from joda._distribute import distribute
     from joda._doctor import doctor
+    from joda._estimate import estimate
+    from joda._evaluate import evaluate
     from joda._experiments import experiments
     from joda._export import export
     from joda._generate import generate
@@ -56,6 +58,8 @@ __all__ = [
     "diagnose",
     "distribute",
     "doctor",
+    "estimate",
+    "evaluate",
     "experiments",
     "export",
     "generate",
@@ -87,6 +91,7 @@ COMMANDS = (
     "diagnose",
     "distribute",
     "doctor",
+    "evaluate",
     "experiments",
     "export",
     "generate",
@@ -104,6 +109,7 @@ COMMANDS = (
 _MODULES = ("effects", "field", "mjx", "warp")
 _LAZY = {
     "Profile": "joda.profile",
+    "estimate": "joda._estimate",
     "generate_all": "joda._generate_all",
     "hidden_effect": "joda._hidden_effect",
     "read_profiles": "joda.scenes.scene",

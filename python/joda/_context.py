@@ -12,6 +12,7 @@ from joda.plain import line
 from joda.profile import Joint
 from joda.scenes.actuators import actuators_on
 from joda.scenes.angles import range_doubt
+from joda.scenes.elements import Elements, elements
 from joda.scenes.engine import inertia_at
 from joda.scenes.masses import mass_doubts
 from joda.scenes.model import describe_joint, find_joint, load_model, moves_with
@@ -52,6 +53,8 @@ class Context(BaseModel):
         size: of the box around what moves, along the world's axes, at the low end; m.
         driven: whether an actuator acts on the joint.
         actuators: which ones do.
+        native: MuJoCo's own elements on the joint, and what else acts on it. Where the joint gets
+            a profile, that replaces its damping, frictionloss and stiffness; the rest stays.
         names: what the file calls the joint, the child and what moves with it, in this order.
         around: what it calls the bodies above, nearest first, and the model.
         shape: features of the part and its object; None of a part without geoms.
@@ -80,6 +83,7 @@ class Context(BaseModel):
     size: Vector
     driven: bool
     actuators: tuple[str, ...] = ()
+    native: Elements = Elements()
     names: tuple[str, ...]
     around: tuple[str, ...]
     shape: Shape | None = None
@@ -104,11 +108,14 @@ class Context(BaseModel):
             "gravity": f"{_span(self.gravity_force)} {force} (positive drives +q)",
             "upper end": self.upper_end.replace("_", " "),
             "closed end": f"{self.closed_end.replace('_', ' ')}; opening: {opens}",
+            "own elements": self.native.describe(joint),
             **({"driven by": ", ".join(self.actuators)} if self.driven else {}),
+            **({"also acting": ", ".join(self.native.besides)} if self.native.besides else {}),
+            **({"contacts": self.native.touches()} if self.native.contacts else {}),
             "names": ", ".join(self.names[:12]),
             "part of": ", ".join(self.around),
         }
-        return "\n".join(f"{name + ':':12} {line(text)}" for name, text in rows.items())
+        return "\n".join(f"{name + ':':13} {line(text)}" for name, text in rows.items())
 
 
 def context(model: str | Path, joint: str) -> Context:
@@ -165,6 +172,7 @@ def context(model: str | Path, joint: str) -> Context:
         size=_vector(np.ptp(points, axis=0)),
         driven=bool(acting),
         actuators=acting,
+        native=elements(m, j, described),
         names=_names(m, j),
         around=_around(m, j),
         shape=seen.shape,

@@ -24,7 +24,7 @@ from joda.scenes.motion import Motion, release
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MODEL, JOINT = "oven.xml", "door"
+MODEL, EXPECTED, JOINT = "oven.xml", "oven.expected.json", "door"
 STARTS = (np.deg2rad(45.0), np.deg2rad(5.0))
 DURATION = 2.5
 NAMES = ("without a profile", "with its profile")
@@ -36,8 +36,9 @@ class Demo:
     """What the demo left behind, and what it saw.
 
     Attributes:
-        folder: with the oven, all that `joda.generate` leaves, and the motions of the door with the
-            profile as runs: let_go_45.csv, let_go_5.csv.
+        folder: with the oven and what is expected of it (for `joda.evaluate`), all that
+            `joda.generate` leaves, and the motions of the door with the profile as runs:
+            let_go_45.csv, let_go_5.csv.
         plain, scene: the oven as it comes, and with the profile.
         picture: both doors beside each other.
         history: the rounds of the generation.
@@ -86,7 +87,8 @@ def demo(
     make_folder(folder)
     plain, scene = folder / MODEL, folder / "scene.xml"
     with as_file(files("joda") / "models") as models:
-        write_bytes(plain, (models / MODEL).read_bytes())
+        for name in (MODEL, EXPECTED):
+            write_bytes(folder / name, (models / name).read_bytes())
     made = generate(plain, JOINT, folder, proposer="offline", force=True, progress=progress)
 
     progress("letting both doors go, opening both by hand")

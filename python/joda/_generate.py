@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import mujoco
 
@@ -11,6 +12,7 @@ from joda.errors import JodaError
 from joda.files import occupied
 from joda.proposal import Proposal
 from joda.propose import Proposer
+from joda.propose.asking import Effort
 from joda.propose.history import History
 from joda.propose.session import Progress, Session, relative, silent
 from joda.scenes.model import find_joint, joint_name, joint_type, load_model
@@ -45,6 +47,8 @@ def generate(
     templates: Sequence[str | Path] = (),
     key: str = "",
     vlm: str | None = None,
+    base_url: str | None = None,
+    effort: Effort | None = None,
     resume: bool = False,
     force: bool = False,
     progress: Progress = silent,
@@ -56,13 +60,18 @@ def generate(
         joint: a hinge or slide with a range, as `joda.scenes.model.find_joint` takes it. None: the
             only one of the model.
         output: folder to fill; made if missing.
-        proposer: "anthropic", "offline", the path of a proposal.json, or an object with a
-            `propose` of its own. By default anthropic where ANTHROPIC_API_KEY is set, else offline.
+        proposer: "anthropic", "openai" (any server that speaks its chat API), "offline", the path
+            of a proposal.json, or an object with a `propose` of its own. By default anthropic where
+            ANTHROPIC_API_KEY is set, else offline.
         rounds: at most so many proposals, those of before included.
         describe: what the joint should do, in words.
         templates: further folders of effect templates.
         key: another key draws other strengths within the labels' bands.
-        vlm: name of the model that the anthropic proposer asks.
+        vlm: name of the model that is asked; by default JODA_VLM's, or one of Claude.
+        base_url: address of the server that is asked; by default the environment's, or the
+            service's own.
+        effort: how much the model is to put into an answer: "low", "medium", "high", "xhigh" or
+            "max"; by default as much as it does by itself.
         resume: go on with what the folder holds, where its last round left it; `describe`,
             `templates` and `key` are those of before.
         force: overwrite what another generation left in the folder; with `resume`, go on although
@@ -78,13 +87,15 @@ def generate(
     """
     check_rounds(rounds)
     folder, source = Path(output), Path(model)
-    name = joint if joint is not None else _only_joint(source)
+    name = joint if joint is not None else only_joint(source)
     further = [Path(path) for path in templates]
     if not resume or not (folder / "history.json").is_file():
         _check_free(folder, force)
-        choose(proposer, key, vlm)  # a mistake in it is found before anything is made
+        choose(
+            proposer, key, vlm, base_url, effort
+        )  # a mistake in it is found before anything is made
     session = begin(folder, source, name, describe, further, key, resume, progress)
-    run(session, choose(proposer, session.history.key, vlm), rounds, force)
+    run(session, choose(proposer, session.history.key, vlm, base_url, effort), rounds, force)
     return Generated(folder, session.history, tuple(session.notes))
 
 
@@ -135,22 +146,39 @@ def begin(
 
 
 def choose(
-    proposer: str | Path | Proposer | None, key: str = "", vlm: str | None = None
+    proposer: str | Path | Proposer | None,
+    key: str = "",
+    vlm: str | None = None,
+    base_url: str | None = None,
+    effort: Effort | None = None,
 ) -> Proposer:
     """The proposer that is meant; see `generate`. Raises JodaError."""
     if proposer is not None and not isinstance(proposer, str | Path):
         return proposer
     name = str(proposer or ("anthropic" if os.environ.get("ANTHROPIC_API_KEY") else "offline"))
+    if effort not in (None, *get_args(Effort)):
+        raise JodaError(f"effort is '{effort}'; give one of {', '.join(get_args(Effort))}.")
+    if name == "anthropic":
+        from joda.propose.anthropic import Anthropic
+
+        return Anthropic(vlm, base_url, effort=effort)
+    if name == "openai":
+        from joda.propose.openai import OpenAI
+
+        return OpenAI(vlm, base_url, effort=effort)
+    if vlm or base_url or effort:
+        raise JodaError(
+            f"--vlm, --base-url and --effort are of the proposers anthropic and openai, not of "
+            f"'{name}'; add --proposer."
+        )
     if name == "offline":
         from joda.propose.offline import Offline
 
         return Offline(key)
-    if name == "anthropic":
-        from joda.propose.anthropic import Anthropic
-
-        return Anthropic(vlm)
     if not Path(name).is_file():
-        raise JodaError(f"{name}: no such proposer or file; give anthropic, offline or a file.")
+        raise JodaError(
+            f"{name}: no such proposer or file; give anthropic, openai, offline or a file."
+        )
     from joda.propose.file import FileProposer
 
     Proposal.read(name)
@@ -176,7 +204,7 @@ def _check_free(folder: Path, force: bool) -> None:
     raise JodaError(f"{folder}: exists already; choose another folder with -o, add --force{more}.")
 
 
-def _only_joint(path: Path) -> str:
+def only_joint(path: Path) -> str:
     """The model's only hinge or slide with a range; raises JodaError if it has several or none."""
     names = ranged(load_model(path))
     if len(names) == 1:

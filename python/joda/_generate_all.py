@@ -9,6 +9,7 @@ from joda._generate import ROUNDS, Generated, begin, check_rounds, choose, range
 from joda.errors import JodaError
 from joda.files import file_name, make_folder, read_text
 from joda.propose import Ask, BatchProposer, Proposer
+from joda.propose.asking import Effort
 from joda.propose.session import Session
 from joda.scenes.model import load_model
 
@@ -38,6 +39,8 @@ def generate_all(
     templates: Sequence[str | Path] = (),
     key: str = "",
     vlm: str | None = None,
+    base_url: str | None = None,
+    effort: Effort | None = None,
     resume: bool = False,
     force: bool = False,
     progress: Advance = lambda done, total, what: None,
@@ -52,7 +55,7 @@ def generate_all(
             loaded by themselves, are passed over.
         output: folder to fill, with a folder per model and in it one per joint.
         joint: only the joints of this name.
-        proposer, rounds, describe, templates, key, vlm: as for `joda.generate`.
+        proposer, rounds, describe, templates, key, vlm, base_url, effort: as for `joda.generate`.
         resume: go on with what the folder holds; what is complete stays.
         force: overwrite what another generation left in the folder, with `resume` profiles that
             were edited by hand.
@@ -69,7 +72,7 @@ def generate_all(
     check_rounds(rounds)
     source, target = Path(models), Path(output)
     _check_target(target, force or resume)
-    chosen = choose(proposer, key, vlm)
+    chosen = choose(proposer, key, vlm, base_url, effort)
     done: Results = {}
     jobs = find_jobs(source, target, joint, done)
     make_folder(target)
@@ -81,7 +84,8 @@ def generate_all(
         try:
             session = begin(job.folder, job.model, job.joint, describe, further, key, resume)
             if batched is None:
-                run(session, choose(proposer, session.history.key, vlm), rounds, force)
+                own = choose(proposer, session.history.key, vlm, base_url, effort)
+                run(session, own, rounds, force)
             elif session.pending(rounds) and not force:
                 session.check_unedited()
             sessions[label] = session

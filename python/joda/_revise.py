@@ -11,6 +11,7 @@ from joda.errors import JodaError
 from joda.pictures.changes import changes, overlay
 from joda.pictures.style import write_png
 from joda.propose import Proposer
+from joda.propose.asking import Effort
 from joda.propose.history import History
 from joda.propose.session import Progress, Session, silent
 
@@ -40,6 +41,8 @@ def revise(
     *,
     proposer: str | Path | Proposer | None = None,
     vlm: str | None = None,
+    base_url: str | None = None,
+    effort: Effort | None = None,
     force: bool = False,
     progress: Progress = silent,
 ) -> Revised:
@@ -48,8 +51,7 @@ def revise(
     Args:
         folder: what `joda.generate` left.
         feedback: what is wrong or wanted, in words.
-        proposer: as for `joda.generate`.
-        vlm: name of the model that the anthropic proposer asks.
+        proposer, vlm, base_url, effort: as for `joda.generate`.
         force: go on although composed.json was edited by hand since; the edit is lost.
         progress: told what is being done.
 
@@ -71,7 +73,7 @@ def revise(
         raise JodaError(f"{path}: holds no proposal yet; go on with: joda generate --resume")
     if not force:
         session.check_unedited()
-    chosen = choose(proposer, session.history.key, vlm)
+    chosen = choose(proposer, session.history.key, vlm, base_url, effort)
     before = session.turns[-1].profile
     session.ask(chosen, feedback.strip())
     after = session.turns[-1].profile

@@ -7,17 +7,19 @@ from pydantic import BaseModel
 from joda.profile import Profile
 from joda.proposal import Proposal
 from joda.propose.archetype import Archetypes
+from joda.propose.expected import Expectations
 from joda.template import Template
 
 
 def schema(
-    file: Literal["composed", "proposal", "template", "archetype"] = "composed",
+    file: Literal["composed", "proposal", "template", "archetype", "expected"] = "composed",
 ) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a file format.
 
     Args:
         file: "composed" for `composed.json`, "proposal" for `proposal.json`, "template" for the
-            effect templates, "archetype" for the tables of kinds of joints (TOML).
+            effect templates, "archetype" for the tables of kinds of joints (TOML), "expected" for
+            what a model's joints should do (`MODEL.expected.json`).
 
     Returns:
         the schema as a JSON object.
@@ -27,5 +29,6 @@ def schema(
         "proposal": Proposal,
         "template": Template,
         "archetype": Archetypes,
+        "expected": Expectations,
     }
     return models[file].model_json_schema()

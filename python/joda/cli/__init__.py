@@ -15,7 +15,7 @@ from joda.cli import interrupt
 from joda.cli.act import experiments, simulate, with_usual
 from joda.cli.edit import studio
 from joda.cli.make import attach, compile, demo, export, generate, revise, weigh
-from joda.cli.many import distribute
+from joda.cli.many import distribute, evaluate
 from joda.cli.measure import bench, compare, refine
 from joda.cli.mend import add, diagnose, improve
 from joda.cli.observe import context, plot, render
@@ -66,7 +66,7 @@ def _help(command: Callable[..., None]) -> str:
 
 for command in (
     demo, attach, compile, context, generate, revise, plot, simulate, compare, diagnose, add,
-    improve, refine, render, experiments, studio, export, distribute,
+    improve, refine, render, experiments, studio, export, distribute, evaluate,
     bench, schema, templates, weigh, doctor,
 ):  # fmt: skip
     app.command(help=_help(command))(command)

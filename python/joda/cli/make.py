@@ -6,7 +6,21 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from joda.cli.options import Folder, Force, Joint, Json, Key, Model, Scene, Templates, Vlm
+from joda.cli.options import (
+    BaseUrl,
+    Efforts,
+    Folder,
+    Force,
+    Joint,
+    Json,
+    Key,
+    Model,
+    Proposer,
+    Rounds,
+    Scene,
+    Templates,
+    Vlm,
+)
 from joda.cli.progress import progress_bar, spinner
 from joda.cli.say import say
 from joda.cli.tell import (
@@ -16,6 +30,7 @@ from joda.cli.tell import (
     tell_changes,
     tell_cost,
     tell_doors,
+    tell_estimate,
     tell_files,
     tell_nearest,
     tell_round,
@@ -107,22 +122,21 @@ def generate(
             "joints of this name.",
         ),
     ] = None,
-    proposer: Annotated[
-        str | None,
-        typer.Option(
-            help="anthropic, offline or a proposal.json [default: anthropic where "
-            "ANTHROPIC_API_KEY is set, else offline]."
-        ),
-    ] = None,
-    rounds: Annotated[int, typer.Option(min=1, help="At most so many proposals.")] = 3,
+    proposer: Proposer = None,
+    rounds: Rounds = 3,
     describe: Annotated[
         str, typer.Option(help="What the joint should do, in words.", show_default=False)
     ] = "",
     templates: Templates = None,
     key: Key = "",
     vlm: Vlm = None,
+    base_url: BaseUrl = None,
+    effort: Efforts = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with what the folder holds.")
+    ] = False,
+    estimate: Annotated[
+        bool, typer.Option("--estimate", help="Only say what asking a model will about cost.")
     ] = False,
     force: Force = False,
     as_json: Json = False,
@@ -138,10 +152,19 @@ def generate(
     from joda import generate as run
     from joda import generate_all as run_all
 
-    options: dict[str, Any] = {
+    asked: dict[str, Any] = {
         "proposer": proposer, "rounds": rounds, "describe": describe, "templates": templates or (),
-        "key": key, "vlm": vlm, "resume": resume, "force": force,
+        "vlm": vlm, "base_url": base_url, "effort": effort,
     }  # fmt: skip
+    if estimate or not (as_json or resume):
+        from joda._estimate import estimate as cost
+
+        expected = cost(model, joint, output, **asked)
+        if estimate or expected:
+            tell_estimate(expected, as_json)
+        if estimate:
+            return
+    options = {**asked, "key": key, "resume": resume, "force": force}
     if model.is_dir():
         with progress_bar() as bar:
             done = run_all(model, output, joint=joint, progress=bar, **options)
@@ -168,9 +191,11 @@ def revise(
         str, typer.Option(help="What is wrong or wanted, in words.", show_default=False)
     ],
     proposer: Annotated[
-        str | None, typer.Option(help="anthropic or offline [default: as for generate].")
+        str | None, typer.Option(help="anthropic, openai or offline [default: as for generate].")
     ] = None,
     vlm: Vlm = None,
+    base_url: BaseUrl = None,
+    effort: Efforts = None,
     force: Annotated[
         bool, typer.Option("--force", help="Although composed.json was edited by hand since.")
     ] = False,
@@ -185,7 +210,10 @@ def revise(
     from joda import revise as run
 
     with spinner("revise") as progress:
-        result = run(folder, feedback, proposer=proposer, vlm=vlm, force=force, progress=progress)
+        result = run(
+            folder, feedback, proposer=proposer, vlm=vlm, base_url=base_url, effort=effort,
+            force=force, progress=progress,
+        )  # fmt: skip
     if as_json:
         last = result.history.rounds[-1].model_dump(mode="json")
         print_json({"changes": result.changes, "picture": str(result.picture), "round": last})

@@ -1,4 +1,4 @@
-"""The command that does others for many joints at once."""
+"""Commands that do others for many joints."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -6,10 +6,23 @@ from typing import Annotated, Literal
 
 import typer
 
-from joda.cli.options import Folder, Force, Json, Passive
+from joda.cli.options import (
+    BaseUrl,
+    Efforts,
+    Folder,
+    Force,
+    Json,
+    Key,
+    Passive,
+    Proposer,
+    Rounds,
+    Templates,
+    Vlm,
+)
 from joda.cli.progress import progress_bar
 from joda.cli.say import say
-from joda.cli.tell import print_json
+from joda.cli.tell import evaluation_as_json, print_json, tell_evaluation
+from joda.errors import JodaError
 
 
 def distribute(
@@ -70,3 +83,53 @@ def distribute(
         say(f"{one.label}: {state}{one.told}")
     failed = sum(one.failed for one in done)
     say(f"{len(done) - failed} of {len(done)} done; {output}")
+
+
+def evaluate(
+    what: Annotated[
+        Literal["proposer"], typer.Argument(help="What to evaluate.", show_default=False)
+    ],
+    models: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder of models, beside each its MODEL.expected.json.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder to fill [default: joda_evaluation]."),
+    ] = None,
+    proposer: Proposer = None,
+    rounds: Rounds = 3,
+    templates: Templates = None,
+    key: Key = "",
+    vlm: Vlm = None,
+    base_url: BaseUrl = None,
+    effort: Efforts = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what the folder holds.")
+    ] = False,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Count what a proposer gets right, and its cost.
+
+    Example:
+
+        joda evaluate proposer out --proposer offline -o evaluated
+    """
+    from joda import evaluate as run
+
+    with progress_bar() as bar:
+        result = run(
+            what, models, output, proposer=proposer, rounds=rounds, templates=templates or (),
+            key=key, vlm=vlm, base_url=base_url, effort=effort, resume=resume, force=force,
+            progress=bar,
+        )  # fmt: skip
+    if as_json:
+        print_json(evaluation_as_json(result))
+    else:
+        tell_evaluation(result)
+    failed = sum(bool(one.failed) for one in result.joints)
+    if failed:
+        raise JodaError(f"{failed} of {len(result.joints)} joints have no whole answer; see above.")

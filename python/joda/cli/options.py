@@ -1,7 +1,7 @@
 """Arguments and options that several commands have."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -30,5 +30,25 @@ Key = Annotated[
     str, typer.Option("--key", help="Another key draws other numbers for the same words.")
 ]
 Vlm = Annotated[
-    str | None, typer.Option(help="The model that anthropic asks [default: $JODA_VLM].")
+    str | None,
+    typer.Option(help="The model that anthropic or openai asks [default: $JODA_VLM, or a Claude]."),
 ]
+BaseUrl = Annotated[
+    str | None,
+    typer.Option(
+        help="Address of the server that is asked, as http://127.0.0.1:8000/v1 [default: "
+        "$OPENAI_BASE_URL, $ANTHROPIC_BASE_URL, or the service's own]."
+    ),
+]
+Efforts = Annotated[
+    Literal["low", "medium", "high", "xhigh", "max"] | None,
+    typer.Option("--effort", help="How much the model puts in [default: as it does by itself]."),
+]
+Proposer = Annotated[
+    str | None,
+    typer.Option(
+        help="anthropic, openai, offline or a proposal.json [default: anthropic where "
+        "ANTHROPIC_API_KEY is set, else offline]."
+    ),
+]
+Rounds = Annotated[int, typer.Option(min=1, help="At most so many proposals.")]

@@ -43,7 +43,8 @@ def templates(
 
 def schema(
     file: Annotated[
-        Literal["composed", "proposal", "template", "archetype"], typer.Argument(help="Which file.")
+        Literal["composed", "proposal", "template", "archetype", "expected"],
+        typer.Argument(help="Which file."),
     ] = "composed",
 ) -> None:
     """Print the JSON Schema of a file format.

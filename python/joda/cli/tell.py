@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 from joda.cli.say import say
 from joda.errors import JodaError
-from joda.plain import plain
+from joda.plain import line, plain
 
 if TYPE_CHECKING:
     from joda._bench import Row
     from joda._demo import Demo
     from joda._doctor import Check
+    from joda._estimate import Estimate
+    from joda._evaluate import Evaluation
     from joda._generate import Generated
     from joda._refine import Refined
     from joda.cases.gallery import Shown
@@ -95,6 +97,33 @@ def tell_cost(usage: "Usage") -> None:
         )
 
 
+def tell_estimate(estimated: "Estimate | None", as_json: bool) -> None:
+    """What a generation will about cost."""
+    if as_json:
+        print_json(estimated and estimated.model_dump(mode="json"))
+        return
+    if estimated is None:
+        say("Nobody would be asked who costs anything.")
+        return
+    least, most = estimated.least, estimated.most
+    dollars = (
+        "price unknown (JODA_VLM_PRICE sets it)"
+        if least.dollars is None or most.dollars is None
+        else f"{_span(least.dollars, most.dollars, '.2g')} dollars"
+    )
+    say(
+        f"Estimate, joints: {estimated.joints}, with {estimated.proposer}: "
+        f"{_span(least.requests, most.requests)} requests, "
+        f"{_span(least.input_tokens, most.input_tokens)} tokens in, "
+        f"{_span(least.output_tokens, most.output_tokens)} out, {dollars}."
+    )
+
+
+def _span(low: float, high: float, form: str = "d") -> str:
+    ends = f"{low:{form}}", f"{high:{form}}"
+    return " to ".join(dict.fromkeys(ends))
+
+
 def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None:
     """A line per joint; raises JodaError if some gave nothing."""
     from joda.propose import total
@@ -124,6 +153,48 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None
         tell_cost(total(result.history.usage for result in made.values()))
     if failed:
         raise JodaError(f"{len(failed)} of {len(done)} have no profile; see above.")
+
+
+def evaluation_as_json(result: "Evaluation") -> dict[str, Any]:
+    """What `joda evaluate --json` prints."""
+    told: dict[str, Any] = result.model_dump(mode="json")
+    for row, one in zip(told["joints"], result.joints, strict=True):
+        row |= {"met": one.met, "of": len(one.behaviours)}
+    usage = result.usage.model_dump(mode="json")
+    return {
+        **told, "met": result.met, "of": result.of, "usage": usage,
+        "seconds": round(result.seconds, 3),
+    }  # fmt: skip
+
+
+def tell_evaluation(result: "Evaluation") -> None:
+    """The table of `joda evaluate`; below it what was not met."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    heads = "joint", "met", "rounds", "tokens in", "out", "dollars", "seconds"
+    table = Table(box=None, pad_edge=False)
+    for k, head in enumerate(heads):
+        table.add_column(head, justify="right" if k else "left")
+    rows = [
+        (one.label, one.met, len(one.behaviours), one.rounds, one.usage, one.seconds)
+        for one in result.joints
+    ]
+    rounds = sum(one.rounds for one in result.joints)
+    whole = f"{result.proposer}, {len(rows)} joints"
+    rows.append((whole, result.met, result.of, rounds, result.usage, result.seconds))
+    for label, met, of, count, usage, seconds in rows:
+        dollars = "?" if usage.dollars is None else f"{usage.dollars:.3f}"
+        tokens = map(str, (usage.input_tokens, usage.output_tokens))
+        paid = (*tokens, dollars) if usage.requests else ("-", "-", "-")
+        counts = f"{met} of {of}", str(count), *paid, f"{seconds:.1f}"
+        table.add_row(Text(line(label)), *counts)
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    for one in result.joints:
+        lacking = [one.failed] if one.failed else [t for t in one.behaviours.values() if t]
+        for sentence in lacking:
+            say(f"{one.label}: {sentence}")
 
 
 def tell_doors(result: "Demo") -> None:

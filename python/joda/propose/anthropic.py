@@ -1,71 +1,64 @@
 """Asks a Claude model for proposals, one at a time or many in one Message Batch.
 
-Everything that was paid for is accounted for: an answer carries its usage, and so does the failure
-to get one. The package `anthropic` is imported when it is first needed.
+The package `anthropic` is imported when it is first needed.
 """
 
 import hashlib
 import json
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from joda.errors import JodaError
-from joda.profile import Profile
-from joda.proposal import Proposal
-from joda.propose import Answer, Ask, Task, Turn, Usage, replies
-from joda.propose import prompt as prompts
-from joda.propose.batch import HALF, Batches, Request, why
-from joda.propose.price import Tally, price
-from joda.propose.service import Credentials, host, usable
-from joda.template import Template
+from joda.propose import Answer, Ask, Usage, replies
+from joda.propose.asking import (
+    MAX_RETRIES,
+    Effort,
+    ProposalFailed,
+    ProposalInterrupted,
+    Reply,
+    Request,
+    Send,
+    VisionModel,
+    chosen,
+    converse,
+    refused,
+)
+from joda.propose.batch import HALF, Batches, why
+from joda.propose.price import Tally, Tokens
+from joda.propose.service import Credentials, counted, host
 
 if TYPE_CHECKING:
     from anthropic import Anthropic as Client
     from anthropic import APIError
     from anthropic.types import Message
 
-T = TypeVar("T")
-
 DEFAULT_MODEL = "claude-opus-5-5"
-MAX_RETRIES = 4
 
 
-class ProposalFailed(JodaError):
-    """No usable answer was to be had.
-
-    Attributes:
-        usage: what it cost all the same.
-    """
-
-    def __init__(self, sentence: str, usage: Usage) -> None:
-        """Takes the sentence for the user and the usage."""
-        super().__init__(sentence)
-        self.usage = usage
-
-
-class ProposalInterrupted(KeyboardInterrupt):
-    """The user did not wait for the answer.
+@dataclass(frozen=True)
+class Abilities:
+    """What a model can do, as far as the service says so.
 
     Attributes:
-        usage: what it had cost until then.
+        thinks: whether it decides by itself how much to think (adaptive thinking).
+        efforts: which it takes; None: not said.
     """
 
-    def __init__(self, usage: Usage) -> None:
-        """Takes the usage."""
-        super().__init__()
-        self.usage = usage
+    thinks: bool = False
+    efforts: tuple[str, ...] | None = None
 
 
-class Anthropic:
+class Anthropic(VisionModel):
     """Proposes by asking a Claude model.
 
     Args:
         model: its name; by default the environment's JODA_VLM, or DEFAULT_MODEL.
         base_url: another address of the service; by default ANTHROPIC_BASE_URL, or Anthropic's.
+        effort: how much to put into an answer; by default the model's own, which is "high".
         timeout: of one request, in seconds.
 
     Raises:
@@ -74,8 +67,15 @@ class Anthropic:
             be read.
     """
 
+    service = "anthropic"
+
     def __init__(
-        self, model: str | None = None, base_url: str | None = None, *, timeout: float = 600.0
+        self,
+        model: str | None = None,
+        base_url: str | None = None,
+        *,
+        effort: Effort | None = None,
+        timeout: float = 600.0,
     ) -> None:
         """Checks what can be checked without asking."""
         try:
@@ -84,38 +84,22 @@ class Anthropic:
             raise JodaError(
                 'asking a Claude model needs the package anthropic: pip install ".[vlm]".'
             ) from None
-        self._credentials = Credentials(base_url)
-        self.model = model or os.environ.get("JODA_VLM") or DEFAULT_MODEL
-        self.name = f"anthropic:{self.model}"
-        self._base_url, self._timeout = base_url, timeout
-        self._price = price(self.model)
-
-    def propose(self, task: Task, turns: Sequence[Turn]) -> Answer:
-        """The next proposal, see `joda.propose.Proposer`.
-
-        Raises:
-            ProposalFailed: no usable answer was to be had; it carries the usage.
-            ProposalInterrupted: a KeyboardInterrupt that carries it.
-        """
-        tally = Tally(self._price)
-        asked = self._request(task, turns)
-        with self._client() as client:
-            proposal = self._converse(client, tally, asked, lambda t: replies.parse(t, task, turns))
-        return Answer(proposal, tally.usage, tally.notes)
-
-    def ablate(self, task: Task) -> tuple[Profile, Usage]:
-        """A profile as the model draws it without templates: the paper's ablation.
-
-        Raises:
-            ProposalFailed: as `propose`.
-        """
-        tally = Tally(self._price)
-        asked = {"model": self.model, **prompts.ablation(task)}
-        with self._client() as client:
-            profile = self._converse(
-                client, tally, asked, lambda t: replies.parse_ablation(t, task)
+        self._credentials = Credentials("ANTHROPIC", base_url)
+        if not self._credentials.key:
+            raise JodaError(
+                "ANTHROPIC_API_KEY is not set; set it to a key from platform.claude.com, or choose "
+                "the proposer 'offline'."
             )
-        return profile, tally.usage
+        super().__init__(chosen(model, DEFAULT_MODEL))
+        self._effort, self._timeout = effort, timeout
+        self._abilities: Abilities | None = None
+
+    @contextmanager
+    def sending(self) -> Iterator[Send]:
+        """See `VisionModel`."""
+        with self._client() as client:
+            extra = self._extra(client)
+            yield lambda asked, tally: self._reply(self._send(client, tally, _with(asked, extra)))
 
     def propose_many(
         self,
@@ -137,15 +121,16 @@ class Anthropic:
         if len({ask.name for ask in asks}) < len(asks):
             raise JodaError("two asks of a batch have the same name; give each its own.")
         wanted: dict[str, tuple[Ask, Request]] = {}
-        for ask in asks:
-            try:
-                asked = self._request(ask.task, ask.turns)
-            except JodaError as error:
-                yield ask.name, error
-                continue
-            wanted[_key(ask.name, asked)] = ask, asked
-        requests = {key: asked for key, (_, asked) in wanted.items()}
         with self._client() as client:
+            for ask in asks:
+                try:
+                    asked = self.request(ask.task, ask.turns, lasting=True)
+                except JodaError as error:
+                    yield ask.name, error
+                    continue
+                asked = _with(asked, self._extra(client))
+                wanted[_key(ask.name, asked)] = ask, asked
+            requests = {key: asked for key, (_, asked) in wanted.items()}
             batches = Batches(client, store, lambda e: self._sentence(e, client), progress, sleep)
             for key, result in batches.results(requests):
                 ask, asked = wanted.pop(key)
@@ -153,107 +138,93 @@ class Anthropic:
         for ask, _ in wanted.values():
             yield ask.name, JodaError("the batch came back without a result for this; ask again.")
 
-    def _request(self, task: Task, turns: Sequence[Turn]) -> Request:
-        sheet = _sheet(tuple(template.model_dump_json() for template in task.templates.values()))
-        return {"model": self.model, **prompts.request(task, turns, sheet)}
-
     def _client(self) -> "Client":
         from anthropic import Anthropic as Client
 
         return Client(
             api_key=self._credentials.key,
-            base_url=self._base_url,
+            base_url=self._credentials.base_url,
             max_retries=MAX_RETRIES,
             timeout=self._timeout,
         )
 
-    def _converse(
-        self,
-        client: "Client",
-        tally: Tally,
-        asked: Request,
-        parse: Callable[[str], T],
-        message: "Message | None" = None,
-    ) -> T:
-        """What `parse` makes of the answer: asked again once if cut off, and once if invalid.
+    def _extra(self, client: "Client") -> Request:
+        """What a request has besides its words: how much the model is to think."""
+        if self._abilities is None:
+            self._abilities = self._look_up(client)
+        takes = self._abilities.efforts
+        if self._effort and takes is not None and self._effort not in takes:
+            instead = f"it takes {', '.join(takes)}" if takes else "leave --effort out"
+            raise JodaError(f"{self.model} takes no effort '{self._effort}'; {instead}.")
+        thinking = {"thinking": {"type": "adaptive"}} if self._abilities.thinks else {}
+        return {**thinking, **({"output_config": {"effort": self._effort}} if self._effort else {})}
 
-        Args:
-            client: to ask with.
-            tally: pays for what is asked here.
-            asked: the request.
-            parse: raises JodaError on an invalid answer.
-            message: the first answer, where there is one already.
-        """
-        grown = repaired = False
-        while True:
-            if message is None:
-                message = self._send(client, tally, asked)
-                tally.pay(message)
-            said = "".join(block.text for block in message.content if block.type == "text")
-            text = self._credentials.hide(said)
-            if message.stop_reason == "refusal":
-                raise ProposalFailed(
-                    f"{self.model} declined to answer; describe the joint in other words, or "
-                    "choose another model with JODA_VLM.",
-                    tally.usage,
-                )
-            if message.stop_reason in ("max_tokens", "model_context_window_exceeded"):
-                if grown:
-                    raise ProposalFailed(
-                        f"the answer of {self.model} was cut off after {asked['max_tokens']} "
-                        "tokens; choose another model with JODA_VLM.",
-                        tally.usage,
-                    )
-                grown, asked = True, {**asked, "max_tokens": 2 * asked["max_tokens"]}
-                tally.notes.append("The answer was cut off, and asked for again with more room.")
-            else:
-                try:
-                    return parse(text)
-                except JodaError as error:
-                    if repaired:
-                        raise ProposalFailed(
-                            f"{self.model} gave no valid proposal, not even when told what is "
-                            f"wrong: {error}",
-                            tally.usage,
-                        ) from None
-                    repaired, asked = True, prompts.repair(asked, text, str(error))
-                    tally.notes.append(f"The answer was invalid, and asked for again: {error}")
-            message = None
+    def _look_up(self, client: "Client") -> Abilities:
+        """What the model can do; nothing is assumed where the service does not know it."""
+        from anthropic import APIError, APIStatusError
+
+        try:
+            return _abilities(client.models.retrieve(self.model))
+        except APIStatusError as error:
+            if error.status_code in (401, 429) or error.status_code >= 500:
+                raise ProposalFailed(self._sentence(error, client), Usage()) from None
+        except APIError as error:
+            raise ProposalFailed(self._sentence(error, client), Usage()) from None
+        except (ValueError, RecursionError):  # JSON that is cut off, or brackets too deep
+            pass
+        return Abilities()
 
     def _send(self, client: "Client", tally: Tally, asked: Request) -> "Message":
         from anthropic import APIError
 
+        def count(request: Any, send: Callable[[Any], Any]) -> Any:
+            tally.sent()
+            return send(request)
+
         message: Message | None
         try:
-            counted = client.with_options(middleware=[tally.sent])
-            message = counted.messages.create(**asked)
+            message = client.with_options(middleware=[count]).messages.create(**asked)
         except APIError as error:
             raise ProposalFailed(self._sentence(error, client), tally.usage) from None
         except KeyboardInterrupt:
             raise ProposalInterrupted(tally.usage) from None
-        except ValueError:  # JSON that is cut off
+        except (ValueError, RecursionError):  # JSON that is cut off, or brackets too deep
             message = None
-        if not usable(message):  # a web page, say
+        if not _usable(message):  # a web page, say
             told = "does not answer as the Messages API does; check ANTHROPIC_BASE_URL."
             raise ProposalFailed(f"{host(client)} {told}", tally.usage)
+        tally.pay(_tokens(message))
         return message
+
+    def _reply(self, message: "Message") -> Reply:
+        said = "".join(block.text for block in message.content if block.type == "text")
+        text = self._credentials.hide(said)
+        if message.stop_reason == "refusal":
+            details = getattr(message, "stop_details", None)
+            why = getattr(details, "explanation", None) or getattr(details, "category", None)
+            return Reply(text, "declined", self._credentials.hide(str(why or "")))
+        cut = message.stop_reason in ("max_tokens", "model_context_window_exceeded")
+        return Reply(text, "cut" if cut else "whole")
 
     def _collect(
         self, client: "Client", ask: Ask, asked: Request, result: Any
     ) -> Answer | ProposalFailed:
         """The answer in a batch's result; an invalid one is repaired outside of the batch."""
-        tally = Tally(self._price, Usage(requests=1))
+        tally = Tally(self.price, Usage(requests=1))
         if result.type != "succeeded":
             return ProposalFailed(self._credentials.hide(why(result)), tally.usage)
-        if not usable(result.message):
+        if not _usable(result.message):
             return ProposalFailed("the service's answer is no message; ask again.", tally.usage)
-        tally.pay(result.message, HALF)
-
-        def parse(text: str) -> Proposal | None:
-            return replies.parse(text, ask.task, ask.turns)
-
+        tally.pay(_tokens(result.message), HALF)
         try:
-            proposal = self._converse(client, tally, asked, parse, result.message)
+            proposal = converse(
+                self.model,
+                lambda asked, tally: self._reply(self._send(client, tally, asked)),
+                asked,
+                tally,
+                lambda text: replies.parse(text, ask.task, ask.turns),
+                self._reply(result.message),
+            )
         except ProposalFailed as error:
             return error
         return Answer(proposal, tally.usage, tally.notes)
@@ -266,31 +237,60 @@ class Anthropic:
             return f"{host(client)} does not answer within {self._timeout:g} s; try again later."
         if not isinstance(error, anthropic.APIStatusError):
             return f"{host(client)} cannot be reached; check network and ANTHROPIC_BASE_URL."
-        reason = self._credentials.hide(str(error.api_message or "no reason given")).rstrip(".")
-        detail = f"{error.status_code}: {reason}"
+        reason = self._credentials.hide(str(error.api_message or ""))
         advice = {
             401: "set ANTHROPIC_API_KEY to a valid key",
-            402: "see to the account's credit",
-            403: "use another key, or choose another model with JODA_VLM",
-            404: f"choose another model than '{self.model}' with JODA_VLM",
-            413: "give fewer or smaller pictures",
             429: "wait a while, or ask in a batch",
         }
-        other = "try again later" if error.status_code >= 500 else "choose another with JODA_VLM"
-        return (
-            f"the service refuses to answer for {self.model} ({detail}); "
-            f"{advice.get(error.status_code, other)}."
-        )
+        return refused(self.model, error.status_code, reason, advice)
 
 
-@cache
-def _sheet(templates: tuple[str, ...]) -> bytes:
-    """PNG file of templates, each given as JSON."""
-    from joda.pictures.sheet import sheet
-    from joda.pictures.style import png
+def _with(asked: Request, extra: Request) -> Request:
+    """A request and what it has besides its words."""
+    config = {**asked["output_config"], **extra.get("output_config", {})}
+    return {**asked, **extra, "output_config": config}
 
-    read = [Template.model_validate_json(text) for text in templates]
-    return png(sheet({template.name: template for template in read}))
+
+def _abilities(found: Any) -> Abilities:
+    """What the service says of a model, which it may not."""
+    said = getattr(found, "capabilities", None)
+    efforts = getattr(said, "effort", None)
+    known = [name for name in ("low", "medium", "high", "xhigh", "max") if _has(efforts, name)]
+    types = getattr(getattr(said, "thinking", None), "types", None)
+    return Abilities(_has(types, "adaptive"), None if efforts is None else tuple(known))
+
+
+def _has(said: Any, name: str) -> bool:
+    return getattr(getattr(said, name, None), "supported", None) is True
+
+
+def _tokens(message: "Message") -> Tokens:
+    used = message.usage
+    write = used.cache_creation_input_tokens or 0
+    hour = getattr(used.cache_creation, "ephemeral_1h_input_tokens", None) or 0
+    read = used.cache_read_input_tokens or 0
+    return Tokens(used.input_tokens, used.output_tokens, read, write - hour, hour)
+
+
+def _usable(message: Any) -> "TypeGuard[Message]":
+    """Whether an answer is a message with texts and sensible counts of tokens."""
+    used, content = getattr(message, "usage", None), getattr(message, "content", None)
+    counts = [getattr(used, name, None) for name in ("input_tokens", "output_tokens")]
+    read, write = (
+        getattr(used, f"cache_{name}_input_tokens", None) or 0 for name in ("read", "creation")
+    )
+    kept = getattr(used, "cache_creation", None)
+    hour = getattr(kept, "ephemeral_1h_input_tokens", None) or 0
+    return (
+        counted(*counts, read, write, hour)
+        and hour <= write
+        and isinstance(content, list)
+        and all(isinstance(part.text, str) for part in content if _kind(part) == "text")
+    )
+
+
+def _kind(part: Any) -> str | None:
+    return getattr(part, "type", None)
 
 
 def _key(name: str, asked: Request) -> str:

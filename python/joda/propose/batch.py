@@ -16,12 +16,11 @@ from joda.component import Frozen
 from joda.errors import JodaError
 from joda.files import write_text
 from joda.profile import File
+from joda.propose.asking import Request
 
 if TYPE_CHECKING:
     from anthropic import Anthropic as Client
     from anthropic import APIError
-
-Request = dict[str, Any]
 
 HALF = 0.5
 """Of the price."""

@@ -5,15 +5,12 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 from joda.errors import JodaError
 from joda.propose import Usage
-
-if TYPE_CHECKING:
-    from anthropic.types import Message
 
 Price = tuple[float, float, float]
 
@@ -35,13 +32,31 @@ PRICES: dict[str, Price] = {
     "claude-haiku-4-5": (1, 5, 0.1),
 }
 """Dollars per million tokens: input, output, cache read (platform.claude.com, November 2026)."""
-CACHE_READ, CACHE_WRITE = 0.1, 1.25
-"""Multiples of the price; CACHE_READ where JODA_VLM_PRICE does not say."""
+CACHE_READ, CACHE_WRITE, CACHE_HOUR = 0.1, 1.25, 2.0
+"""Multiples of the price: to read from the cache (where JODA_VLM_PRICE is given, which does not
+say), to write into it for 5 minutes, and for an hour."""
 
 TOKEN_PIXELS = 28
 TOKEN_AREA = 750
 CHARACTERS = 3.2
 """Per token of text, rather too few than too many."""
+
+
+class Tokens(NamedTuple):
+    """What an answer took.
+
+    Attributes:
+        fresh: input that no cache had to do with.
+        output: reasoning included.
+        read: input from the cache.
+        write, write_hour: input written into it for 5 minutes, and for an hour.
+    """
+
+    fresh: int
+    output: int
+    read: int = 0
+    write: int = 0
+    write_hour: int = 0
 
 
 @dataclass
@@ -56,24 +71,27 @@ class Tally:
         """Begins at no dollars where the price is known."""
         self._grow(dollars=0.0 if self.price else None)
 
-    def sent(self, request: Any, send: Callable[[Any], Any]) -> Any:
-        """Middleware of the client: counts what is sent, retries too."""
+    def sent(self) -> None:
+        """Counts a request, retries too."""
         self._grow(requests=self.usage.requests + 1)
-        return send(request)
 
-    def pay(self, message: "Message", factor: float = 1.0) -> None:
-        """Adds a message's tokens, at `factor` times the price."""
-        spent, before = message.usage, self.usage
-        read, write = spent.cache_read_input_tokens or 0, spent.cache_creation_input_tokens or 0
+    def pay(self, spent: Tokens | None, factor: float = 1.0) -> None:
+        """Adds an answer's tokens, at `factor` times the price; None: nobody knows how many."""
+        if spent is None:
+            self.price = None
+            self._grow(dollars=None)
+            return
+        before = self.usage
         if self.price:
             into, out, cached = self.price
-            fresh = spent.input_tokens * into + spent.output_tokens * out
-            dollars = factor * (fresh + write * into * CACHE_WRITE + read * cached) / 1e6
-            self._grow(dollars=(before.dollars or 0.0) + dollars)
+            written = spent.write * CACHE_WRITE + spent.write_hour * CACHE_HOUR
+            dollars = (spent.fresh + written) * into + spent.output * out + spent.read * cached
+            self._grow(dollars=(before.dollars or 0.0) + factor * dollars / 1e6)
+        write = spent.write + spent.write_hour
         self._grow(
-            input_tokens=before.input_tokens + spent.input_tokens + read + write,
-            output_tokens=before.output_tokens + spent.output_tokens,
-            cache_read_tokens=before.cache_read_tokens + read,
+            input_tokens=before.input_tokens + spent.fresh + spent.read + write,
+            output_tokens=before.output_tokens + spent.output,
+            cache_read_tokens=before.cache_read_tokens + spent.read,
             cache_write_tokens=before.cache_write_tokens + write,
         )
 

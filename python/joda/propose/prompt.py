@@ -33,15 +33,22 @@ JOINT, JOINTS = (704, 528), 5  # more pictures than JOINTS share their area
 
 Block = dict[str, Any]
 CACHED: Block = {"cache_control": {"type": "ephemeral"}}
+CACHED_LONG: Block = {"cache_control": {"type": "ephemeral", "ttl": "1h"}}
+"""The longest that the service offers."""
 
 
-def request(task: Task, turns: Sequence[Turn], sheet: bytes | None = None) -> dict[str, Any]:
+def request(
+    task: Task, turns: Sequence[Turn], sheet: bytes | None = None, *, lasting: bool = False
+) -> dict[str, Any]:
     """A request for the next proposal, but for the model's name.
 
     Args:
         task: the joint.
         turns: the rounds so far, oldest first.
         sheet: PNG file of the templates' previews.
+        lasting: it is for a batch, which may take hours: what all joints share is cached for
+            longest; what only the next round of the same joint reads again is not, as that comes
+            too late.
 
     Returns:
         keyword arguments of `client.messages.create`.
@@ -49,23 +56,24 @@ def request(task: Task, turns: Sequence[Turn], sheet: bytes | None = None) -> di
     Raises:
         JodaError: a picture cannot be read.
     """
+    shared, own = (CACHED_LONG, {}) if lasting else (CACHED, CACHED)
     first: list[Block] = []
     if sheet is not None:
-        first += [_text("The effect templates:"), _image(sheet, SHEET) | CACHED]
-    first += _joint(task, references=True)
+        first += [_text("The effect templates:"), _image(sheet, SHEET) | shared]
+    first += _joint(task, own, references=True)
     messages: list[Block] = [{"role": "user", "content": first}]
     for number, turn in enumerate(turns, 1):
         envelope = {"status": "revised", "proposal": turn.proposal.model_dump(mode="json")}
         reply = json.dumps(envelope, ensure_ascii=False, separators=(",", ":"))
         messages.append({"role": "assistant", "content": [_text(reply)]})
         newest = number == len(turns)
-        content = [_text(_round(number, turn)) | (CACHED if newest else {})]
+        content = [_text(_round(number, turn)) | (own if newest else {})]
         if newest:  # the picture last: what precedes it is the next round's prefix
             content.append(_image(turn.picture, PROFILE))
         messages.append({"role": "user", "content": content})
     return {
         "max_tokens": MAX_TOKENS,
-        "system": [_text(system(task.templates)) | CACHED],
+        "system": [_text(system(task.templates)) | shared],
         "messages": messages,
         "output_config": {"format": {"type": "json_schema", "schema": schema(task.templates)}},
     }
@@ -82,7 +90,7 @@ def ablation(task: Task) -> dict[str, Any]:
     return {
         "max_tokens": MAX_TOKENS,
         "system": [_text(_read("ablation")) | CACHED],
-        "messages": [{"role": "user", "content": _joint(task, references=False)}],
+        "messages": [{"role": "user", "content": _joint(task, CACHED, references=False)}],
         "output_config": {"format": {"type": "json_schema", "schema": curves}},
     }
 
@@ -117,8 +125,8 @@ def system(templates: Mapping[str, Template]) -> str:
     )
 
 
-def _joint(task: Task, references: bool) -> list[Block]:
-    """The pictures of the joint, and last, cached, what is known and wished of it."""
+def _joint(task: Task, cached: Block, references: bool) -> list[Block]:
+    """The pictures of the joint, and last, `cached`, what is known and wished of it."""
     share = math.sqrt(JOINTS / max(JOINTS, len(task.pictures)))
     room = (int(JOINT[0] * share), int(JOINT[1] * share))
     pictures = [_image(picture, room) for picture in task.pictures]
@@ -127,13 +135,13 @@ def _joint(task: Task, references: bool) -> list[Block]:
         lines.append(_references(task.context))
     lines += ["", "# The user's wish", "", task.description.strip() or "(none)"]
     head = [_text("The joint, from its low to its high end:")] if pictures else []
-    return [*head, *pictures, _text("\n".join(lines)) | CACHED]
+    return [*head, *pictures, _text("\n".join(lines)) | cached]
 
 
 def _gravity(context: Context) -> str:
     """Gravity along the range, where it acts."""
     if context.gravity_scale == 0:
-        return "gravity at s:  none anywhere"
+        return "gravity at s: none anywhere"
     last = len(context.positions) - 1
     picked = [round(k * last / 4) for k in range(5)]
     return "gravity at s: " + ", ".join(
@@ -149,7 +157,7 @@ def _references(context: Context) -> str:
         for scale in scales
     )
     other = f", or {without} if gravity_can_be_ignored" if without != with_gravity else ""
-    return f"reference:   {with_gravity}{other}"
+    return f"reference:    {with_gravity}{other}"
 
 
 def _round(number: int, turn: Turn) -> str:

@@ -1,15 +1,11 @@
-"""The service that is asked: its key and address, what it answers, and what is never told of it."""
+"""The services that are asked: keys and addresses, and what is never told of them."""
 
 import os
 import re
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any
 from urllib.parse import urlsplit
 
 from joda.errors import JodaError
-
-if TYPE_CHECKING:
-    from anthropic import Anthropic as Client
-    from anthropic.types import Message
 
 SHORTEST_SECRET = 6
 """Letters; less is no secret but a word."""
@@ -18,38 +14,34 @@ MOST_TOKENS = 10**9
 
 
 class Credentials:
-    """What proves who asks.
+    """What proves who asks; all of it is from the environment.
 
     Attributes:
-        key: of the service.
+        key: of the service; empty where there is none.
+        base_url: its address; None: the service's own.
     """
 
-    def __init__(self, base_url: str | None) -> None:
+    def __init__(self, service: str, base_url: str | None) -> None:
         """Reads the environment.
 
         Args:
-            base_url: the service's address; None: ANTHROPIC_BASE_URL, or the usual one.
+            service: "ANTHROPIC" or "OPENAI", as the variables' names begin.
+            base_url: its address; None: the environment's, or the service's own.
 
         Raises:
-            JodaError: ANTHROPIC_API_KEY is missing or no key, or the address holds a password.
+            JodaError: the key is no key, or the address cannot be used.
         """
-        self.key = os.environ.get("ANTHROPIC_API_KEY", "").strip()
-        if not self.key:
-            raise JodaError(
-                "ANTHROPIC_API_KEY is not set; set it to a key from platform.claude.com, or choose "
-                "the proposer 'offline'."
-            )
-        if not re.fullmatch("[!-~]+", self.key):
-            raise JodaError("ANTHROPIC_API_KEY holds characters that no key has; set it anew.")
-        if "@" in urlsplit(base_url or os.environ.get("ANTHROPIC_BASE_URL", "")).netloc:
-            raise JodaError(
-                "ANTHROPIC_BASE_URL holds a user name or a password, which logs would show; give "
-                "them in ANTHROPIC_CUSTOM_HEADERS, as Authorization: Basic ..."
-            )
-        headers = os.environ.get("ANTHROPIC_CUSTOM_HEADERS", "").splitlines()
+        self.key = os.environ.get(f"{service}_API_KEY", "").strip()
+        if not re.fullmatch("[!-~]*", self.key):
+            raise JodaError(f"{service}_API_KEY holds characters that no key has; set it anew.")
+        self.base_url = base_url or os.environ.get(f"{service}_BASE_URL", "").strip() or None
+        if self.base_url:
+            _check_address(self.base_url, service)
+        headers = os.environ.get(f"{service}_CUSTOM_HEADERS", "").splitlines()
         values = [header.partition(":")[2].strip() for header in headers]
         values += [value.split()[-1] for value in values if value]  # without "Bearer"
-        sent = {self.key, os.environ.get("ANTHROPIC_AUTH_TOKEN", ""), *values}
+        others = (os.environ.get(f"{service}_{name}", "") for name in ("AUTH_TOKEN", "ADMIN_KEY"))
+        sent = {self.key, *others, *values}
         self._secrets = sorted((s for s in sent if len(s) >= SHORTEST_SECRET), key=len)[::-1]
 
     def hide(self, said: str) -> str:
@@ -59,23 +51,28 @@ class Credentials:
         return said
 
 
-def host(client: "Client") -> str:
-    """The service's address, without what a path or a query may hold."""
+def host(client: Any) -> str:
+    """The address of an SDK's client, without what a path or a query may hold."""
     return f"{client.base_url.scheme}://{client.base_url.netloc.decode()}"
 
 
-def usable(message: Any) -> "TypeGuard[Message]":
-    """Whether an answer is a message with texts and sensible counts of tokens."""
-    usage, content = getattr(message, "usage", None), getattr(message, "content", None)
-    counts = [getattr(usage, name, None) for name in ("input_tokens", "output_tokens")]
-    for name in ("cache_read_input_tokens", "cache_creation_input_tokens"):
-        counts.append(getattr(usage, name, None) or 0)
-    return (
-        all(isinstance(count, int) and 0 <= count <= MOST_TOKENS for count in counts)
-        and isinstance(content, list)
-        and all(isinstance(part.text, str) for part in content if _kind(part) == "text")
-    )
+def counted(*counts: Any) -> bool:
+    """Whether all are sensible counts of tokens."""
+    return all(type(count) is int and 0 <= count <= MOST_TOKENS for count in counts)
 
 
-def _kind(part: Any) -> str | None:
-    return getattr(part, "type", None)
+def _check_address(url: str, service: str) -> None:
+    try:
+        parts = urlsplit(url)
+        usable = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+    except ValueError:
+        usable = False
+    if usable and "@" in parts.netloc:
+        raise JodaError(
+            "the service's address holds a user name or a password, which logs would show; give "
+            f"them in {service}_CUSTOM_HEADERS, as Authorization: Basic ..."
+        )
+    if not usable or not re.fullmatch("[!-~]+", url):
+        raise JodaError(
+            "the service's address (--base-url) is none; give one such as http://127.0.0.1:8000/v1"
+        )
