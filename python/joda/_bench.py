@@ -236,7 +236,9 @@ def _repeats(model: mujoco.MjModel, callback: Any) -> int:
     return max(1, int(0.02 / (SWING * seconds(model, callback, 1))))
 
 
-def seconds(model: mujoco.MjModel, callback: Any = None, repeats: int = 1) -> float:
+def seconds(
+    model: mujoco.MjModel, callback: Any = None, repeats: int = 1, steps: int = SWING
+) -> float:
     """Seconds per step of short swings through the middle of the joints' ranges."""
     data = mujoco.MjData(model)
     limited = np.asarray(model.jnt_limited, bool) & (np.asarray(model.jnt_type) >= 2)
@@ -250,11 +252,11 @@ def seconds(model: mujoco.MjModel, callback: Any = None, repeats: int = 1) -> fl
         for _ in range(repeats):
             mujoco.mj_setState(model, data, start, FULL)
             begin = time.perf_counter()
-            mujoco.mj_step(model, data, SWING)
+            mujoco.mj_step(model, data, steps)
             total += time.perf_counter() - begin
     finally:
         mujoco.set_mjcb_passive(None)
-    return total / (repeats * SWING)
+    return total / (repeats * steps)
 
 
 def _row(what: str, ours: np.ndarray, other: np.ndarray, bar: str) -> Row:
