@@ -31,10 +31,7 @@ def fetch(version: str, folder: Path) -> None:
         with zipfile.ZipFile(next(Path(wheels).iterdir())) as wheel:
             for name in wheel.namelist():
                 part = name.removeprefix("mujoco/")
-                if part.startswith(("include/", "libmujoco.")) or part in (
-                    "mujoco.dll",
-                    "mujoco.lib",
-                ):
+                if part.startswith(("include/", "libmujoco.")) or part == "mujoco.dll":
                     wheel.extract(name, folder)
 
 

@@ -19,6 +19,8 @@ import pytest
 
 from joda import COMMANDS, JodaError, Profile, bench, demo, plot
 from joda._bench import hinges, without_plugin
+from joda._bench_plot import bench_plot
+from joda._bench_plot import profile as plotted
 from joda._refine import Refined
 from joda.cli import app, main
 from joda.cli.tell import tell_viewer
@@ -245,10 +247,23 @@ class TestBench:
         assert native.dof_damping[0] > 0.1
         assert native.dof_frictionloss[0] == pytest.approx(0.07, rel=1e-6)
 
+    @pytest.mark.long
+    def test_the_plot_shows_how_the_cost_grows(self, folder, monkeypatch):
+        monkeypatch.setattr("joda._bench_plot.ROUNDS", 2)
+        monkeypatch.setattr("joda._bench_plot.JOINTS", (1, 3))
+        growth = bench_plot(folder / "cost.png")
+        assert (folder / "cost.png").read_bytes().startswith(b"\x89PNG")
+        assert growth.joints == (1, 3) and min(growth.ours + growth.rows) > 0
+        assert len(growth.by_components) == len(growth.components)
+        with pytest.raises(JodaError, match="exists already"):
+            bench_plot(folder / "cost.png")
+        assert [len(plotted(n).channels.friction.components) for n in (3, 96)] == [1, 32]
+
     def test_worlds_are_of_warp(self, folder):
         result = joda("bench", "--worlds", "2", cwd=folder)
         assert result.returncode == 2
         assert "--worlds is of --warp; add --warp." in result.stderr
+        assert "leave out the scene" in fails("bench", "a.xml", "--plot", "b.png", cwd=folder)
 
     def test_hinges_differ_only_in_what_acts_on_them(self):
         plain, native, ours = (hinges(3, kind) for kind in ("plain", "native", "joda"))

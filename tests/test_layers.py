@@ -24,7 +24,7 @@ LAYERS = [
     {"_context", "_attach", "_bench", "_export", "_weigh"},
     {"_compile", "joints"},
     {"mjx", "pictures", "warp"},
-    {"_plot", "_render", "_templates", "measured"},
+    {"_bench_plot", "_plot", "_render", "_templates", "measured"},
     {"hidden", "interaction", "diagnosis"},
     {"_compare", "_simulate", "_diagnose", "_improve", "refining"},
     {"_add", "_refine", "propose"},

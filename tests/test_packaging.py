@@ -1,5 +1,7 @@
 """What a release is: the source archive, a wheel made from it, and what it leaves when it goes."""
 
+import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -7,6 +9,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+
+import joda
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = Path(pytest.__file__).parents[1]
@@ -84,3 +88,12 @@ def test_it_works_in_a_fresh_environment_and_leaves_nothing(wheel, tmp_path):
     run(*pip, "uninstall", "-q", "-y", "joda")
     assert [path.name for path in site.iterdir()] == ["others.pth"]
     assert not (tmp_path / "venv" / "bin" / "joda").exists()
+
+
+@pytest.mark.skipif(not shutil.which("nm"), reason="there are no binutils")
+def test_windows_import_library_has_all_that_the_plugin_calls():
+    """On Linux the same sources leave these to libmujoco."""
+    told = run("nm", "-D", "--undefined-only", joda.plugin_path())
+    called = {word for word in told.split() if re.match("mj[a-z]?_", word)}
+    _, exports = (ROOT / "cpp" / "mujoco.def").read_text().split("EXPORTS")
+    assert set(exports.split()) == called

@@ -18,6 +18,8 @@ import pytest
 HERE = Path(__file__).parent
 VERSIONS = ("3.3.0", "3.3.7", "3.11.0", "3.17.0")
 """metaworld's, the last of 3.3, mjlab's, and newton's; in 4.0.0 all other tests run."""
+WARPS = ("3.11.0", "3.17.0")
+"""Of MuJoCo Warp: mjlab's and newton's; 4.0 has its tests in every session."""
 PHYSICS = ("physics", "plugin", "attach_physics", "engine", "effects_physics", "end_stops")
 LONG = (
     "not ten_minutes and not knocking and not any_import_order and not any_timestep and "
@@ -46,23 +48,39 @@ def reached(result: subprocess.CompletedProcess) -> str:
     return result.stdout
 
 
-@pytest.fixture(scope="module", params=VERSIONS)
-def python(request, tmp_path_factory):
-    """A Python with that MuJoCo and an empty cache, and what it prints when it first loads joda."""
-    folder = tmp_path_factory.mktemp(request.param)
+def python_with(folder: Path, *packages: str):
+    """Calls a Python that has these packages before those of this one, and an empty cache."""
     venv = folder / "venv"
     assert run(sys.executable, "-m", "venv", "--without-pip", venv).returncode == 0
     site = next((venv / "lib").glob("python*/site-packages"))
     behind = [path for path in sys.path if path.endswith("site-packages")]
     (site / "others.pth").write_text("\n".join(behind))
     pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", site]
-    reached(run(*pip, f"mujoco=={request.param}"))
+    reached(run(*pip, *packages))
 
     def call(*arguments: str | Path) -> subprocess.CompletedProcess:
         return run(venv / "bin" / "python", *arguments, XDG_CACHE_HOME=str(folder))
 
+    return call
+
+
+@pytest.fixture(scope="module", params=VERSIONS)
+def python(request, tmp_path_factory):
+    """A Python with that MuJoCo, and what it prints when it first loads joda."""
+    call = python_with(tmp_path_factory.mktemp(request.param), f"mujoco=={request.param}")
     call.version = request.param
     return call
+
+
+@pytest.mark.parametrize("version", WARPS)
+def test_each_mujoco_warp(version, request, tmp_path):
+    if not request.config.getoption("--whole"):
+        pytest.skip("takes minutes: pytest tests/test_versions.py --whole")
+    call = python_with(tmp_path, f"mujoco=={version}", f"mujoco-warp=={version}")
+    options = ["-n", "0", "-q", "-p", "no:cacheprovider", "--tb=short", "-o", "addopts="]
+    result = call("-m", "pytest", *options, HERE / "test_warp.py")
+    assert result.returncode == 0, result.stdout[-4000:]
+    assert int(re.search(r"(\d+) passed", result.stdout)[1]) > 12
 
 
 @pytest.mark.sweep(2)

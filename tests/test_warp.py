@@ -6,6 +6,7 @@ All in one file and with one shape of scene: mujoco_warp compiles its kernels fo
 import re
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -57,7 +58,7 @@ def test_random_profiles_move_as_with_the_plugin(integrator, cone):
     """Of 300 at least 95 % are that close (docs/warp.md); of these 60, drawn anew, at least 85 %:
     fewer come once in some ten thousand times if 97 % are."""
     seed = int(np.random.SeedSequence().generate_state(1)[0])
-    error = warp_parity.errors(warp_parity.draw(30, seed), integrator=integrator, cone=cone)
+    error, _ = warp_parity.errors(warp_parity.draw(30, seed), integrator=integrator, cone=cone)
     assert (error < CLOSE).mean() > 0.85 and np.median(error) < 1e-5, f"seed {seed}: {error}"
 
 
@@ -204,12 +205,19 @@ def test_a_callback_that_was_there_is_called_too():
     assert called == [d]
 
 
+older = pytest.mark.skipif(
+    not metadata.version("mujoco-warp").startswith(("3.17", "4.")), reason="MuJoCo Warp is older"
+)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         ({"integrator": "RK4"}, "integrators Euler, implicit and implicitfast, not RK4"),
-        ({"integrator": "discrete"}, "not DISCRETE"),
-        ({"option": 'noslip_iterations="2"'}, "option/noslip_iterations to 0"),
+        pytest.param({"integrator": "discrete"}, "not DISCRETE", marks=older),
+        pytest.param(
+            {"option": 'noslip_iterations="2"'}, "option/noslip_iterations to 0", marks=older
+        ),
         ({"option": '><flag sleep="enable"/></option><option'}, "flag sleep off"),
     ],
 )
@@ -258,7 +266,7 @@ def test_what_does_not_fit_is_refused():
         ("import sys; sys.modules['mujoco_warp'] = None", 'run: pip install ".[warp]"'),
         (
             "import importlib.metadata as told; told.version = lambda name: '3.9.1'",
-            "joda.warp works with mujoco-warp 4.0 and found 3.9.1",
+            "joda.warp works with mujoco-warp 3.11, 3.17 and 4.0 and found 3.9.1",
         ),
     ],
 )
@@ -268,6 +276,7 @@ def test_without_a_fitting_mujoco_warp_one_sentence_says_what_to_install(change,
     assert said in run.stdout
 
 
+@older  # forgets the plugin's instances behind a <replicate>
 def test_the_example_of_the_docs(tmp_path):
     root = Path(__file__).parents[1]
     (code,) = re.findall(r"```python\n(.*?)```", (root / "docs/warp.md").read_text(), re.DOTALL)

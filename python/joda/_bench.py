@@ -105,22 +105,24 @@ def bench(
     return rows
 
 
-def hinges(count: int, kind: str) -> mujoco.MjModel:
-    """Doors side by side: "plain", with "native" spring, damping and friction, with profiles
-    ("joda"), or with profiles and all effects that there are ("effects")."""
-    return mujoco.MjModel.from_xml_string(hinges_text(count, kind))
+def hinges(count: int, kind: str, profile: Profile | None = None) -> mujoco.MjModel:
+    """Doors side by side: "plain", with "native" spring, damping and friction, the same with the
+    damping's constraint "rows", but no plugin, with profiles ("joda"; by default of 8 components),
+    or with profiles and all effects that there are ("effects")."""
+    return mujoco.MjModel.from_xml_string(hinges_text(count, kind, profile))
 
 
-def hinges_text(count: int, kind: str) -> str:
+def hinges_text(count: int, kind: str, profile: Profile | None = None) -> str:
     """The same as MJCF."""
     attributes = {
         "plain": "",
         "native": 'stiffness="0.5" damping="0.2" frictionloss="0.1"',
+        "rows": 'stiffness="0.5" frictionloss="0.1"',
         "joda": f'frictionloss="{TRACE}"',
         "effects": f'frictionloss="{TRACE}"',
     }[kind]
     ours = kind in ("joda", "effects")
-    profile = _three_channels()
+    profile = profile or _three_channels()
     if kind == "effects":
         profile = profile.model_copy(update={"effects": ALL_EFFECTS})
     bodies, instances, rows = [], [], []
@@ -135,7 +137,10 @@ def hinges_text(count: int, kind: str) -> str:
         instances.append(f'<instance name="p{k}">{config}</instance>')
         rows.append(f'<joint name="{DAMPING_ROW}j{k}" joint1="j{k}" {INERT}/>')
     extension = f'<extension><plugin plugin="{PLUGIN}">{"".join(instances)}</plugin></extension>'
-    extra = (extension, f"<equality>{''.join(rows)}</equality>") if ours else ("", "")
+    extra = (
+        extension if ours else "",
+        f"<equality>{''.join(rows)}</equality>" if ours or kind == "rows" else "",
+    )
     quiet = '<option><flag contact="disable"/></option>'  # a row of doors is no collision benchmark
     return (
         f'<mujoco><compiler angle="radian"/>{quiet if count > 1 else ""}{extra[0]}'
@@ -222,16 +227,18 @@ def _measure(models: list[tuple[mujoco.MjModel, Any]]) -> np.ndarray:
     times = np.empty((len(models), ROUNDS))
     for k in range(ROUNDS):
         for i, (model, callback) in enumerate(models):
-            times[i, k] = _time(model, callback, repeats[i])
+            times[i, k] = seconds(model, callback, repeats[i])
     return times
 
 
 def _repeats(model: mujoco.MjModel, callback: Any) -> int:
     """How many swings take about 20 ms."""
-    return max(1, int(0.02 / (SWING * _time(model, callback, 1))))
+    return max(1, int(0.02 / (SWING * seconds(model, callback, 1))))
 
 
-def _time(model: mujoco.MjModel, callback: Any, repeats: int) -> float:
+def seconds(
+    model: mujoco.MjModel, callback: Any = None, repeats: int = 1, steps: int = SWING
+) -> float:
     """Seconds per step of short swings through the middle of the joints' ranges."""
     data = mujoco.MjData(model)
     limited = np.asarray(model.jnt_limited, bool) & (np.asarray(model.jnt_type) >= 2)
@@ -240,16 +247,16 @@ def _time(model: mujoco.MjModel, callback: Any, repeats: int) -> float:
     start = np.empty(mujoco.mj_stateSize(model, FULL))
     mujoco.mj_getState(model, data, start, FULL)
     mujoco.set_mjcb_passive(callback)
-    seconds = 0.0
+    total = 0.0
     try:
         for _ in range(repeats):
             mujoco.mj_setState(model, data, start, FULL)
             begin = time.perf_counter()
-            mujoco.mj_step(model, data, SWING)
-            seconds += time.perf_counter() - begin
+            mujoco.mj_step(model, data, steps)
+            total += time.perf_counter() - begin
     finally:
         mujoco.set_mjcb_passive(None)
-    return seconds / (repeats * SWING)
+    return total / (repeats * steps)
 
 
 def _row(what: str, ours: np.ndarray, other: np.ndarray, bar: str) -> Row:

@@ -56,6 +56,10 @@ def make(sources: Path, version: str) -> Path:
             include = [f"-I{sources}", "-isystem", str(mujoco / "include")]
             link = [str(library[0]), f"-Wl,-rpath,{mujoco}", "-o", str(made)]
             _run([*compiler, *FLAGS, *include, *files, *link], missing)
+            if sys.platform == "darwin":  # the library names a framework that it is not in
+                framework = f"@rpath/mujoco.framework/Versions/A/{library[0].name}"
+                change = ["-change", framework, str(library[0]), str(made)]
+                _run(["install_name_tool", *change], missing)
             made.replace(target)
     except OSError as error:
         raise JodaError(

@@ -131,6 +131,11 @@ def bench(
     worlds: Annotated[
         list[int] | None, typer.Option(min=1, help="With --warp: so many worlds instead.")
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw how the cost grows with joints and components: a PNG."),
+    ] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Measure what profiles cost per step, as ratios.
@@ -141,6 +146,11 @@ def bench(
     """
     if worlds and not warp:
         raise JodaError("--worlds is of --warp; add --warp.")
+    if plot and (warp or scene):
+        raise JodaError("--plot draws hinges of our own; leave out the scene and --warp.")
+    if plot:
+        _bench_plot(plot, force, as_json)
+        return
     if warp:
         _bench_warp(scene, worlds or (), as_json)
         return
@@ -152,6 +162,18 @@ def bench(
         print_json([asdict(row) for row in rows])
         return
     tell_ratios(rows)
+
+
+def _bench_plot(plot: Path, force: bool, as_json: bool) -> None:
+    """`joda bench --plot`."""
+    from joda._bench_plot import bench_plot as run
+
+    with spinner("bench") as progress:
+        growth = run(plot, force=force, progress=progress)
+    if as_json:
+        print_json(asdict(growth))
+        return
+    say(plot)
 
 
 def _bench_warp(scene: Path | None, worlds: Sequence[int], as_json: bool) -> None:

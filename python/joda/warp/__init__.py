@@ -23,13 +23,13 @@ except ImportError as error:
         f'joda.warp needs MuJoCo Warp (no module {error.name}); run: pip install ".[warp]"'
     ) from None
 
-SUPPORTED = "4.0"
+TESTED = ("3.11", "3.17", "4.0")
 """Of mujoco-warp: other versions may have other arrays than the kernel reads and writes."""
 
-if not f"{version('mujoco-warp')}.".startswith(f"{SUPPORTED}."):
+if ".".join(version("mujoco-warp").split(".")[:2]) not in TESTED:
     raise JodaError(
-        f"joda.warp works with mujoco-warp {SUPPORTED} and found {version('mujoco-warp')}; "
-        f"run: pip install 'mujoco-warp=={SUPPORTED}.*'"
+        f"joda.warp works with mujoco-warp {', '.join(TESTED[:-1])} and {TESTED[-1]} and found "
+        f"{version('mujoco-warp')}; run: pip install 'mujoco-warp=={TESTED[-1]}.*'"
     )
 
 from joda.warp.fields import Fields, attach, put_fields  # noqa: E402

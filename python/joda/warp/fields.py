@@ -192,7 +192,7 @@ def _check_options(m: Any) -> None:
             f"joda.warp steps with the integrators Euler, implicit and implicitfast, not {name}; "
             "set option/integrator."
         )
-    if m.opt.noslip_iterations:
+    if getattr(m.opt, "noslip_iterations", 0):  # MuJoCo Warp 3.11 refuses them itself
         raise JodaError(
             "noslip drops the compliance of friction rows, without which joints do not come to "
             "rest; set option/noslip_iterations to 0."
