@@ -4,6 +4,7 @@ The paper's "virtual-hand interaction". Where a latch lets go, the joint runs ah
 far as the hand's softness allows.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -62,7 +63,7 @@ class Hand:
         """Args: the compiled scene; the joint's id; positions, rad or m; what the hand is like."""
         self._model, self._grip = model, grip
         self._qpos, self._dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
-        self._range = model.jnt_range[joint]
+        self._range: tuple[float, float] = tuple(model.jnt_range[joint].tolist())
         self._left = list(to)
         self._stage: _Going | _Resting | None = None
         self._target = 0.0
@@ -95,7 +96,7 @@ class Hand:
         mujoco.mj_forward(model, data)
         inertia = inertia_at(model, data, self._dof)
         self._stiffness = min(grip.stiffness, FIRMEST * inertia / model.opt.timestep**2)
-        self._damping = 2 * np.sqrt(self._stiffness * inertia)
+        self._damping = 2 * math.sqrt(self._stiffness * inertia)
         reach = grip.strength / self._stiffness
         self._bounds = self._range[0] - reach, self._range[1] + reach
 
@@ -108,11 +109,12 @@ class Hand:
         """The force towards the target, which goes on."""
         assert self._stage is not None
         self._target, speed = self._stage.target(now)
-        bounded = float(np.clip(self._target, *self._bounds))
+        low, high = self._bounds
+        bounded = min(max(self._target, low), high)
         if bounded != self._target:
             self._target, speed = bounded, 0.0
         wanted = self._stiffness * (self._target - position) + self._damping * (speed - velocity)
-        return float(np.clip(wanted, -self._grip.strength, self._grip.strength))
+        return min(max(wanted, -self._grip.strength), self._grip.strength)
 
 
 @dataclass
@@ -148,7 +150,7 @@ class _Going:
     def target(self, now: float) -> tuple[float, float]:
         """The target and its speed."""
         time = now - self._since
-        speed = self._pace * (1 - np.exp(-time / SET_OUT))
+        speed = self._pace * (1 - math.exp(-time / SET_OUT))
         return self._from + self._pace * time - SET_OUT * speed, speed
 
     def rest(self, now: float, target: float) -> _Resting:

@@ -10,6 +10,7 @@ import hashlib
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -260,13 +261,13 @@ class Session:
     def _turn(self, round: Round, profile: Profile | None = None) -> Turn:
         """A round as the proposer is shown it."""
         profile = profile or self._compiled(round.proposal)
-        balance = -np.array(self.context.gravity_force)
+        positions, balance = np.array(self.context.positions), -np.array(self.context.gravity_force)
         later = (r.complaint for r in self.history.rounds if r.number == round.number + 1)
         return Turn(
             proposal=round.proposal,
             profile=profile,
             behaviour=round.behaviour,
-            picture=png(draw(profile, (np.array(self.context.positions), balance))),
+            picture=cache(lambda: png(draw(profile, (positions, balance)))),
             facts=round.facts,
             unmet=round.unmet,
             complaint=next(later, ""),
@@ -308,7 +309,7 @@ class Session:
 
     def _write(self, turn: Turn) -> None:
         write_text(self.folder / "proposal.json", turn.proposal.to_json())
-        write_bytes(self.folder / "profile.png", turn.picture)
+        write_bytes(self.folder / "profile.png", turn.picture())
         joint = self.history.joint
         said = attach(self.model, turn.profile, self.folder / "scene.xml", joint=joint, force=True)
         self.notes += [note for note in said if note not in self.notes]
