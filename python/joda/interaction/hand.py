@@ -6,13 +6,13 @@ far as the hand's softness allows.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from joda.scenes.engine import inertia_at
-from joda.scenes.motion import Motion, play
+from joda.scenes.motion import Motion, applied, play
 
 SET_OUT = 0.3
 """Time constant (s) with which a hand reaches its speed."""
@@ -196,8 +196,4 @@ def pull(
     """
     grip = Grip(abs(end - start) / duration, strength, stiffness)
     hand = Hand(model, joint, (end,), grip)
-    dof, force = model.jnt_dofadr[joint], list[float]()
-    motion = play(
-        model, joint, start, hand, watch=lambda data: force.append(data.qfrc_applied[dof])
-    )
-    return replace(motion, force=np.array(force))
+    return play(model, joint, start, hand, felt=applied)

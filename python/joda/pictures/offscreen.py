@@ -97,7 +97,8 @@ class _Child:
     """A process that renders one request after the other."""
 
     def __init__(self, module: str, backend: str) -> None:
-        self._module, self._errors = module, TemporaryFile()
+        self._module = module
+        self._errors = TemporaryFile()  # noqa: SIM115: it is closed in _end
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", module],  # -P: not what lies in the user's folder
             stdin=subprocess.PIPE,

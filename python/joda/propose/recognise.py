@@ -145,10 +145,16 @@ class _Words(NamedTuple):
         """Of a joint."""
         return cls(
             concepts(context.names[:2], "part"),
-            concepts((*context.names, *context.around), "object"),
+            _object(context),
             said(description, "part"),
             said(description, "object"),
         )
+
+
+def _object(context: Context) -> Concepts:
+    """What the part is on, by its own names and by the nearest above that says what it is."""
+    above = (concepts([name], "object") for name in context.around)
+    return concepts(context.names, "object") | next(filter(None, above), frozenset())
 
 
 def _may_be(one: Archetype, context: Context, words: _Words) -> bool:
