@@ -113,7 +113,8 @@ class Hand:
         bounded = min(max(self._target, low), high)
         if bounded != self._target:
             self._target, speed = bounded, 0.0
-        wanted = self._stiffness * (self._target - position) + self._damping * (speed - velocity)
+        wanted: float = self._stiffness * (self._target - position)
+        wanted += self._damping * (speed - velocity)
         return min(max(wanted, -self._grip.strength), self._grip.strength)
 
 

@@ -98,7 +98,7 @@ class _Child:
 
     def __init__(self, module: str, backend: str) -> None:
         self._module = module
-        self._errors = TemporaryFile()  # noqa: SIM115: it is closed in _end
+        self._errors = TemporaryFile()  # noqa: SIM115 (it is closed in _end)
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", module],  # -P: not what lies in the user's folder
             stdin=subprocess.PIPE,
