@@ -64,8 +64,8 @@ class Surroundings:
         if not overlaps:
             return ""
         return (
-            "; parts that overlap all along the way are perhaps meant to pass each other, then keep "
-            'them from colliding with <contact><exclude body1="..." body2="..."/></contact>'
+            "; if parts that overlap all along the way are meant to pass, keep them from colliding "
+            'with <contact><exclude body1="..." body2="..."/></contact>'
         )
 
     def scene(self, profile: Profile) -> tuple[mujoco.MjModel, int]:

@@ -84,6 +84,9 @@ def _card(entry: Entry, folder: Path) -> str:
         for sentence in sentences
     )
     hard = "Infinity" if entry.force is None else f"{entry.force:.6g}"
+    remarks = "".join(f"<li>{_text(sentence)}</li>" for sentence in entry.remarks)
+    if remarks:
+        remarks = f"<details><summary>of the model</summary><ul>{remarks}</ul></details>"
     force = "a hand cannot open it" if entry.force is None else f"{entry.force:.3g} N at the handle"
     band = f" (such joints {entry.band[0]:g} to {entry.band[1]:g})" if entry.band else ""
     others = f"; else {', '.join(entry.others)}" if entry.others else ""
@@ -93,7 +96,7 @@ def _card(entry: Entry, folder: Path) -> str:
         f"{picture}{entry.sketch}"
         f'<p><b>{_text(entry.kind)}</b> <meter min="0" max="1" value="{entry.likely}"></meter> '
         f"{entry.likely:.0%}{_text(others)}</p>"
-        f"<p>{_text(force + band)}</p><ul>{behaviours}</ul>"
+        f"<p>{_text(force + band)}</p><ul>{behaviours}</ul>{remarks}"
         f'<p class="more">{links} <button type="button">copy studio command</button></p>'
         f"<code>{_text(command)}</code></article>"
     )

@@ -16,8 +16,10 @@ from joda.propose.history import History
 
 Array = NDArray[np.float64]
 
-SIZE = (240, 180)
+SIZE = (240, 171)
 """Of a small picture, pixels; two are beside each other."""
+SHOWN = 0.95
+"""Of the height of a picture; below is its caption, which nobody could read."""
 QUALITY = 70
 """Of its JPEG."""
 SMALL = "small.jpg"
@@ -38,6 +40,7 @@ class Entry:
         likely: how sure that is, 0 to 1.
         others: what else it could be, in words.
         met, unmet, notes: of the last round, a sentence each.
+        remarks: what was told of the model and its files.
         force: that opening takes at the handle, N; None where a hand cannot open it.
         band: what such joints take, N; None where nothing is known.
         picture: JPEG, closed beside open, in base64; empty where nothing could render.
@@ -54,20 +57,21 @@ class Entry:
     met: tuple[str, ...] = ()
     unmet: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     force: float | None = None
     band: tuple[float, float] | None = None
     picture: str = ""
     sketch: str = ""
 
     @classmethod
-    def read(cls, label: str, folder: Path, history: History, notes: tuple[str, ...]) -> "Entry":
+    def read(cls, label: str, folder: Path, history: History, remarks: tuple[str, ...]) -> "Entry":
         """Of a joint that has rounds.
 
         Args:
             label: as it is told.
             folder: where everything is.
             history: what the folder's `history.json` holds.
-            notes: what was told of it besides.
+            remarks: what was told of the model and its files.
 
         Raises:
             JodaError: a file of the folder cannot be read or written.
@@ -88,7 +92,8 @@ class Entry:
             others=tuple(f"{one.title} {one.likely:.0%}" for one in found.others) if found else (),
             met=last.met,
             unmet=last.unmet,
-            notes=(*last.notes, *notes),
+            notes=last.notes,
+            remarks=remarks,
             force=force / context.lever_arm if way.arrived else None,
             band=found.force.opening if found and found.force else None,
             picture=base64.b64encode(_small(folder / "pictures", names)).decode(),
@@ -104,16 +109,21 @@ def _small(folder: Path, names: tuple[str, ...]) -> bytes:
     if not paths or not all(path.is_file() for path in paths):
         return b""
     made = folder / SMALL
-    if not made.is_file() or made.stat().st_mtime < max(path.stat().st_mtime for path in paths):
-        both = Image.new("RGB", (2 * SIZE[0], SIZE[1]))
+    if made.is_file() and made.stat().st_mtime >= max(path.stat().st_mtime for path in paths):
+        return made.read_bytes()
+    both = Image.new("RGB", (2 * SIZE[0], SIZE[1]))
+    try:
         for number, path in enumerate(paths):
             with Image.open(path) as picture:
-                little = picture.convert("RGB").resize(SIZE, Image.Resampling.BOX, reducing_gap=1.0)
+                shown = (0, 0, picture.width, round(SHOWN * picture.height))
+                little = picture.convert("RGB").resize(SIZE, Image.Resampling.BOX, shown)
             both.paste(little, (number * SIZE[0], 0))
-        content = io.BytesIO()
-        both.save(content, "jpeg", quality=QUALITY)
-        write_bytes(made, content.getvalue())
-    return made.read_bytes()
+    except OSError:  # somebody has put something else there
+        return b""
+    content = io.BytesIO()
+    both.save(content, "jpeg", quality=QUALITY)
+    write_bytes(made, content.getvalue())
+    return content.getvalue()
 
 
 def _sketch(profile: Profile, context: Context) -> str:
