@@ -68,7 +68,7 @@ def test_a_folder_ends_with_a_page_that_needs_nothing_else_and_obeys_no_name(mod
     for card, one in zip(cards, made.values(), strict=True):
         last = one.history.rounds[-1]
         assert card["data-kind"] == last.recognised.title
-        assert float(card["data-likely"]) == last.recognised.likely
+        assert float(card["data-likely"]) == last.sure
         assert int(card["data-lacking"]) == len(last.unmet)
         assert all(sentence in page.text for sentence in (*last.met, *last.unmet))
         assert str((one.folder / "scene.xml").resolve()) in page.text
@@ -134,7 +134,7 @@ def test_review_asks_the_least_sure_first_and_keeps_each_decision(models, tmp_pa
     out, asked = tmp_path / "out", []
     first = generate_all(models, out, rounds=1)
     made = {k: one for k, one in first.items() if not isinstance(one, JodaError)}
-    likely = {k: one.history.rounds[-1].recognised.likely for k, one in made.items()}
+    likely = {k: one.history.rounds[-1].sure for k, one in made.items()}
 
     def decide(label, one):
         asked.append(label)

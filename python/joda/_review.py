@@ -33,13 +33,6 @@ Decide = Callable[[str, Generated], Decision | None]
 again, where a decision came to nothing, with the reason among the notes."""
 
 
-def sure(made: Generated) -> float:
-    """How sure the proposer was of a joint, 0 to 1."""
-    last = made.history.rounds[-1]
-    found = last.recognised
-    return found.likely if found else last.proposal.joint_summary.overall_confidence
-
-
 def doubtful(done: Mapping[str, Generated | JodaError]) -> list[str]:
     """The labels of joints that nobody has looked at and that should be, the least sure first."""
     made = {label: one for label, one in done.items() if isinstance(one, Generated)}
@@ -47,9 +40,10 @@ def doubtful(done: Mapping[str, Generated | JodaError]) -> list[str]:
         (
             label
             for label, one in made.items()
-            if not one.history.reviewed and (sure(one) < UNSURE or one.history.rounds[-1].unmet)
+            if not one.history.reviewed
+            and (one.history.rounds[-1].sure < UNSURE or one.history.rounds[-1].unmet)
         ),
-        key=lambda label: (sure(made[label]), label),
+        key=lambda label: (made[label].history.rounds[-1].sure, label),
     )
 
 

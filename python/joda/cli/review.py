@@ -16,11 +16,11 @@ HELP = (
 
 def look_at(label: str, made: "Generated") -> "Decision | None":
     """Tells what a joint was taken for, and asks; the end of the input is no more."""
-    from joda._review import Decision, sure
+    from joda._review import Decision
 
     last = made.history.rounds[-1]
     found = last.recognised
-    say("", f"{label}: {last.proposal.joint_summary.motion_description} ({sure(made):.0%} sure)")
+    say("", f"{label}: {last.proposal.joint_summary.motion_description} ({last.sure:.0%} sure)")
     for name in made.history.pictures or ():
         say(f"  picture: {made.folder / 'pictures' / name}")
     others = [one.title for one in found.others] if found else []

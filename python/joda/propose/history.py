@@ -42,6 +42,13 @@ class Round(Frozen):
     usage: Usage = Usage()
     recognised: Recognition | None = None
 
+    @property
+    def sure(self) -> float:
+        """How sure it is what the joint is, 0 to 1; not at all where no kind fits."""
+        if self.recognised is None:
+            return self.proposal.joint_summary.overall_confidence
+        return 0.0 if self.recognised.unknown else self.recognised.likely
+
 
 class Failure(Frozen):
     """A request that gave no proposal, and what it cost all the same."""

@@ -62,6 +62,7 @@ class Recognition(Frozen):
     Attributes:
         title: of the archetype.
         likely: how sure that is, 0 to 1.
+        unknown: whether it is what remains where no other fits.
         decided: what spoke for it and against it, the most important first.
         others: what else it could be, the likeliest first.
         because: why such joints do what they do.
@@ -70,6 +71,7 @@ class Recognition(Frozen):
 
     title: str
     likely: float
+    unknown: bool = False
     decided: tuple[Evidence, ...] = ()
     others: tuple[Other, ...] = ()
     because: str = ""
@@ -125,6 +127,7 @@ def recognise(
     return best, Recognition(
         title=best.title,
         likely=round(min(float(odds[order[0]]), SUREST), 2),
+        unknown=best.unknown,
         decided=tuple(one for one in decided if abs(one.points) >= FITS)[:6],
         others=tuple(others),
         because=best.evidence,

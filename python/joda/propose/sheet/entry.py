@@ -25,6 +25,8 @@ QUALITY = 70
 SMALL = "small.jpg"
 WIDTH, HEIGHT = 240, 80
 """Of a sketch."""
+FULL = 0.75
+"""Share of its height that the largest force takes."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class Entry:
             joint=profile.joint.name,
             folder=folder,
             kind=found.title if found else summary.motion_description.split(" (")[0],
-            likely=found.likely if found else summary.overall_confidence,
+            likely=last.sure,
             others=tuple(f"{one.title} {one.likely:.0%}" for one in found.others) if found else (),
             met=last.met,
             unmet=last.unmet,
@@ -134,7 +136,7 @@ def _sketch(profile: Profile, context: Context) -> str:
     high = max(float(np.abs([force - friction, force + friction, -balance]).max()), 1e-9)
 
     def points(values: Array) -> str:
-        rows = HEIGHT / 2 * (1 - 0.95 * values / high)
+        rows = HEIGHT / 2 * (1 - FULL * values / high)
         return " ".join(f"{WIDTH * a:.0f},{b:.1f}" for a, b in zip(s, rows, strict=True))
 
     back = " ".join(points(force - friction).split()[::-1])
