@@ -154,19 +154,20 @@ def test_review_asks_the_least_sure_first_and_keeps_each_decision(models, tmp_pa
 def test_the_command_takes_kinds_words_and_mistakes(joda, models, tmp_path, monkeypatch):
     out = tmp_path / "out"
     joda("generate", models, "-o", out, "--rounds", "1")
-    answers = "k contraption\nk cabinet door\n9\nit clicks into 3 positions\n"
+    answers = "k contraption\nk cabinet door\nk push button\n9\nit clicks into 3 positions\n"
     monkeypatch.setattr("sys.stdin", io.StringIO(answers))
     _, told, _ = joda("generate", models, "-o", out, "--rounds", "1", "--resume", "--review")
     assert (
         "there is no kind of joint 'contraption'; there are: " in told and "There is no 9." in told
     )
     histories = [json.loads(p.read_text()) for p in sorted(out.rglob("history.json"))]
-    assert {h["kind"] for h in histories} == {"", "cabinet door"}
+    assert "a cabinet door is a hinge, the joint is none" in told
+    assert {h["kind"] for h in histories} == {"", "push button"}
     assert {h["description"] for h in histories} == {"", "it clicks into 3 positions"}
     chosen = next(h for h in histories if h["kind"])
-    assert chosen["rounds"][-1]["recognised"]["title"] == "cabinet door"
+    assert chosen["rounds"][-1]["recognised"]["title"] == "push button"
     text = (out / "sheet.html").read_text()
-    assert "cabinet door" in text and "It clicks into 3 positions" in text
+    assert "push button" in text and "It clicks into 3 positions" in text
     for path in out.rglob("scene.xml"):
         mujoco.MjModel.from_xml_path(str(path))
 

@@ -107,11 +107,11 @@ def recognise(
     Args:
         context: the joint.
         description: what the user says of it; its words count most.
-        archetypes: to choose from; by default the library's.
+        archetypes: to choose from; by default the library's. Where none may be it, all may.
     """
     known = read_archetypes() if archetypes is None else archetypes
     words = _Words.of(context, description)
-    fitting = [one for one in known if _may_be(one, context, words)]
+    fitting = [one for one in known if _may_be(one, context, words)] or list(known)
     weighed = [_weigh(one, context, words) for one in fitting]
     points = np.array(
         [one.common + sum(e.points for e in each)

@@ -311,6 +311,8 @@ class Session:
         if kind and not chosen:
             listed = ", ".join(sorted(one.title for one in known))
             raise JodaError(f"there is no kind of joint '{kind}'; there are: {listed}.")
+        if chosen and self.context.joint.type not in chosen[0].joint:
+            raise JodaError(f"a {kind} is a {chosen[0].joint}, the joint is none; choose another.")
         return chosen or known
 
     def _compiled(self, proposal: Proposal) -> Profile:
