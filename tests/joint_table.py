@@ -154,7 +154,7 @@ def judge(row: Row) -> Result:
         profile = compile(answer.proposal, found)
         behaved = behaviour(found, profile)
         lacking = unmet(read_wishes(answer.proposal.whole_motion_descrptn), behaved, found)
-        turns.append(Turn(answer.proposal, profile, behaved, b"", "", tuple(lacking.values())))
+        turns.append(Turn(answer.proposal, profile, behaved, bytes, "", tuple(lacking.values())))
     behaved, summary = turns[-1].behaviour, turns[-1].proposal.joint_summary
     arm = found.lever_arm if row.arm is None else row.arm
     way = behaved.opening

@@ -83,7 +83,9 @@ def test_the_command_tells_a_line_per_joint(joda, models, tmp_path):
     assert status == 2 and err.count("\n") == 1
     assert err.startswith("joda: 1 of 4 have no profile")
     lines = out.splitlines()
-    assert len(lines) == 4 and all(any(line.startswith(n) for line in lines) for n in NAMES)
+    assert lines[-1] == f"Contact sheet: {tmp_path / 'out' / 'sheet.html'}"
+    assert "behaviours come true" in lines[-2]
+    assert len(lines) == 6 and all(any(line.startswith(n) for line in lines) for n in NAMES)
     assert next(line for line in lines if line.startswith("broken: ")).count("broken.xml") == 1
 
 

@@ -29,6 +29,7 @@ LAYERS = [
     {"_compare", "_simulate", "_diagnose", "_improve", "refining"},
     {"_add", "_refine", "propose"},
     {"_generate", "_hidden_effect", "_schema"},
+    {"_review"},
     {"_generate_all", "_revise", "_demo", "cases", "distributed"},
     {"_experiments", "_studio", "_distribute", "_evaluate", "_estimate"},
     {"cli"},

@@ -59,7 +59,7 @@ def turn(found: Context, proposal: Proposal, key: str = "", complaint: str = "")
     behaved = behaviour(found, profile)
     lacking = unmet(read_wishes(proposal.whole_motion_descrptn), behaved, found)
     facts = behaved.describe(found)
-    return Turn(proposal, profile, behaved, b"", facts, list(lacking.values()), complaint)
+    return Turn(proposal, profile, behaved, bytes, facts, list(lacking.values()), complaint)
 
 
 @cache

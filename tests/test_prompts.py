@@ -74,7 +74,7 @@ def finished(name, number):
         proposal=proposal,
         profile=profile,
         behaviour=shown,
-        picture=png(draw(profile, flat)),
+        picture=lambda: png(draw(profile, flat)),
         facts=shown.describe(found),
         unmet=["closes by itself near the shut position: let go at 3 % of the way it stays"],
     )

@@ -247,3 +247,17 @@ def test_somebody_elses_implausible_force_is_doubted(tmp_path):
     done = generate(model, "door", tmp_path / "out", proposer=tmp_path / "p.json")
     (note,) = done.history.rounds[0].notes
     assert "looks like a refrigerator door" in note and "16 CFR 1750" in note
+
+
+def test_what_a_part_is_on_is_told_by_the_nearest_name(tmp_path):
+    """A knob of an oven that stands in a kitchen of cabinets is the oven's."""
+    path = tmp_path / "kitchen.xml"
+    path.write_text(
+        '<mujoco model="kitchen_cabinets"><worldbody><body name="cupboards"><geom size=".5"/>'
+        '<body name="oven"><geom type="box" size=".3 .3 .3"/><body name="k1" pos="0 -.32 .2">'
+        '<joint name="j" axis="0 1 0" range="0 270"/><geom type="cylinder" size=".02 .02" '
+        'euler="90 0 0"/></body></body></body></worldbody></mujoco>'
+    )
+    found = recognise(context(path, "j"))[1]
+    assert "the object is called oven" in [one.feature for one in found.decided]
+    assert found.title == "selector knob"

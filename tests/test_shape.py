@@ -138,3 +138,43 @@ def test_the_box_of_least_face_is_found_at_any_angle():
     mujoco.mj_kinematics(model, data)
     found = box_along(surface(model, data, [0]), np.array([0.0, 0.0, 1.0]))
     assert found.size == pytest.approx([0.1, 0.6, 0.2], rel=0.02)
+
+
+def test_a_silhouette_is_that_of_the_mesh_and_not_of_its_hull(tmp_path):
+    """A disc fills pi/4 of its box; a ring of four bars 1 - 0.6² of it, whatever its hull says."""
+    disc = '<geom type="cylinder" size=".2 .01" euler="1.5708 0 0" pos=".2 -.01 0" mass="2"/>'
+    assert scene(tmp_path, part=disc).shape.fill == pytest.approx(np.pi / 4, abs=0.02)
+    assert scene(tmp_path).shape.fill == 1.0
+    corners = [(s * x, y, s * z) for s in (0.2, 0.12) for y in (-0.01, 0.01) for x, z in
+               ((-1, -1), (1, -1), (1, 1), (-1, 1))]  # fmt: skip
+    faces = []
+    for k in range(4):
+        n = (k + 1) % 4  # outer back, outer front, inner back, inner front: 0, 4, 8, 12
+        for a, b in ((0, 4), (4, 12), (12, 8), (8, 0)):
+            faces += [(a + k, a + n, b + n), (a + k, b + n, b + k)]
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in corners)
+    (tmp_path / "ring.obj").write_text(
+        text + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces)
+    )
+    path = tmp_path / "b.xml"
+    path.write_text(
+        '<mujoco><compiler angle="radian"/><asset><mesh name="m" file="ring.obj" inertia="shell"/>'
+        f'</asset><worldbody><body name="o">{WALL}<body pos="-.2 -.15 .2">{SIDE}'
+        '<geom type="mesh" mesh="m" pos=".2 -.01 0" mass="2"/></body></body></worldbody></mujoco>'
+    )
+    assert context(path, "j").shape.fill == pytest.approx(1 - 0.6**2, abs=0.06)
+
+
+def test_the_room_beyond_either_end_is_that_to_the_object(tmp_path):
+    """A slide of 0.1 m whose block of 0.1 m stops 0.05 m before one wall, and at the other."""
+    rest = (
+        '<geom type="box" size=".01 .2 .2" pos="-.06 0 0"/>'
+        '<geom type="box" size=".01 .2 .2" pos=".21 0 0"/>'
+    )
+    part = '<geom type="box" size=".05 .05 .05" mass="1"/>'
+    slide = '<joint name="j" type="slide" axis="1 0 0" range="0 .1"/>'
+    seen = scene(tmp_path, rest, slide, part, "0 0 0").shape
+    assert seen.room_closed == pytest.approx(0, abs=0.02)
+    assert seen.room_open == pytest.approx(0.5, abs=0.02)
+    free = scene(tmp_path, rest, slide.replace('"1 0 0"', '"0 0 1"'), part, "0 0 0").shape
+    assert free.room_closed == free.room_open == 1.0

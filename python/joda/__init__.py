@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from joda._plot import plot
     from joda._refine import refine
     from joda._render import render
+    from joda._review import Decision
     from joda._revise import revise
     from joda._schema import schema
     from joda._simulate import simulate
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
+    "Decision",
     "JodaError",
     "Profile",
     "add",
@@ -108,6 +110,7 @@ COMMANDS = (
 )
 _MODULES = ("effects", "field", "mjx", "warp")
 _LAZY = {
+    "Decision": "joda._review",
     "Profile": "joda.profile",
     "estimate": "joda._estimate",
     "generate_all": "joda._generate_all",

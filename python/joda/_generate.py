@@ -137,7 +137,7 @@ def begin(
         "key": (key, history.key),
     }
     for option, (now, then) in given.items():
-        if now and now != then:
+        if now and now != then and not (option == "describe" and history.reviewed):
             raise JodaError(
                 f"{folder}: was begun with another --{option}; leave it out to go on with that, or "
                 "choose another folder with -o."

@@ -6,15 +6,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 from joda._generate import ROUNDS, Generated, begin, check_rounds, choose, ranged, run
+from joda._review import Decide
+from joda._review import review as walk
 from joda.errors import JodaError
-from joda.files import file_name, make_folder, read_text
+from joda.files import file_name, make_folder, read_text, write_text
 from joda.propose import Ask, BatchProposer, Proposer
 from joda.propose.asking import Effort
 from joda.propose.session import Session
+from joda.propose.sheet import Entry, sheet
 from joda.scenes.model import load_model
 
 Advance = Callable[[int, int, str], None]
 Results = dict[str, Generated | JodaError]
+
+SHEET = "sheet.html"
+"""The contact sheet."""
 
 MODELS = (".xml", ".urdf")
 """How names of models end."""
@@ -43,9 +49,13 @@ def generate_all(
     effort: Effort | None = None,
     resume: bool = False,
     force: bool = False,
+    review: Decide | None = None,
     progress: Advance = lambda done, total, what: None,
 ) -> Results:
     """`joda.generate` for all hinges and slides with a range, of all models below a folder.
+
+    Ends with a contact sheet, `sheet.html` in the folder: every joint's pictures, profile,
+    behaviours, force at the handle, and how sure the proposer was.
 
     A `joda.propose.BatchProposer`, as anthropic's with its Message Batches, is asked for a round
     of all joints at once. Interrupted, the same call with `resume` goes on.
@@ -59,6 +69,9 @@ def generate_all(
         resume: go on with what the folder holds; what is complete stays.
         force: overwrite what another generation left in the folder, with `resume` profiles that
             were edited by hand.
+        review: asked about the joints that are doubtful, the least sure first: given the label and
+            what was made, returns a `joda.Decision`, or None for no more. What it has been asked
+            before it is not asked again.
         progress: told how many joints are done, of how many, and what is being done.
 
     Returns:
@@ -96,8 +109,25 @@ def generate_all(
     for label, session in sessions.items():
         if label not in done:
             done[label] = Generated(session.folder, session.history, tuple(session.notes))
+    progress(len(jobs), len(jobs), "drawing the contact sheet")
+    write_sheet(target, done)
     progress(len(jobs), len(jobs), "done")
+    if review is not None:
+        for label, changed in walk(done, review, rounds, proposer, vlm, force):
+            done[label] = changed
+        write_sheet(target, done)
     return dict(sorted(done.items()))
+
+
+def write_sheet(folder: Path, done: Results) -> None:
+    """Writes the contact sheet of what is in a folder; raises JodaError."""
+    entries = [
+        Entry(label, failed=str(one))
+        if isinstance(one, JodaError)
+        else Entry.read(label, one.folder, one.history, one.notes)
+        for label, one in sorted(done.items())
+    ]
+    write_text(folder / SHEET, sheet(entries, folder, f"Joints of {folder.resolve().name}"))
 
 
 def _run_many(

@@ -22,6 +22,7 @@ from joda.cli.options import (
     Vlm,
 )
 from joda.cli.progress import progress_bar, spinner
+from joda.cli.review import look_at
 from joda.cli.say import say
 from joda.cli.tell import (
     generated_as_json,
@@ -138,6 +139,14 @@ def generate(
     estimate: Annotated[
         bool, typer.Option("--estimate", help="Only say what asking a model will about cost.")
     ] = False,
+    review: Annotated[
+        bool,
+        typer.Option(
+            "--review",
+            help="Of a folder: ask about the doubtful joints, the least sure first; with --resume "
+            "about those of before.",
+        ),
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -145,7 +154,7 @@ def generate(
 
     Effects are proposed, compiled, simulated and revised. Leaves context.json, pictures,
     proposal.json, composed.json, profile.png, scene.xml and history.json. A folder of models is
-    done joint by joint. Example:
+    done joint by joint, and ends with a contact sheet, sheet.html. Example:
 
         joda generate out/oven.xml --joint door -o stays --describe "it stays wherever it is left"
     """
@@ -166,10 +175,16 @@ def generate(
             return
     options = {**asked, "key": key, "resume": resume, "force": force}
     if model.is_dir():
+        from joda._generate_all import SHEET
+
         with progress_bar() as bar:
             done = run_all(model, output, joint=joint, progress=bar, **options)
-        tell_all(done, as_json)
+        if review:
+            done = run_all(model, output, joint=joint, review=look_at, **options | {"resume": True})
+        tell_all(done, output / SHEET, as_json)
         return
+    if review:
+        raise JodaError("--review goes with a folder of models; change one joint with joda revise.")
     with spinner("generate") as progress:
         result = run(model, joint, output, progress=progress, **options)
     if as_json:

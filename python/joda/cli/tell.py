@@ -124,8 +124,11 @@ def _span(low: float, high: float, form: str = "d") -> str:
     return " to ".join(dict.fromkeys(ends))
 
 
-def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None:
-    """A line per joint; raises JodaError if some gave nothing."""
+def tell_all(done: "Mapping[str, Generated | JodaError]", sheet: Path, as_json: bool) -> None:
+    """A line per joint, what of all does not come true, and the contact sheet.
+
+    Raises JodaError if some gave nothing.
+    """
     from joda.propose import total
 
     failed = {label: result for label, result in done.items() if isinstance(result, JodaError)}
@@ -151,6 +154,11 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", as_json: bool) -> None
             for note in result.notes:
                 say(f"  {note}")
         tell_cost(total(result.history.usage for result in made.values()))
+        lasts = [result.history.rounds[-1] for result in made.values()]
+        came, not_ = (sum(len(getattr(r, what)) for r in lasts) for what in ("met", "unmet"))
+        joints = sum(bool(last.unmet) for last in lasts)
+        say(f"{came} of {came + not_} behaviours come true; {joints} joints lack one.")
+        say(f"Contact sheet: {sheet}")
     if failed:
         raise JodaError(f"{len(failed)} of {len(done)} have no profile; see above.")
 

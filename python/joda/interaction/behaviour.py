@@ -1,5 +1,6 @@
 """How a joint behaves, found by simulating it: let go everywhere, and moved slowly by a hand."""
 
+from collections.abc import Callable
 from itertools import groupby
 from typing import Literal
 
@@ -162,9 +163,12 @@ def behaviour(context: Context, profile: Profile, around: Surroundings | None = 
     back = reached if opened else open_
     closing = pulled(model, joint, back, shut, context)[0] if opened or possible(back) else opening
     if around:
-        alone = rig(context, profile)
-        opening = _held(opening, around, pulled(alone, 0, begin, open_, context)[0])
-        closing = _held(closing, around, pulled(alone, 0, back, shut, context)[0])
+
+        def alone(start: float, end: float) -> Pull:
+            return pulled(rig(context, profile), 0, start, end, context)[0]
+
+        opening = _held(opening, around, lambda: alone(begin, open_))
+        closing = _held(closing, around, lambda: alone(back, shut))
     far = (min(shut, reached), max(shut, reached))
     starts = STARTS if around is None else IN_SCENE
     freely = np.array([far[0] <= s <= far[1] and possible(s) for s in starts])
@@ -186,18 +190,20 @@ def behaviour(context: Context, profile: Profile, around: Surroundings | None = 
     )
 
 
-def _held(way: Pull, around: Surroundings, alone: Pull) -> Pull:
+def _held(way: Pull, around: Surroundings, alone: Callable[[], Pull]) -> Pull:
     """The same with what is in the way where the hand got stuck, if it is not the joint itself.
 
     Args:
         way: in the scene.
         around: the scene.
-        alone: the same way of the joint by itself.
+        alone: simulates the same way of the joint by itself.
     """
     if way.arrived:
         return way
-    near = touching(around.near(way.at))
-    return way.model_copy(update={"held_by": near or (around.acting if alone.arrived else "")})
+    held_by = touching(around.near(way.at))
+    if not held_by and around.acting and alone().arrived:
+        held_by = around.acting
+    return way.model_copy(update={"held_by": held_by})
 
 
 def _snaps(way: Pull) -> str:

@@ -4,14 +4,15 @@ The paper's "virtual-hand interaction". Where a latch lets go, the joint runs ah
 far as the hand's softness allows.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from joda.scenes.engine import inertia_at
-from joda.scenes.motion import Motion, play
+from joda.scenes.motion import Motion, applied, play
 
 SET_OUT = 0.3
 """Time constant (s) with which a hand reaches its speed."""
@@ -62,7 +63,7 @@ class Hand:
         """Args: the compiled scene; the joint's id; positions, rad or m; what the hand is like."""
         self._model, self._grip = model, grip
         self._qpos, self._dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
-        self._range = model.jnt_range[joint]
+        self._range: tuple[float, float] = tuple(model.jnt_range[joint].tolist())
         self._left = list(to)
         self._stage: _Going | _Resting | None = None
         self._target = 0.0
@@ -95,7 +96,7 @@ class Hand:
         mujoco.mj_forward(model, data)
         inertia = inertia_at(model, data, self._dof)
         self._stiffness = min(grip.stiffness, FIRMEST * inertia / model.opt.timestep**2)
-        self._damping = 2 * np.sqrt(self._stiffness * inertia)
+        self._damping = 2 * math.sqrt(self._stiffness * inertia)
         reach = grip.strength / self._stiffness
         self._bounds = self._range[0] - reach, self._range[1] + reach
 
@@ -108,11 +109,13 @@ class Hand:
         """The force towards the target, which goes on."""
         assert self._stage is not None
         self._target, speed = self._stage.target(now)
-        bounded = float(np.clip(self._target, *self._bounds))
+        low, high = self._bounds
+        bounded = min(max(self._target, low), high)
         if bounded != self._target:
             self._target, speed = bounded, 0.0
-        wanted = self._stiffness * (self._target - position) + self._damping * (speed - velocity)
-        return float(np.clip(wanted, -self._grip.strength, self._grip.strength))
+        wanted: float = self._stiffness * (self._target - position)
+        wanted += self._damping * (speed - velocity)
+        return min(max(wanted, -self._grip.strength), self._grip.strength)
 
 
 @dataclass
@@ -148,7 +151,7 @@ class _Going:
     def target(self, now: float) -> tuple[float, float]:
         """The target and its speed."""
         time = now - self._since
-        speed = self._pace * (1 - np.exp(-time / SET_OUT))
+        speed = self._pace * (1 - math.exp(-time / SET_OUT))
         return self._from + self._pace * time - SET_OUT * speed, speed
 
     def rest(self, now: float, target: float) -> _Resting:
@@ -194,8 +197,4 @@ def pull(
     """
     grip = Grip(abs(end - start) / duration, strength, stiffness)
     hand = Hand(model, joint, (end,), grip)
-    dof, force = model.jnt_dofadr[joint], list[float]()
-    motion = play(
-        model, joint, start, hand, watch=lambda data: force.append(data.qfrc_applied[dof])
-    )
-    return replace(motion, force=np.array(force))
+    return play(model, joint, start, hand, felt=applied)

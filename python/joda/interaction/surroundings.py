@@ -19,6 +19,8 @@ from joda.scenes.motion import at_home
 
 NEAR = 0.02
 """How near a contact (in normalised position) a joint that got stuck there may be."""
+OVERLAPS = 0.9
+"""What presses over more than this share of the range is no obstacle but drawn into each other."""
 TOLD = 3
 """How many contacts are told, those with the largest force first."""
 
@@ -32,7 +34,7 @@ class Surroundings:
         joint: its name or address.
         contacts: over its whole range.
         besides: tendons, equality constraints and media that act on it.
-        reference: its reference position, normalised.
+        reference: its position at the keyframe `home`, else its reference, normalised.
     """
 
     path: Path
@@ -53,6 +55,18 @@ class Surroundings:
             return ""
         does = "acts" if len(self.besides) == 1 else "act"
         return f"{' and '.join(self.besides)} {does} on joint '{self.joint}'"
+
+    @property
+    def remedy(self) -> str:
+        """What to do about parts that overlap all along the way; empty if none do."""
+        overlaps = [one for one in self.contacts
+                    if one.presses and one.interval[1] - one.interval[0] > OVERLAPS]  # fmt: skip
+        if not overlaps:
+            return ""
+        return (
+            "; if parts that overlap all along the way are meant to pass, keep them from colliding "
+            'with <contact><exclude body1="..." body2="..."/></contact>'
+        )
 
     def scene(self, profile: Profile) -> tuple[mujoco.MjModel, int]:
         """The scene with a profile on the joint, compiled, and the joint's id.
@@ -96,13 +110,14 @@ def surroundings(path: Path, joint: str) -> Surroundings | None:
     model = load_model(path)
     number = find_joint(model, joint)
     described = describe_joint(model, number)
-    found = contacts_along(model, number, described, described.range)
+    found = contacts_along(model, number, described, described.range, home=True)
     felt = tuple(one for one in found if not one.stop)
     besides = acting_besides(model, number)
     if not felt and not besides:
         return None
     lo, hi = described.range
-    reference = float(np.clip((model.qpos0[model.jnt_qposadr[number]] - lo) / (hi - lo), 0, 1))
+    begins = at_home(model).qpos[model.jnt_qposadr[number]]
+    reference = float(np.clip((begins - lo) / (hi - lo), 0, 1))
     return Surroundings(path, joint_name(model, number), felt, besides, reference)
 
 

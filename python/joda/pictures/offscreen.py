@@ -4,14 +4,17 @@ MuJoCo reads its OpenGL backend from the environment when it is imported, and so
 process that asks them in vain. A child process can try one backend after the other.
 """
 
+import atexit
 import json
 import os
 import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
+from threading import Lock
 from typing import Any
 
 import mujoco
@@ -27,6 +30,9 @@ WIDTH, HEIGHT = 960, 720
 
 FAILED = 70
 """Exit status of a child that could render and failed all the same."""
+
+SIZE = 8
+"""Bytes before an answer that say how long it is."""
 
 
 class NoRenderer(JodaError):
@@ -52,6 +58,8 @@ def opening() -> Iterator[None]:
 def ask(module: str, request: Any) -> Any:
     """What a module makes in a child process, with the first OpenGL backend that works.
 
+    The child stays for the next request: to start one takes as long as to render.
+
     Args:
         module: to run; it ends in `answer`.
         request: what it reads; anything that JSON can carry.
@@ -63,25 +71,80 @@ def ask(module: str, request: Any) -> Any:
         RuntimeError: the module failed otherwise although the backend works.
     """
     asked = os.environ.get("MUJOCO_GL")
-    for backend in [asked] if asked else ["egl", "osmesa"]:
-        result = subprocess.run(
-            [sys.executable, "-P", "-m", module],  # -P: not what lies in the user's folder
-            input=json.dumps(request).encode(),
-            capture_output=True,
-            env={**os.environ, "MUJOCO_GL": backend},
-        )
-        if result.stdout and result.returncode == 0:
-            made = pickle.loads(result.stdout)
-            if isinstance(made, JodaError):
-                raise made
-            return made
-        if result.returncode == FAILED:
-            raise RuntimeError(f"{module} failed:\n{result.stderr.decode(errors='replace')}")
+    with _ONE_AT_A_TIME:
+        for backend in [asked] if asked else ["egl", "osmesa"]:
+            child = _children.pop((module, backend, os.getpid()), None)
+            made = child.made(request) if child else None
+            if made is None:  # none was there, or it has died since
+                child = _Child(module, backend)
+                made = child.made(request)
+            if made is not None:
+                assert child is not None
+                _children[module, backend, os.getpid()] = child
+                answered = pickle.loads(made)
+                if isinstance(answered, JodaError):
+                    raise answered
+                return answered
     raise NoRenderer
 
 
+_ONE_AT_A_TIME = Lock()
+_children: dict[tuple[str, str, int], "_Child"] = {}
+"""Those that wait for a request, by module, backend and the process that has started them."""
+
+
+class _Child:
+    """A process that renders one request after the other."""
+
+    def __init__(self, module: str, backend: str) -> None:
+        self._module = module
+        self._errors = TemporaryFile()  # noqa: SIM115 (it is closed in _end)
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", module],  # -P: not what lies in the user's folder
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            env={**os.environ, "MUJOCO_GL": backend},
+        )
+        atexit.register(self._end)
+
+    def made(self, request: Any) -> bytes | None:
+        """What it makes, pickled; None where it has died, as of a backend that does not work.
+
+        Raises:
+            RuntimeError: the module failed although the backend works.
+        """
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin and stdout
+        try:
+            with suppress(BrokenPipeError):
+                stdin.write(json.dumps([os.getcwd(), request]).encode() + b"\n")
+                stdin.flush()
+            size = int.from_bytes(stdout.read(SIZE))
+            made = stdout.read(size)
+            if size and len(made) == size:
+                return made
+        except BaseException:
+            self._end()  # what it still says would be taken for the next answer
+            raise
+        if self._process.wait() == FAILED:
+            self._errors.seek(0)
+            told = self._errors.read().decode(errors="replace")
+            self._end()
+            raise RuntimeError(f"{self._module} failed:\n{told}")
+        self._end()
+        return None
+
+    def _end(self) -> None:
+        atexit.unregister(self._end)
+        if self._process.returncode is None:
+            self._process.kill()
+        with suppress(BrokenPipeError), self._process, self._errors:
+            pass
+
+
 def answer(make: Callable[[Any], Any]) -> None:
-    """The child: the request as JSON on stdin, what is made of it, or a JodaError, on stdout.
+    """The child: a request per line of stdin, for each what is made of it, or a JodaError.
 
     Args:
         make: given the request, makes the OpenGL context within `opening`, and then the rest.
@@ -89,17 +152,22 @@ def answer(make: Callable[[Any], Any]) -> None:
     # MuJoCo prints its warnings to stdout; they go where the errors go.
     with os.fdopen(os.dup(1), "wb") as stdout:
         os.dup2(2, 1)
-        made: Any
-        try:
-            made = make(json.load(sys.stdin))
-        except NoRenderer:
-            raise
-        except JodaError as error:
-            made = error
-        except Exception:
-            sys.excepthook(*sys.exc_info())
-            sys.exit(FAILED)
-        stdout.write(pickle.dumps(made))
+        for line in sys.stdin:
+            made: Any
+            try:
+                folder, request = json.loads(line)
+                os.chdir(folder)
+                made = make(request)
+            except NoRenderer:
+                raise
+            except JodaError as error:
+                made = error
+            except Exception:
+                sys.excepthook(*sys.exc_info())
+                sys.exit(FAILED)
+            content = pickle.dumps(made)
+            stdout.write(len(content).to_bytes(SIZE) + content)
+            stdout.flush()
 
 
 def render(

@@ -48,7 +48,7 @@ class Turn:
         proposal: what was proposed.
         profile: what it was compiled to.
         behaviour: how the joint behaved in simulation.
-        picture: PNG file of the profile.
+        picture: draws the profile, a PNG file; who looks at none need not wait for it.
         facts: the behaviour in a few lines.
         unmet: what was wished for and did not come, a sentence each.
         complaint: what the user said of it; may be empty.
@@ -57,7 +57,7 @@ class Turn:
     proposal: Proposal
     profile: Profile
     behaviour: Behaviour
-    picture: bytes
+    picture: Callable[[], bytes]
     facts: str
     unmet: Sequence[str] = ()
     complaint: str = ""

@@ -23,6 +23,7 @@ class Round(Frozen):
         proposal: what was proposed.
         behaviour: how the joint then behaved in simulation.
         facts: the same in a few lines.
+        met: what was wished for and came, a sentence each.
         unmet: what was wished for and did not come, a sentence each.
         notes: what the proposer had to say besides.
         usage: what it cost.
@@ -35,10 +36,18 @@ class Round(Frozen):
     proposal: Proposal
     behaviour: Behaviour
     facts: str
+    met: tuple[str, ...] = ()
     unmet: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     usage: Usage = Usage()
     recognised: Recognition | None = None
+
+    @property
+    def sure(self) -> float:
+        """How sure it is what the joint is, 0 to 1; not at all where no kind fits."""
+        if self.recognised is None:
+            return self.proposal.joint_summary.overall_confidence
+        return 0.0 if self.recognised.unknown else self.recognised.likely
 
 
 class Failure(Frozen):
@@ -55,6 +64,8 @@ class History(File):
         model: path of the MJCF or URDF file, relative to the folder that the history is in.
         joint: its name or address in it.
         description: what the user wants of the joint, in words.
+        kind: title of the archetype that the user says it is; empty where the rules may choose.
+        reviewed: whether the user has looked at it and decided.
         templates: further folders of templates, relative as the model.
         key: with which proposals are compiled.
         pictures: names of the joint's pictures in `pictures/`; none where nothing could render.
@@ -68,6 +79,8 @@ class History(File):
     model: str
     joint: str
     description: str = ""
+    kind: str = ""
+    reviewed: bool = False
     templates: tuple[str, ...] = ()
     key: str = ""
     pictures: tuple[str, ...] | None = None

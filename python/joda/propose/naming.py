@@ -25,6 +25,18 @@ def _vocabulary() -> dict[Group, dict[str, tuple[str, ...]]]:
     }
 
 
+@cache
+def _sayings() -> dict[Group, dict[str, re.Pattern[str]]]:
+    """What a sentence calls each concept: a pattern for all its words at once."""
+    return {
+        group: {
+            concept: re.compile(rf"(?<!to )\b(?:{'|'.join(map(re.escape, words))})s?\b")
+            for concept, words in known.items()
+        }
+        for group, known in _vocabulary().items()
+    }
+
+
 def concepts(texts: Iterable[str], group: Group) -> Concepts:
     """The concepts that names speak of, such as "door" in "Kuehlschranktuer".
 
@@ -46,9 +58,7 @@ def said(description: str, group: Group) -> Concepts:
     """The concepts that a sentence names as things: what latches, or is to latch, is no latch."""
     text = description.lower()
     return frozenset(
-        concept
-        for concept, known in _vocabulary()[group].items()
-        if any(re.search(rf"(?<!to )\b{re.escape(word)}s?\b", text) for word in known)
+        concept for concept, saying in _sayings()[group].items() if saying.search(text)
     )
 
 

@@ -69,7 +69,7 @@ def request(
         newest = number == len(turns)
         content = [_text(_round(number, turn)) | (own if newest else {})]
         if newest:  # the picture last: what precedes it is the next round's prefix
-            content.append(_image(turn.picture, PROFILE))
+            content.append(_image(turn.picture(), PROFILE))
         messages.append({"role": "user", "content": content})
     return {
         "max_tokens": MAX_TOKENS,

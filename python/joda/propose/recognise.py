@@ -6,7 +6,7 @@ odds, so that all archetypes together give how sure the best one is.
 """
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from joda._compile import reference_scales
 from joda._context import Context
 from joda.component import Frozen
 from joda.propose.archetype import Archetype, Feature, Force, forces, read_archetypes
-from joda.propose.naming import concepts, said
+from joda.propose.naming import Concepts, concepts, said
 
 Gravity = Literal["level", "opens", "closes"]
 
@@ -62,6 +62,7 @@ class Recognition(Frozen):
     Attributes:
         title: of the archetype.
         likely: how sure that is, 0 to 1.
+        unknown: whether it is what remains where no other fits.
         decided: what spoke for it and against it, the most important first.
         others: what else it could be, the likeliest first.
         because: why such joints do what they do.
@@ -70,6 +71,7 @@ class Recognition(Frozen):
 
     title: str
     likely: float
+    unknown: bool = False
     decided: tuple[Evidence, ...] = ()
     others: tuple[Other, ...] = ()
     because: str = ""
@@ -105,11 +107,12 @@ def recognise(
     Args:
         context: the joint.
         description: what the user says of it; its words count most.
-        archetypes: to choose from; by default the library's.
+        archetypes: to choose from; by default the library's. Where none may be it, all may.
     """
     known = read_archetypes() if archetypes is None else archetypes
-    fitting = [one for one in known if _may_be(one, context, description)]
-    weighed = [_weigh(one, context, description) for one in fitting]
+    words = _Words.of(context, description)
+    fitting = [one for one in known if _may_be(one, context, words)] or list(known)
+    weighed = [_weigh(one, context, words) for one in fitting]
     points = np.array(
         [one.common + sum(e.points for e in each)
          for one, each in zip(fitting, weighed, strict=True)]
@@ -124,6 +127,7 @@ def recognise(
     return best, Recognition(
         title=best.title,
         likely=round(min(float(odds[order[0]]), SUREST), 2),
+        unknown=best.unknown,
         decided=tuple(one for one in decided if abs(one.points) >= FITS)[:6],
         others=tuple(others),
         because=best.evidence,
@@ -131,34 +135,54 @@ def recognise(
     )
 
 
-def _may_be(one: Archetype, context: Context, description: str) -> bool:
+class _Words(NamedTuple):
+    """Concepts that names and the user's words speak of."""
+
+    part: Concepts
+    object: Concepts
+    said_part: Concepts
+    said_object: Concepts
+
+    @classmethod
+    def of(cls, context: Context, description: str) -> "_Words":
+        """Of a joint."""
+        return cls(
+            concepts(context.names[:2], "part"),
+            _object(context),
+            said(description, "part"),
+            said(description, "object"),
+        )
+
+
+def _object(context: Context) -> Concepts:
+    """What the part is on, by its own names and by the nearest above that says what it is."""
+    above = (concepts([name], "object") for name in context.around)
+    return concepts(context.names, "object") | next(filter(None, above), frozenset())
+
+
+def _may_be(one: Archetype, context: Context, words: _Words) -> bool:
     if context.joint.type not in one.joint:
         return False
     if one.closed != "any" and (context.closed_end == "unknown") != (one.closed == "unknown"):
         return False
-    if not one.needs_object:
-        return True
-    named = concepts((*context.names, *context.around), "object") | said(description, "object")
-    return bool(named & set(one.object))
+    return not one.needs_object or bool((words.object | words.said_object) & set(one.object))
 
 
-def _weigh(one: Archetype, context: Context, description: str) -> list[Evidence]:
+def _weigh(one: Archetype, context: Context, words: _Words) -> list[Evidence]:
     if one.unknown:
         return []
     out = []
-    own = concepts(context.names[:2], "part")
-    everything = concepts((*context.names, *context.around), "object")
-    for words, mine, yes, no, what in (
-        (own, one.part, PART, OTHER_PART, "the part"),
-        (everything, one.object, OBJECT, OTHER_OBJECT, "the object"),
-        (said(description, "part"), one.part, SAID_PART, SAID_OTHER, "your words"),
-        (said(description, "object"), one.object, SAID_OBJECT, 0.0, "your words"),
+    for named, mine, yes, no, what in (
+        (words.part, one.part, PART, OTHER_PART, "the part"),
+        (words.object, one.object, OBJECT, OTHER_OBJECT, "the object"),
+        (words.said_part, one.part, SAID_PART, SAID_OTHER, "your words"),
+        (words.said_object, one.object, SAID_OBJECT, 0.0, "your words"),
     ):
-        hit = words & set(mine)
+        hit = named & set(mine)
         if hit:
             out.append(Evidence(feature=f"{what} is called {'/'.join(sorted(hit))}", points=yes))
-        elif words and mine and no:
-            out.append(Evidence(feature=f"{what} is called {'/'.join(sorted(words))}", points=no))
+        elif named and mine and no:
+            out.append(Evidence(feature=f"{what} is called {'/'.join(sorted(named))}", points=no))
     if one.driven or context.driven:
         points = DRIVEN if one.driven == context.driven else -DRIVEN
         out.append(Evidence(feature="an actuator" if context.driven else "no actuator",

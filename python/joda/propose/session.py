@@ -8,8 +8,9 @@ interrupted goes on where it stopped, and what was paid for is not asked again.
 
 import hashlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +31,11 @@ from joda.plain import plain
 from joda.profile import Profile, describe
 from joda.proposal import Proposal
 from joda.propose import Answer, Proposer, Task, Turn, Usage, total
-from joda.propose.archetype import read_archetypes
+from joda.propose.archetype import Archetype, read_archetypes
 from joda.propose.checks import Seen, takes
 from joda.propose.history import Failure, History, Round
 from joda.propose.recognise import recognise
-from joda.propose.wishes import read_wishes, unmet
+from joda.propose.wishes import Wanted, read_wishes, unmet
 from joda.template import read_templates
 
 PICTURES = 5
@@ -83,7 +84,7 @@ class Session:
                 "is."
             )
         self._templates = [self._path(path) for path in history.templates]
-        library = read_templates(self._templates)
+        library, archetypes = read_templates(self._templates), self._archetypes()
         self.turns = [self._turn(round) for round in history.rounds]
         make_folder(folder)
         self._save()
@@ -93,7 +94,7 @@ class Session:
             library,
             self._pictures(),
             history.description,
-            read_archetypes(self._templates),
+            archetypes,
         )
         if self.turns and not self._finished():
             self._write(self.turns[-1])
@@ -138,6 +139,26 @@ class Session:
         if not model.is_file():
             raise JodaError(f"{path}: model: there is no {model}; put it back, or mend the path.")
         return cls(folder, history, progress)
+
+    def again(self, description: str, kind: str) -> "Session":
+        """Begins anew with what the user has said of the joint; raises JodaError, as it was then.
+
+        Args:
+            description: what it should do, in words.
+            kind: title of the archetype that it is; empty where the rules may choose.
+        """
+        spent = Failure(reason="reviewed, and begun anew", usage=self.history.usage)
+        history = self.history.model_copy(
+            update={
+                "description": description,
+                "kind": kind,
+                "reviewed": True,
+                "complete": False,
+                "rounds": (),
+                "failures": (spent,) if spent.usage.requests else (),
+            }
+        )
+        return type(self)(self.folder, history, self.progress)
 
     def pending(self, rounds: int) -> bool:
         """Whether there is more to ask, within so many rounds in all."""
@@ -193,6 +214,10 @@ class Session:
         self._save(rounds=rounds, complete=False, composed=_digest(turn.profile.to_json()))
         self._write(turn)
 
+    def review(self) -> None:
+        """Keeps that the user has looked at it, and leaves it as it is."""
+        self._save(reviewed=True)
+
     def check_unedited(self) -> None:
         """Raises JodaError if `composed.json` is none that any round left."""
         if self._edited():
@@ -220,7 +245,9 @@ class Session:
         # what was asked for at first may be what the user has complained about since
         heard = complaint or any(round.complaint for round in self.history.rounds)
         said = "" if heard else self.history.description
-        asked = [wish for wish in read_wishes(said) if wish not in wanted]
+        every = [*wanted, *(wish for wish in read_wishes(said) if wish not in wanted)]
+        lacking = unmet(every, behaved, self.context)
+        came = [wish.sentence for wish in (Wanted("moves"), *every) if wish.name not in lacking]
         round = Round(
             number=len(self.history.rounds) + 1,
             proposer=proposer,
@@ -228,8 +255,13 @@ class Session:
             proposal=proposal,
             behaviour=behaved,
             facts=behaved.describe(self.context),
-            unmet=tuple(unmet([*wanted, *asked], behaved, self.context).values()),
-            notes=(*answer.notes, *self._implausible(behaved, answer)),
+            met=tuple(f"It {sentence}." for sentence in came),
+            unmet=tuple(lacking.values()),
+            notes=(
+                *answer.notes,
+                *self._implausible(behaved, answer),
+                *self._hindered(profile, every, lacking),
+            ),
             usage=answer.usage,
             recognised=answer.recognised,
         )
@@ -254,19 +286,48 @@ class Session:
             else ()
         )
 
+    def _hindered(
+        self, profile: Profile, every: Sequence[Wanted], lacking: Mapping[str, str]
+    ) -> tuple[str, ...]:
+        """What of the lacking the joint would do by itself: the scene is in the way of that."""
+        if not self._around or not lacking:
+            return ()
+        alone = unmet(every, behaviour(self.context, profile), self.context)
+        wishes = [wish.sentence for wish in (Wanted("moves"), *every)
+                  if wish.name in lacking.keys() - alone.keys()]  # fmt: skip
+        return (
+            (
+                f"By itself it {', '.join(wishes)}; what forbids that is the scene: "
+                f"{self._around.words}{self._around.remedy}.",
+            )
+            if wishes
+            else ()
+        )
+
+    def _archetypes(self) -> tuple[Archetype, ...]:
+        """Those to choose from, the one that the user chose first of all."""
+        known, kind = read_archetypes(self._templates), self.history.kind
+        chosen = tuple(one for one in known if one.title == kind)
+        if kind and not chosen:
+            listed = ", ".join(sorted(one.title for one in known))
+            raise JodaError(f"there is no kind of joint '{kind}'; there are: {listed}.")
+        if chosen and self.context.joint.type not in chosen[0].joint:
+            raise JodaError(f"a {kind} is a {chosen[0].joint}, the joint is none; choose another.")
+        return chosen or known
+
     def _compiled(self, proposal: Proposal) -> Profile:
         return compile(proposal, self.context, templates=self._templates, key=self.history.key)
 
     def _turn(self, round: Round, profile: Profile | None = None) -> Turn:
         """A round as the proposer is shown it."""
         profile = profile or self._compiled(round.proposal)
-        balance = -np.array(self.context.gravity_force)
+        positions, balance = np.array(self.context.positions), -np.array(self.context.gravity_force)
         later = (r.complaint for r in self.history.rounds if r.number == round.number + 1)
         return Turn(
             proposal=round.proposal,
             profile=profile,
             behaviour=round.behaviour,
-            picture=png(draw(profile, (np.array(self.context.positions), balance))),
+            picture=cache(lambda: png(draw(profile, (positions, balance)))),
             facts=round.facts,
             unmet=round.unmet,
             complaint=next(later, ""),
@@ -308,7 +369,7 @@ class Session:
 
     def _write(self, turn: Turn) -> None:
         write_text(self.folder / "proposal.json", turn.proposal.to_json())
-        write_bytes(self.folder / "profile.png", turn.picture)
+        write_bytes(self.folder / "profile.png", turn.picture())
         joint = self.history.joint
         said = attach(self.model, turn.profile, self.folder / "scene.xml", joint=joint, force=True)
         self.notes += [note for note in said if note not in self.notes]

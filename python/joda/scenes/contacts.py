@@ -1,8 +1,9 @@
 """Contacts that resist a joint: found by moving it through its scene with collisions on.
 
-All other joints stay at their reference positions. At each place the scene is solved for a slow
-motion in either direction; what counts is the generalised force that a contact then makes on the
-joint, not that two geoms touch: a door that rests in its frame touches it all along and is free.
+All other joints stay at their reference positions, or at home. At each place the scene is solved
+for a slow motion in either direction; what counts is the generalised force that a contact then
+makes on the joint, not that two geoms touch: a door that rests in its frame touches it all along
+and is free.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from joda.profile import Joint
 from joda.scenes.engine import inertia_at
 from joda.scenes.model import moves_with
+from joda.scenes.motion import at_home
 
 Array = NDArray[np.float64]
 Pair = tuple[str, str]
@@ -68,7 +70,11 @@ class Contact:
 
 
 def contacts_along(
-    model: mujoco.MjModel, joint: int, described: Joint, path: tuple[float, float]
+    model: mujoco.MjModel,
+    joint: int,
+    described: Joint,
+    path: tuple[float, float],
+    home: bool = False,
 ) -> tuple[Contact, ...]:
     """The contacts that resist a joint along its path.
 
@@ -77,13 +83,14 @@ def contacts_along(
         joint: its id.
         described: the joint, with its range.
         path: from where to where it is moved, rad or m.
+        home: whether all else is at the keyframe `home`, if there is one, and not at its reference.
 
     Returns:
         by place, then by name; none where nothing resists, or contacts are disabled.
     """
     if not model.ngeom or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
         return ()
-    sweep = _Sweep(model, joint, described)
+    sweep = _Sweep(model, joint, described, home)
     count = max(round((path[1] - path[0]) / (STEP * sweep.span)), 1) + 1
     positions = np.linspace(*path, count)
     looks = [sweep.look(float(position)) for position in positions]
@@ -167,11 +174,14 @@ class Felt(NamedTuple):
 class _Sweep:
     """A scene in which a joint is put here and there."""
 
-    def __init__(self, model: mujoco.MjModel, joint: int, described: Joint) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, joint: int, described: Joint, home: bool = False
+    ) -> None:
         self.model = copy(model)  # pulled away from a contact by anything else, it shows no force
         for kind in ALL_ELSE:
             self.model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}"))
-        self.data = mujoco.MjData(self.model)
+        self.data = at_home(self.model) if home else mujoco.MjData(self.model)
+        self._others = self.data.qpos.copy()
         self.lo, hi = described.range
         self.span = hi - self.lo
         self.qpos, self.dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
@@ -192,6 +202,7 @@ class _Sweep:
     def _look(self, position: float) -> dict[Pair, Felt]:
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
+        data.qpos[:] = self._others
         data.qpos[self.qpos] = position
         mujoco.mj_fwdPosition(model, data)
         rows = self._rows()

@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 Act = Callable[[mujoco.MjData], bool]
 """What acts on a scene: called before each step, it sets qfrc_applied or ctrl; False when done."""
 
+Felt = Callable[[mujoco.MjModel, mujoco.MjData, int], float]
+"""A generalised force (N·m or N) on a dof in the step that was made last."""
+
 HOME = "home"
 """Name of the keyframe at which a scene begins, if it has one."""
 
@@ -59,6 +62,7 @@ def play(
     duration: float | None = None,
     watch: Callable[[mujoco.MjData], None] = lambda data: None,
     stride: int = 1,
+    felt: Felt | None = None,
 ) -> Motion:
     """Simulates the whole scene from rest, the joint at a position, all else at home.
 
@@ -72,6 +76,7 @@ def play(
         duration: s; what acts is over earlier if it is done earlier. None: until it is done.
         watch: shown the scene before each step, and at the end.
         stride: timesteps from one sample to the next, in which what acts stays the same.
+        felt: the force that the motion tells of; by default `outside`.
 
     Returns:
         the motion, one sample per stride, the start included.
@@ -83,6 +88,7 @@ def play(
     qpos, dof, step = model.jnt_qposadr[joint], model.jnt_dofadr[joint], model.opt.timestep
     put(model, data, joint, position)
     steps = None if duration is None else round(duration / (step * stride))
+    felt = felt or outside
     out: list[tuple[float, float, float, float]] = []
     going = True
     while True:
@@ -93,10 +99,10 @@ def play(
         state = data.time, data.qpos[qpos], data.qvel[dof]
         watch(data)
         if len(out) == steps or not (going or steps):
-            out.append((*state, outside(model, data, dof)))
+            out.append((*state, felt(model, data, dof)))
             return Motion(*np.array(out).T)
         mujoco.mj_step(model, data, stride)
-        out.append((*state, outside(model, data, dof)))
+        out.append((*state, felt(model, data, dof)))
         if data.time <= state[0]:  # MuJoCo has begun anew
             raise _unstable(model, state[0])
 
@@ -127,6 +133,11 @@ def leaning(model: mujoco.MjModel, joint: int, position: float) -> float:
         return position
     end = play(model, joint, position, duration=LEAN).position[-1]
     return position if lo < end < hi else float(end)
+
+
+def applied(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:
+    """What was applied to a dof in the step that was made last, N·m or N."""
+    return float(data.qfrc_applied[dof])
 
 
 def outside(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from joda.component import Frozen
 from joda.profile import Joint
 from joda.scenes.cavity import covered, open_above, view
+from joda.scenes.clearance import clearance
 from joda.scenes.model import moves_with
 from joda.scenes.outline import Box, box_along, corners, grip, own_geoms, rest_of_object, surface
+from joda.scenes.silhouette import filled
 
 Array = NDArray[np.float64]
 End = Literal["low_end", "high_end"]
@@ -51,6 +53,8 @@ class Shape(Frozen):
         size: the largest of these, m.
         flat: the smallest of these over the middle one: 0 a sheet, 1 a rod or a cube.
         aspect: width over length.
+        fill: share of its box's face that the part covers, seen from before it: 1 a rectangle, 0.79
+            a disc, less a lever, spokes or a frame.
         slim: the middle one over the largest: 0 a rod, 1 a square plate or a cube.
         travel: hinge: degrees; slide: m.
         axis: "vertical", "level" or "slanted".
@@ -64,6 +68,8 @@ class Shape(Frozen):
         covers: share of the view from inside that the part takes where it closes a cavity; else 0.
         holds: whether the part is open above and closed else, as a tray.
         sticks_out: how much farther the part is out of the object when open, in its own sizes.
+        room_closed, room_open: how far the part could go on beyond its closed end and its open end
+            before the object is in its way, in its own sizes; 1 that much or more.
         object_size: the largest edge of the box around the object, without the part; m, 0 if none.
         object_flat: the smallest edge of that box over its largest.
         share: the part's size over that.
@@ -91,6 +97,9 @@ class Shape(Frozen):
     covers: float = 0.0
     holds: bool = False
     sticks_out: float = 0.0
+    fill: float = 1.0
+    room_closed: float = 1.0
+    room_open: float = 1.0
     object_size: float = 0.0
     object_flat: float = 1.0
     aspect: float = 1.0
@@ -148,6 +157,7 @@ def look(model: mujoco.MjModel, joint: int, described: Joint, reference: End | s
     other: End = "high_end" if shut == "low_end" else "low_end"
     at, open_ = looks[shut], looks[other]
     data_at(model, data, joint, described.range[0 if shut == "low_end" else 1])
+    fill = filled(model, data, own, at.box, at.outward)
     alike, controls, doors = _neighbours(model, data, joint)
     shape = _features(model, described, at, open_, data)
     below, above = _carriers(model, body), _carried(model, body)
@@ -158,6 +168,7 @@ def look(model: mujoco.MjModel, joint: int, described: Joint, reference: End | s
             "doors": doors,
             "carried": bool(below),
             "carries": bool(above),
+            "fill": _round(fill),
             "linked": any(_like(model, data, joint, other) for other in (*below, *above)),
         }
     )
@@ -195,6 +206,7 @@ class _Look:
         outward: across the part's face, away from the object.
         up: against gravity.
         covers, holds: see Shape.
+        room: how far it could go on beyond this end, see `joda.scenes.clearance`.
     """
 
     points: Array
@@ -206,6 +218,7 @@ class _Look:
     up: Array
     covers: float
     holds: bool
+    room: float
 
     @classmethod
     def at(
@@ -230,10 +243,11 @@ class _Look:
             inside = (others.min(axis=0) + others.max(axis=0)) / 2
         if outward @ (box.centre - inside) < 0:
             outward = -outward
-        covers, holds = 0.0, False
+        covers, holds, room = 0.0, False, 1.0
         if len(others):
             hits = view(model, data, box.centre, 2 * float(box.size.max())).geoms
             holds = open_above(hits, own, _up(model))
+            room = clearance(model, data, joint, rest, float(np.sign(ends[0] - ends[1])))
             depth = float(np.ptp(others @ outward))
             places = _behind(box, outward, depth, float((points @ outward).min()))
             reach = 2 * (depth + float(box.size.max()))
@@ -243,7 +257,7 @@ class _Look:
                 covered(one, view(model, data, place, reach), own)
                 for one, place in zip(shut, places, strict=True)
             )[-WITNESSES]
-        return cls(points, box, others, anchor, axis, outward, _up(model), covers, holds)
+        return cls(points, box, others, anchor, axis, outward, _up(model), covers, holds, room)
 
     def out(self) -> float:
         """Mean distance of the part's points from the object's box, in the part's sizes."""
@@ -320,6 +334,8 @@ def _features(
         covers=_round(at.covers),
         holds=at.holds,
         sticks_out=_round(open_.out() - at.out()),
+        room_closed=_round(at.room),
+        room_open=_round(open_.room),
         object_size=_round(object_size),
         object_flat=_round(float(extent.min()) / object_size) if object_size else 1.0,
         share=_round(large / object_size) if object_size else 0.0,
