@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.scenes.rays import rays
+
 Array = NDArray[np.float64]
 
 RAYS = 96
@@ -44,12 +46,7 @@ class View(NamedTuple):
 
 def view(model: mujoco.MjModel, data: mujoco.MjData, point: Array, reach: float) -> View:
     """What rays from a point hit within `reach` (m)."""
-    geoms, distances = np.full(RAYS, -1, np.int32), np.empty(RAYS)
-    ways, normals = DIRECTIONS.ravel(), np.zeros(3 * RAYS)
-    mujoco.mj_multiRay(
-        model, data, point, ways, None, 1, -1, geoms, distances, normals, RAYS, reach
-    )
-    within = np.sum(normals.reshape(-1, 3) * DIRECTIONS, axis=1) > 0
+    geoms, distances, within = rays(model, data, point, DIRECTIONS, reach)
     planes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
     none = (geoms < 0) | np.isin(geoms, planes)
     return View(np.where(none, -1, geoms), np.where(none, np.inf, distances), within & ~none)

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.scenes.outline import own_geoms, surface
+from joda.scenes.rays import ray
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,6 @@ def clearance(
     slide = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
     ways = np.tile(axis, (len(points), 1)) if slide else np.cross(axis, points - anchor)
     lengths = np.linalg.norm(ways, axis=1)
-    met, normal = np.zeros(1, np.int32), np.zeros(3)
     mine, others, free = set(own.tolist()), set(rest.tolist()), 1.0
     for point, way, length in zip(points, ways, lengths, strict=True):
         if length < 0.3 * lengths.max():
@@ -49,11 +49,10 @@ def clearance(
         ahead = sign * way / length
         begin, left = point - BACK * size * ahead, (1 + BACK) * size
         while left > 0:
-            far = mujoco.mj_ray(model, data, begin, ahead, None, 1, body, met, normal)
+            geom, far, behind = ray(model, data, begin, ahead, body)
             if far < 0 or far > left:
                 break
-            geom = int(met[0])
-            if geom in others and normal @ ahead < 0:
+            if geom in others and not behind:
                 free = min(free, max(1 - (left - far) / size, 0.0))
                 break
             if geom not in mine and geom not in others:
