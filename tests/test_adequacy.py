@@ -159,3 +159,20 @@ def test_a_right_model_of_noisy_free_runs_is_not_blamed_for_their_starts(tmp_pat
     ]
     blamed = [o > MULTIPLE and o > EXPLAINED * e for o, e in zip(off, explained, strict=True)]
     assert sum(blamed) <= 1, seed
+
+
+def test_what_may_be_motion_between_samples_is_not_called_small(tmp_path):
+    """A spring swings at 4.3 Hz, logged at 10 Hz; the model has none."""
+    (tmp_path / "model.xml").write_text(
+        '<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody><body>'
+        '<joint name="j" axis="0 0 1" range="0 1.6" limited="true" damping=".01"/>'
+        '<geom type="box" size=".2 .02 .2" pos=".2 0 0" mass="1"/></body></worldbody></mujoco>'
+    )
+    time = np.arange(0, 6, 0.1)
+    position = 0.8 + 0.33 * np.cos(2 * np.pi * 4.3 * time)
+    rows = "\n".join(f"{t:.1f},{q:.6f}" for t, q in zip(time, position, strict=True))
+    (tmp_path / "run.csv").write_text("time,position\n" + rows + "\n")
+    found = compare(tmp_path / "model.xml", "j", [tmp_path / "run.csv"])
+    assert found.adequacy.verdict != "within_noise"
+    assert found.adequacy.loudness > 0.5
+    assert "Small" not in said(found) and "record faster" in said(found)

@@ -1,6 +1,8 @@
 """The words of a verdict: "Missing is" and "Right." only where all that they claim holds."""
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from test_compare import door, runs_of, scene_of
@@ -8,12 +10,14 @@ from test_compare import door, runs_of, scene_of
 from joda import add, diagnose
 from joda._hidden_effect import _judged
 from joda.diagnosis import verdict
+from joda.diagnosis.asking import asked
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import explained
-from joda.diagnosis.summary import summarised
+from joda.diagnosis.summary import strengths_off, summarised
 from joda.diagnosis.weighing import Weighed
 from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
+from joda.measured.reading import read_measured
 from joda.measured.runs import read_run, write_run
 from joda.profile import Joint
 
@@ -176,3 +180,14 @@ def test_a_recorded_force_that_is_off_by_a_factor_is_no_missing_inertia(tmp_path
     refused = add(model, "joint", tmp_path / "said.json", runs, tmp_path / "new.xml")
     assert not refused.added and told.doubt in refused.reason
     assert not (tmp_path / "new.xml").exists()
+
+
+def test_numbers_are_off_only_by_more_than_their_errors(tmp_path):
+    runs = runs_of(door(), tmp_path, 4)
+    right = asked(read_measured(scene_of(door(), tmp_path), "joint", runs))
+    assert strengths_off(SimpleNamespace(asked=right)) == ""
+    wrong = asked(read_measured(scene_of(door(damping=1.0), tmp_path), "joint", runs))
+    told = strengths_off(SimpleNamespace(asked=wrong))
+    factor, error = map(float, re.search(r"([\d.]+) ± ([\d.e-]+\d)", told).groups())
+    assert factor == pytest.approx(0.5, abs=0.05) and 0 < error < 0.1
+    assert told.count("±") == 1  # the friction is right
