@@ -312,10 +312,12 @@ def test_a_coarse_gauge_has_the_noise_of_its_steps():
 def test_the_true_models_curve_is_at_the_noise(tmp_path, rng):
     scene = scene_of(door(BUMP), tmp_path)
     for n in (20, 300):
-        found = compare(scene, "joint", [gauge(door(BUMP), tmp_path, rng=rng, noise=0.03, n=n)])
-        assert found.curves[0].rmse_force == pytest.approx(0.03, rel=0.5)
-        assert found.failing_force == ()
-        assert "no fault" in sentences(found)[-1]
+        cleared = 0
+        for _ in range(3):  # one of some hundred has a pattern by chance
+            found = compare(scene, "joint", [gauge(door(BUMP), tmp_path, rng=rng, noise=0.03, n=n)])
+            assert found.curves[0].rmse_force == pytest.approx(0.03, rel=0.5)
+            cleared += found.failing_force == () and "no fault" in sentences(found)[-1]
+        assert cleared >= 2
 
 
 def test_a_planted_deviation_is_the_error(tmp_path, rng):

@@ -72,7 +72,9 @@ def finding(effect):
 
 
 def said(verdict, *effects):
-    told = SimpleNamespace(verdict=verdict, effects=[*map(finding, effects)], summary="The end.")
+    told = SimpleNamespace(
+        verdict=verdict, effects=[*map(finding, effects)], summary="The end.", doubt=None
+    )
     puzzling = verdict == "unexplained"
     return SimpleNamespace(diagnosis=told, candidates=told.effects, puzzling=puzzling)
 

@@ -76,7 +76,7 @@ class Unknowns:
         if self.widest is None:
             return self
         low, high = ~np.isnan(self.widest)
-        off = 2 * self.step
+        off = np.minimum(2 * self.step, (self.high - self.low) / 2)
         return replace(self, low=self.low + low * off, high=self.high - high * off)
 
     def and_(self, other: "Unknowns") -> "Unknowns":

@@ -9,7 +9,7 @@ from joda.measured.runs import QuasiStatic, Run
 from joda.measured.smoothing import resolution
 from joda.measured.suspicions.base import Kind, Suspicion, suspect
 from joda.measured.suspicions.clock import too_slow, wrong_clock
-from joda.measured.suspicions.columns import counted, level, unread
+from joda.measured.suspicions.columns import counted, unread
 from joda.measured.suspicions.energy import driven
 from joda.measured.suspicions.force import balance_of_curve, balance_of_run, too_large, wrong_sign
 from joda.measured.suspicions.position import coarse, hardly_moved, noise, placed, strays
@@ -41,7 +41,7 @@ def suspicions(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
         return [suspect(run, "force_size", told)]
     found, position = placed(run, context)
     step, sigma = resolution(position), noise(run, position)
-    sentences: dict[Kind, str] = {"unread": unread(run), "level": level(run)}
+    sentences: dict[Kind, str] = {"unread": unread(run)}
     if isinstance(run, Run):
         sentences["stray"], position = strays(run, position, sigma, unit)
     if still := hardly_moved(position, context, step, sigma):

@@ -18,7 +18,6 @@ Kind = Literal[
     "clock",
     "origin",
     "unread",
-    "level",
     "ticks",
     "force_size",
     "uneven_time",

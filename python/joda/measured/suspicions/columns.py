@@ -1,11 +1,6 @@
 """What was made of a file's columns that a person may not expect."""
 
-import numpy as np
-
 from joda.measured.runs import QuasiStatic, Run
-
-NEXT_TO_NONE = 1e-12
-"""Force that none is, N·m or N."""
 
 FORCE = ("force", "torque", "effort", "moment", "kraft", "drehmoment", "couple", "fuerza")
 TIME = ("time", "stamp", "zeit", "temps", "tiempo", "tempo", "sec")
@@ -36,22 +31,6 @@ def unread(run: Run | QuasiStatic) -> str:
         else "without time this is a quasi-static curve"
     )
     return f"column '{alike[0]}' is not read, and {taken}; if it is the {name}, name it '{name}'"
-
-
-def level(run: Run | QuasiStatic) -> str:
-    """Speaks where a force is the same in every sample, or next to none."""
-    force = run.force[np.isfinite(run.force)]
-    if (isinstance(run, Run) and not run.forced) or not len(force):
-        return ""
-    largest = float(np.abs(force).max())
-    if 0 < largest < NEXT_TO_NONE:
-        return f"the force is at most {largest:.2g}, as good as none; is it recorded?"
-    if largest > 0 and np.ptp(force) == 0:
-        return (
-            f"the force is {force[0]:.3g} in every sample; right for a hanging weight or a "
-            "constant current, else leave the column out"
-        )
-    return ""
 
 
 def _alike(name: str, parts: tuple[str, ...]) -> bool:
