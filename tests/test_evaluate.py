@@ -114,6 +114,7 @@ def test_it_is_not_told_what_is_expected(folder, tmp_path):
     assert "# The user's wish\n\n(none)" in words(server.requests[0])
 
 
+@pytest.mark.long
 def test_interrupted_it_goes_on_and_pays_for_nothing_twice(folder, tmp_path):
     first = Recorded(stop="refrigerator")
     with pytest.raises(KeyboardInterrupt):
@@ -147,6 +148,7 @@ def test_the_command_prints_a_table_and_json(folder, tmp_path, joda):
     assert status == 2 and "is of offline with --rounds 1 and no --effort; go on with" in err
 
 
+@pytest.mark.long
 def test_failures_are_rows_and_the_rest_is_not_asked_for_ever(folder, tmp_path, joda, monkeypatch):
     monkeypatch.setattr(openai._base_client, "INITIAL_RETRY_DELAY", 0.001)
     for name in ("b", "c"):

@@ -239,6 +239,7 @@ FAILURES = {
 }
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("name", FAILURES)
 def test_a_failure_is_a_sentence_and_keeps_its_cost(server, name):
     entry, requests, says = FAILURES[name]
@@ -299,6 +300,7 @@ LEAKS = {
 }
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", LEAKS)
 def test_the_key_is_told_nobody(name, server, tmp_path, caplog, monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
