@@ -149,7 +149,7 @@ class OpenAI(VisionModel):
                 raise ProposalInterrupted(tally.usage) from None
 
     def _create(self, client: "Client", tally: Tally, asked: Request, manner: Manner) -> Reply:
-        effort = {"reasoning_effort": self._effort} if self._effort else {}
+        effort: dict[str, Any] = {"reasoning_effort": self._effort} if self._effort else {}
         try:
             answer: Any = client.chat.completions.create(**translated(asked, manner), **effort)
         except (ValueError, RecursionError):  # JSON that is cut off, or brackets too deep
