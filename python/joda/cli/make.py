@@ -16,6 +16,7 @@ from joda.cli.options import (
     Key,
     Model,
     Proposer,
+    Resume,
     Rounds,
     Scene,
     Templates,
@@ -133,9 +134,7 @@ def generate(
     vlm: Vlm = None,
     base_url: BaseUrl = None,
     effort: Efforts = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what the folder holds.")
-    ] = False,
+    resume: Resume = False,
     estimate: Annotated[
         bool, typer.Option("--estimate", help="Only say what asking a model will about cost.")
     ] = False,

@@ -15,6 +15,7 @@ from joda.cli.options import (
     Key,
     Passive,
     Proposer,
+    Resume,
     Rounds,
     Templates,
     Vlm,
@@ -56,9 +57,7 @@ def distribute(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Tasks at a time [default: one per core].")
     ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what the folder holds.")
-    ] = False,
+    resume: Resume = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -106,9 +105,7 @@ def evaluate(
     vlm: Vlm = None,
     base_url: BaseUrl = None,
     effort: Efforts = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what the folder holds.")
-    ] = False,
+    resume: Resume = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

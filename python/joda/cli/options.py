@@ -51,4 +51,5 @@ Proposer = Annotated[
         "ANTHROPIC_API_KEY is set, else offline]."
     ),
 ]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with what the folder holds.")]
 Rounds = Annotated[int, typer.Option(min=1, help="At most so many proposals.")]

@@ -78,7 +78,7 @@ class Asked:
 
     def rough(self, hypothesis: Hypothesis) -> "Rough":
         """The hypothesis fitted roughly, in longer steps, to windows without knocks."""
-        judge, base = self.judge.coarser(), self.base.coarser()
+        judge, base = self.judge.coarser, self.base.coarser()
         return Rough(hypothesis, rough(judge, base, self.begins, hypothesis))
 
     def finished(self, found: "Rough") -> Guess:
@@ -134,5 +134,5 @@ def asked(measured: Measured, length: float | None = None, near: Array | None = 
     fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in tried]
     fit = judge.refit(base.solo, base.unknowns, min(fits, key=lambda f: f.loss))
     every = hypotheses(units_of(windows, measured), templates(), measured.profile)
-    begun = begins(judge.coarser(), base.coarser(), given, fit)
+    begun = begins(judge.coarser, base.coarser(), given, fit)
     return Asked(judge, base, measured.single, fit, begun, tuple(every))

@@ -201,6 +201,7 @@ class Judge:
         """How many samples count."""
         return float(self.windows.count[self.counts].sum())
 
+    @cached_property
     def coarser(self) -> "Judge":
         """The same in longer steps, see `Windows.coarser`."""
         return replace(self, windows=self.windows.coarser())

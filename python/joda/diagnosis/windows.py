@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 GRID = 3
-"""Windows begin at multiples of so many steps: they can be simulated in as many times longer ones.
-"""
+"""Windows of runs begin and end at multiples of so many steps: they can be simulated in as many
+times longer ones."""
 LOOSE = 10.0
 """How much further than its measurement's error a start may be from the measured one."""
 
@@ -77,12 +77,10 @@ class Windows:
 
     def coarser(self) -> "Windows":
         """The same in steps that are `GRID` times longer; the force is the mean over each."""
-        mean = np.add.reduceat(self.force, np.arange(0, len(self.force), GRID))
-        each = np.diff(np.append(np.arange(0, len(self.force), GRID), len(self.force)))
         return replace(
             self,
             h=GRID * self.h,
-            force=mean / each,
+            force=self.force.reshape(-1, GRID).mean(axis=1),
             at=self.at // GRID,
             step=self.step // GRID,
             share=(self.step % GRID + self.share) / GRID,

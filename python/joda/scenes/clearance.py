@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.scenes.outline import own_geoms, surface
-from joda.scenes.rays import ray
+from joda.scenes.rays import PAST, ray
 
 Array = NDArray[np.float64]
 
@@ -57,5 +57,5 @@ def clearance(
                 break
             if geom not in mine and geom not in others:
                 break
-            begin, left = begin + (far + 1e-6) * ahead, left - far - 1e-6
+            begin, left = begin + (far + PAST) * ahead, left - far - PAST
     return free
