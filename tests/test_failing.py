@@ -83,6 +83,22 @@ def test_noise_free_runs_that_stick_blame_no_tiny_force(friction, spring, rest, 
     assert window.force == 0.0 and np.isinf(window.doubt)  # friction holds it at rest
 
 
+SWINGS = """<mujoco><compiler angle="radian"/><option timestep=".001"/><worldbody><body>
+  <joint name="lid" axis="0 0 1" range="-1 1" stiffness="4" damping="0.001"/>
+  <geom type="box" size=".2 .2 .01" mass="{mass}"/>
+</body></worldbody></mujoco>"""
+
+
+def test_a_whole_run_that_no_constant_force_explains_blames_none(tmp_path):
+    """A swing whose model is a little too heavy parts from it ever more: no window shows it."""
+    path = write(tmp_path, SWINGS.format(mass=4.016), "model.xml")
+    text = SWINGS.format(mass=4.0)
+    run = pushed(text, "lid", lambda t: 0.0, tmp_path, "a.csv", 8.0, 0.5, noise=1e-3)
+    found = compare(path, "lid", [run])
+    assert found.failing_window == 0.0 and found.failing
+    assert all(place.force is None for place in found.failing)
+
+
 def test_a_small_share_is_no_bare_zero():
     assert "By load: less than 1 % of the error is under" in sentence(share=0.003)
     assert "By load: 3 % of the error is under" in sentence(share=0.03)

@@ -24,7 +24,7 @@ from joda.diagnosis.summary import (
     summarised,
 )
 from joda.diagnosis.uncertainty import uncertainty
-from joda.diagnosis.weighing import LITTLE, Verdict, Weighed, excess_of, weigh
+from joda.diagnosis.weighing import LITTLE, MUCH, Verdict, Weighed, excess_of, weigh
 from joda.diagnosis.whole import BEYOND, worst
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
@@ -121,6 +121,7 @@ def diagnosed(
     strictness = LOOSELY if one_way else 1.0
     weighed = weigh(ranking, strictness)
     puzzling = ranking if weighed.verdict == "unexplained" and measured.runs else None
+    calm = ranking if weighed.verdict == "adequate" else None
     if weighed.verdict == "unexplained":
         again, anew = _looked_again(measured, ranking, strictness, exclude, told)
         better = anew.verdict == "missing_effect" or anew.share < weighed.share
@@ -161,6 +162,8 @@ def diagnosed(
     profile = ranking.guesses[sized[0]].written(ranking.asked.base)
     first = findings[0]
     helps = first.held_out_error_after < first.held_out_error_before
+    if calm and not helps and weighed.excess[0] < MUCH:  # shorter windows and these know of nothing
+        return Diagnosed(_calm(measured, calm))
     verdict = weighed.verdict if helps else "unexplained"
     base, guess = ranking.asked.base, ranking.guesses[sized[0]]
     doubt = one_factor(base, guess) or other_unit(measured)

@@ -132,22 +132,26 @@ def _tells(window: Window, sigma: float) -> bool:
 
 
 def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
-    """The same of pieces of whole runs; the force is the whole run's, NaN if that is long."""
+    """The same of pieces of whole runs, with the whole run's force, NaN if that is long, and each
+    its part of what that force explains."""
     rows = []
     for run, sigma, path in zip(measured.runs, measured.sigma, paths, strict=True):
         there = np.flatnonzero(~np.isnan(path))
         duration = float(np.ptp(run.time))
         force = doubt = float("nan")
+        squares = np.zeros(2)
         if duration <= LONGEST and len(there) == len(run.time):
             whole = measured.replayer.windows(run, sigma, duration)
-            force, doubt = (whole[0].force, whole[0].doubt) if len(whole) == 1 else (force, doubt)
+            if len(whole) == 1:
+                force, doubt, squares = whole[0].force, whole[0].doubt, np.array(whole[0].squares)
             if abs(force) < max(BLIND * doubt, SLIGHT * _usual_force(measured, run)):
                 continue  # it drifts, but no force on the whole makes it
         off = measured.replayer.scatter(run, measured.replayer.start(run, sigma))
         for samples in np.array_split(there, PIECES):
             if len(samples) > 1:
                 misfit = path[samples] - run.position[samples]
-                piece = Window(samples, misfit, force, doubt, pushed=off)
+                part = squares * len(samples) / len(there)
+                piece = Window(samples, misfit, force, doubt, pushed=off, squares=tuple(part))
                 rows.append(_row(measured, run, sigma, piece))
     return np.array(rows).reshape(-1, COLUMNS)
 
@@ -184,7 +188,7 @@ def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
         _edges(by, values), values, found, apart=by in ("velocity", "load", "direction")
     ):
         rows = found[inside]
-        force = None if _uneven(rows) else _force(rows[:, 3], rows[:, 4])
+        force = _force(rows[:, 3], rows[:, 4])
         share = float(beyond[inside].sum() / beyond.sum())
         if by == "direction" and force is None:
             continue  # what changes its sign within a direction is not the direction's
@@ -193,7 +197,7 @@ def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
                 by=by,
                 interval=interval,
                 error=float(np.sqrt(np.average(rows[:, 0] ** 2, weights=rows[:, 1]))),
-                force=force,
+                force=None if _uneven(rows) else force,
                 share=share,
                 significant=True,
             )
