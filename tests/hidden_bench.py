@@ -25,6 +25,7 @@ import sys
 import tempfile
 import time
 import traceback
+from dataclasses import asdict
 from pathlib import Path
 
 from hidden_cases import Job, case_of, job_of, read, spread
@@ -81,12 +82,14 @@ def examined(job: Job) -> dict:
 def said(train: Measured, exclude: tuple[str, ...] = ()) -> dict:
     """The diagnosis, in short."""
     begun = time.perf_counter()
-    diagnosis = diagnosed(train, exclude).diagnosis
+    found = diagnosed(train, exclude)
+    diagnosis = found.diagnosis
     keys = ("effect", "probability", "interval", "interval_error", "direction", "magnitude")
     keys += ("magnitude_error", "held_out_error_after", "indistinguishable_from")
     return {
         "seconds": time.perf_counter() - begun,
         "verdict": diagnosis.verdict,
+        "looks": [asdict(look) for look in found.looks],
         "named": [{key: getattr(one, key) for key in keys} for one in diagnosis.effects],
     }
 

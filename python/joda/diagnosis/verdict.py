@@ -5,15 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joda.diagnosis.asking import Asked, asked
+from joda.diagnosis.asking import Asked
 from joda.diagnosis.baseline import joined, usable, windows_for
 from joda.diagnosis.coverage import moved_one_way, too_little, too_noisy
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.holdout import Holdout
+from joda.diagnosis.looks import Looked, looked
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.plausible import unseen_place
 from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
-from joda.diagnosis.ranking import Ranking, Told, rank
+from joda.diagnosis.ranking import Ranking, Told
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import (
     BOUNCY,
@@ -24,7 +25,7 @@ from joda.diagnosis.summary import (
     summarised,
 )
 from joda.diagnosis.uncertainty import uncertainty
-from joda.diagnosis.weighing import LITTLE, MUCH, Verdict, Weighed, excess_of, weigh
+from joda.diagnosis.weighing import LITTLE, MUCH, Evidence, Verdict, Weighed
 from joda.diagnosis.whole import BEYOND, worst
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
@@ -32,14 +33,8 @@ from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
 
-LONGER, LONGEST = 9.0, 1.5
-"""How much longer the windows of a second look are, and at most how long, s."""
-NOTICED = 0.1
-"""Excess per sample of the model in a second look from which that tells of effects."""
 SLOWEST = 0.02
 """Part of the range per second that a motion is proposed at, at the least."""
-STRICTLY, LOOSELY = 0.7, 3.0
-"""Strictness of that second look; and where the joint went one way only, which tells little."""
 SURE = 0.9
 """Probability from which no further experiment is proposed."""
 TOO_SHORT = "The measurements are too short to tell anything."
@@ -92,12 +87,14 @@ class Diagnosed:
         profile: with the likeliest effect; None if there is none.
         candidates: what may be tried, the likeliest first, also what is too unlikely to be named.
         puzzling: the first look's ranking, where no effect explained the runs; else None.
+        looks: the evidence of each look.
     """
 
     diagnosis: Diagnosis
     profile: Profile | None = None
     candidates: tuple[Finding, ...] = ()
     puzzling: Ranking | None = None
+    looks: tuple[Evidence, ...] = ()
 
 
 def diagnosed(
@@ -116,24 +113,17 @@ def diagnosed(
         return Diagnosed(_said(measured, "insufficient_data", TOO_SHORT, (), None))
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
-    ranking = rank(asked(measured), exclude, told)
+    looks = looked(measured, exclude, told)
+    return replace(_concluded(measured, looks), looks=looks.evidence)
+
+
+def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
+    """What looking at the measurements says."""
+    ranking, weighed = looks.ranking, looks.weighed
+    first_ranking, first_weighed = looks.first
     one_way = moved_one_way(measured)
-    strictness = LOOSELY if one_way else 1.0
-    weighed = weigh(ranking, strictness)
-    puzzling = ranking if weighed.verdict == "unexplained" and measured.runs else None
-    calm = ranking if weighed.verdict == "adequate" else None
-    if weighed.verdict == "unexplained":
-        again, anew = _looked_again(measured, ranking, strictness, exclude, told)
-        better = anew.verdict == "missing_effect" or anew.share < weighed.share
-        if better and anew.excess[0] > NOTICED:  # else nothing shows there to be explained
-            ranking, weighed = again, anew
-    elif weighed.verdict == "adequate" and measured.runs:
-        longer = asked(measured, _longer(ranking), ranking.asked.fit.x)
-        if excess_of(longer) > NOTICED:
-            again = rank(longer, exclude, told)
-            anew = weigh(again, STRICTLY, wholly=True)
-            if anew.verdict != "adequate" and anew.excess[0] > NOTICED:
-                ranking, weighed = again, anew
+    puzzled = first_weighed.verdict == "unexplained" and bool(measured.runs)
+    puzzling = first_ranking if puzzled else None
     if weighed.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if weighed.verdict == "adequate":
@@ -162,8 +152,8 @@ def diagnosed(
     profile = ranking.guesses[sized[0]].written(ranking.asked.base)
     first = findings[0]
     helps = first.held_out_error_after < first.held_out_error_before
-    if calm and not helps and weighed.excess[0] < MUCH:  # shorter windows and these know of nothing
-        return Diagnosed(_calm(measured, calm))
+    if first_weighed.verdict == "adequate" and not helps and weighed.excess[0] < MUCH:
+        return Diagnosed(_calm(measured, first_ranking))  # nor do windows held out know of anything
     verdict = weighed.verdict if helps else "unexplained"
     base, guess = ranking.asked.base, ranking.guesses[sized[0]]
     doubt = one_factor(base, guess) or other_unit(measured)
@@ -172,32 +162,6 @@ def diagnosed(
     likely = tuple(one for one in findings if one.probability >= WORTH_NAMING)
     said = replace(_said(measured, verdict, summary, likely, experiment), doubt=doubt)
     return Diagnosed(said, profile if likely else None, findings, puzzling)
-
-
-def _looked_again(
-    measured: Measured, first: Ranking, strictness: float, exclude: Collection[str], told: Told
-) -> tuple[Ranking, Weighed]:
-    """A second look: of runs at longer windows, where what is weak shows.
-
-    Of curves as if their noise were what the best effect usually leaves: a hand trembles, and
-    friction is uneven, by more than a gauge's noise. That stays unexplained, but it no longer
-    decides what is named.
-    """
-    judge = first.asked.judge
-    if measured.runs:
-        ranking = rank(asked(measured, _longer(first), first.asked.fit.x), exclude, told)
-        return ranking, weigh(ranking, STRICTLY, wholly=True)
-    best = first.guesses[0].fit if first.guesses else first.asked.fit
-    left = best.squares / np.maximum(judge.windows.count, 1)
-    factor = max(float(np.sqrt(np.median(left[judge.counts]))), 1.0)
-    rough = measured.with_curves([curve.noisier(factor) for curve in measured.curves])
-    ranking = rank(asked(rough), exclude, told)
-    return ranking, replace(weigh(ranking, strictness), verdict="unexplained")
-
-
-def _longer(first: Ranking) -> float:
-    """Length of the windows of a second look, s."""
-    return min(LONGER * first.asked.judge.windows.length, LONGEST)
 
 
 def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:

@@ -1,4 +1,8 @@
-"""From a ranking to a verdict: is anything missing, how likely is each effect, is one enough."""
+"""From a ranking to a verdict: is anything missing, how likely is each effect, is one enough.
+
+What the fits leave is the `Evidence`, every number that decides on it is one of the `Settings`, and
+`decide` is a function of these two alone.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -12,29 +16,83 @@ from joda.diagnosis.ranking import WORST, Ranking, levelled
 
 Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
 
-SHARPNESS = 3.0
-"""How fast an effect's probability falls with the misfit that it leaves; calibrated on simulated
-joints with a hidden effect (docs/diagnose.md)."""
-LEAST_GAIN = 60.0
-"""Least gain in loss of an effect that is more than chance."""
-NOTICEABLE = 0.02
-"""The same, per sample."""
-CRUDE = 0.1
-"""Part of its excess that any true effect may leave where more than noise is left of all."""
-WEAK, LEFT = 0.12, 0.12
-"""Part of its excess that any true effect may leave, up to so much per sample: noise is not known
-better."""
-APART = 0.5
-"""Part of what the next best effect leaves that a true one may leave, if that is less: where two
-are nearly as good, and neither leaves only noise, both only resemble what is missing."""
-LITTLE = 0.05
-"""Excess per sample that is never worth a word."""
-CHANCE = 2.0
-"""So many standard deviations the noise may be more than it was taken for, or any amount less."""
-HARDLY = 0.1
-"""Probability of the first effect below which a small excess is nothing that an effect explains."""
-MUCH = 0.5
-"""Excess per sample that is, even if no effect lowers it."""
+
+@dataclass(frozen=True)
+class Settings:
+    """Every number that decides on evidence; excesses are per sample, beyond what noise makes.
+
+    Calibrated on simulated joints that hide an effect, and judged on families of these that were
+    left out (tests/benchmarks/calibrate.py; docs/diagnose.md).
+
+    Attributes:
+        sharpness: how fast an effect's probability falls with the excess that it leaves.
+        least_gain: least gain in loss of an effect that is more than chance.
+        noticeable: the same, per sample.
+        crude: part of the model's excess that any true effect may leave where more than noise is
+            left of all.
+        weak: part of the model's excess that any true effect may leave, up to `left`.
+        left: see `weak`; noise is not known better.
+        apart: part of what the next best effect leaves that a true one may leave, if that is less:
+            where two are nearly as good, and neither leaves only noise, both only resemble what is
+            missing.
+        little: excess that is never worth a word.
+        chance: so many standard deviations the noise may be more than it was taken for, or any
+            amount less.
+        hardly: probability of the first effect below which a small excess is nothing that an effect
+            explains.
+        much: excess that is, even if no effect lowers it.
+        strictly: factor of what a true effect may leave in a second look.
+        noticed: excess of the model in a second look from which that tells of effects.
+    """
+
+    sharpness: float = 3.0
+    least_gain: float = 60.0
+    noticeable: float = 0.02
+    crude: float = 0.1
+    weak: float = 0.12
+    left: float = 0.12
+    apart: float = 0.5
+    little: float = 0.05
+    chance: float = 2.0
+    hardly: float = 0.1
+    much: float = 0.5
+    strictly: float = 0.7
+    noticed: float = 0.1
+
+
+SETTINGS = Settings()
+LITTLE, LEFT, MUCH = SETTINGS.little, SETTINGS.left, SETTINGS.much
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the fits of a ranking leave; excesses are per sample, beyond what noise makes.
+
+    Attributes:
+        samples: how many there are.
+        told: how many count.
+        noisy: whether more than noise is left of all.
+        bouncy: whether knocks tell of bouncier ends than the model's, and that is not tried.
+        model: excess of the model with its own strengths as fitted.
+        calm: the same, where noise may be as much as the best of all leaves, within bounds.
+        own: the same, where noise is as much as the best of all leaves.
+        gain: in loss, by the first effect, less the price of its numbers.
+        remains: part of the model's excess that the first effect may leave if it is the true one.
+        effects: names, the likeliest first.
+        left: excess that each leaves, with its price, where noise is as for `own`.
+    """
+
+    samples: float
+    told: float
+    noisy: bool
+    bouncy: bool
+    model: float
+    calm: float
+    own: float
+    gain: float
+    remains: float
+    effects: tuple[str, ...]
+    left: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -75,45 +133,80 @@ def _excess(loss: float, count: float) -> float:
     return loss / count - BEND * float(np.log1p(1 / BEND))
 
 
+def evidence(ranking: Ranking) -> Evidence:
+    """What the fits of a ranking leave."""
+    judge, fit, guesses = ranking.asked.judge, ranking.asked.fit, ranking.guesses
+    samples = max(judge.samples, 1.0)
+    first = guesses[0] if guesses else None
+    calm = judge.loss(fit.squares, level=min(ranking.level, WORST))
+    return Evidence(
+        samples=judge.samples,
+        told=ranking.told,
+        noisy=ranking.level > WORST,
+        bouncy=ranking.bouncy,
+        model=excess_of(ranking.asked),
+        calm=_excess(calm, samples),
+        own=_excess(levelled(judge, fit, ranking.level), samples),
+        gain=fit.loss - first.fit.loss - first.cost if first else 0.0,
+        remains=first.hypothesis.remains if first else KNOWN_LAW,
+        effects=tuple(guess.hypothesis.effect for guess in guesses),
+        left=tuple(_excess(guess.score, max(ranking.told, 1.0)) for guess in guesses),
+    )
+
+
 def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Weighed:
-    """The verdict on a ranking, and how likely each effect is the missing one.
+    """`decide` on a ranking's evidence."""
+    return decide(evidence(ranking), strictness, wholly)
+
+
+def decide(
+    found: Evidence,
+    strictness: float = 1.0,
+    wholly: bool = False,
+    settings: Settings = SETTINGS,
+) -> Weighed:
+    """The verdict, and how likely each effect is the missing one.
 
     Args:
-        ranking: of what may be missing.
+        found: what the fits leave.
         strictness: factor of what the true effect may leave.
         wholly: whether it is unexplained where more than noise is left of all.
+        settings: every number that decides.
     """
-    judge, guesses = ranking.asked.judge, ranking.guesses
-    samples = judge.samples
-    if not samples:
+    if not found.samples:
         return Weighed("adequate", (), (0.0, ()))
-    loss = judge.loss(ranking.asked.fit.squares, level=min(ranking.level, WORST))
-    calm = _excess(loss, samples) < MUCH and not ranking.bouncy
+    calm = found.calm < settings.much and not found.bouncy
     without: Verdict = "adequate" if calm else "unexplained"
-    if not guesses:
-        return Weighed(without, (), (excess_of(ranking.asked), ()))
-    first = guesses[0]
-
-    own = _excess(levelled(judge, ranking.asked.fit, ranking.level), samples)
-    left = np.array([_excess(guess.score, ranking.told) for guess in guesses])
-    noise = min(left.min(), CHANCE * float(np.sqrt(2 / ranking.told)))  # not known better
-    own, left = max(own - noise, 0.0), left - noise
-    noisy = ranking.level > WORST  # more than noise is left of all
-    part = CRUDE if noisy else first.hypothesis.remains
-    least = max(KNOWN_LAW * own, min(WEAK * own, LEFT))
-    unknown = strictness * max(min(part * own, APART * left[1:].min(initial=np.inf)), least)
-    if wholly and noisy:  # then an unknown one is as likely as the first
+    if not found.left:
+        return Weighed(without, (), (found.model, ()))
+    left = np.array(found.left)
+    noise = min(left.min(), settings.chance * float(np.sqrt(2 / found.told)))  # not known better
+    own, left = max(found.own - noise, 0.0), left - noise
+    part = settings.crude if found.noisy else found.remains
+    least = max(KNOWN_LAW * own, min(settings.weak * own, settings.left))
+    beside = settings.apart * left[1:].min(initial=np.inf)
+    unknown = strictness * max(min(part * own, beside), least)
+    if wholly and found.noisy:  # then an unknown one is as likely as the first
         unknown = min(unknown, float(left[0]))
-    weights = (left + LITTLE) ** -SHARPNESS
-    strange = (unknown + LITTLE) ** -SHARPNESS
+    weights = (left + settings.little) ** -settings.sharpness
+    strange = (unknown + settings.little) ** -settings.sharpness
     likely = weights / (weights.sum() + strange)
-    gain = ranking.asked.fit.loss - first.fit.loss - first.cost
-    doubtful = likely[0] < HARDLY or ranking.bouncy
-    if gain < max(LEAST_GAIN, NOTICEABLE * samples) or (own < MUCH and doubtful):
+    doubtful = likely[0] < settings.hardly or found.bouncy
+    chance = max(settings.least_gain, settings.noticeable * found.samples)
+    if found.gain < chance or (own < settings.much and doubtful):
         said = without
     elif weights[0] <= strange:
         said = "unexplained"
     else:
         said = "missing_effect"
-    names = tuple(guess.hypothesis.effect for guess in guesses)
-    return Weighed(said, tuple(map(float, likely)), (own, tuple(map(float, left))), names)
+    excess = own, tuple(map(float, left))
+    return Weighed(said, tuple(map(float, likely)), excess, found.effects)
+
+
+def second_counts(first: Weighed, second: Weighed, settings: Settings = SETTINGS) -> bool:
+    """Whether a second look, at longer windows, tells more than the first that left a question."""
+    if second.excess[0] <= settings.noticed:  # nothing shows there to be explained
+        return False
+    if first.verdict == "adequate":
+        return second.verdict != "adequate"
+    return second.verdict == "missing_effect" or second.share < first.share

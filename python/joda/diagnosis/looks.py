@@ -1,0 +1,98 @@
+"""One look at the measurements or two: the usual windows, and longer ones where these leave a
+question."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from joda.diagnosis.asking import asked
+from joda.diagnosis.coverage import moved_one_way
+from joda.diagnosis.ranking import Ranking, Told, rank
+from joda.diagnosis.weighing import (
+    SETTINGS,
+    Evidence,
+    Weighed,
+    decide,
+    evidence,
+    excess_of,
+    second_counts,
+)
+from joda.measured.reading import Measured
+
+LONGER, LONGEST = 9.0, 1.5
+"""How much longer the windows of a second look are, and at most how long, s."""
+LOOSELY = 3.0
+"""Strictness where the joint went one way only, which tells little."""
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What looking at the measurements found.
+
+    Attributes:
+        ranking, weighed: of the look that counts.
+        first: the first look's ranking, and what it says.
+        evidence: of each look.
+    """
+
+    ranking: Ranking
+    weighed: Weighed
+    first: tuple[Ranking, Weighed]
+    evidence: tuple[Evidence, ...]
+
+
+def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
+    """Ranks what may be missing; once more in longer windows, where what is weak shows.
+
+    Args:
+        measured: the joint and its runs or curves.
+        exclude: effects that are not considered.
+        told: how much is done, of how much, and what.
+    """
+    ranking = rank(asked(measured), exclude, told)
+    strictness = LOOSELY if moved_one_way(measured) else 1.0
+    found = evidence(ranking)
+    weighed = decide(found, strictness)
+    first = ranking, weighed
+    if weighed.verdict == "missing_effect":
+        return Looked(ranking, weighed, first, (found,))
+    again = _again(measured, first, exclude, told)
+    if again is None:
+        return Looked(ranking, weighed, first, (found,))
+    more = evidence(again)
+    if measured.runs:
+        anew = decide(more, SETTINGS.strictly, wholly=True)
+    else:
+        anew = replace(decide(more, strictness), verdict="unexplained")
+    if second_counts(weighed, anew):
+        ranking, weighed = again, anew
+    return Looked(ranking, weighed, first, (found, more))
+
+
+def _again(
+    measured: Measured, first: tuple[Ranking, Weighed], exclude: Collection[str], told: Told
+) -> Ranking | None:
+    """A second ranking; None where nothing shows that is to be explained.
+
+    Of curves as if their noise were what the best effect usually leaves: a hand trembles, and
+    friction is uneven, by more than a gauge's noise. That stays unexplained, but it no longer
+    decides what is named.
+    """
+    ranking, weighed = first
+    calm, judge = weighed.verdict == "adequate", ranking.asked.judge
+    if measured.runs:
+        longer = asked(measured, min(LONGER * judge.windows.length, LONGEST), ranking.asked.fit.x)
+        if calm and excess_of(longer) <= SETTINGS.noticed:
+            return None
+        return rank(longer, exclude, told)
+    if calm:
+        return None
+    best = ranking.guesses[0].fit if ranking.guesses else ranking.asked.fit
+    left = best.squares / np.maximum(judge.windows.count, 1)
+    factor = max(float(np.sqrt(np.median(left[judge.counts]))), 1.0)
+    return rank(
+        asked(measured.with_curves([curve.noisier(factor) for curve in measured.curves])),
+        exclude,
+        told,
+    )
