@@ -4,7 +4,7 @@
     python tests/benchmarks/calibrate.py rows.jsonl                                  (a minute)
 
 Of each family in turn: `joda.diagnosis.weighing.Settings` are fitted to the other families' cases
-(coordinate descent on the mean log loss over "nothing", "none of these" and every effect) and judged
+(coordinate descent on the mean log loss of "nothing", "none of these" and every effect) and judged
 on its own, beside those in use; then they are fitted to all of them. The rows hold the evidence of
 each case, so nothing is simulated or fitted again.
 """
