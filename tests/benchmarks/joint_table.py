@@ -1,10 +1,10 @@
 """The table of joints: what each should do, written down before, beside what the rules make of it.
 
-    python tests/joint_table.py                    made objects of the seed that the rules were
-                                                   written with, and those of other people
-    python tests/joint_table.py --seed fresh       made objects that nobody has seen
-    python tests/joint_table.py --write FOLDER     the made objects as models with expectations, for
-                                                   joda evaluate proposer FOLDER
+    python tests/benchmarks joint_table                  made objects of the seed that the rules
+                                                         were written with, and other people's
+    python tests/benchmarks joint_table --seed fresh     made objects that nobody has seen
+    python tests/benchmarks joint_table --write FOLDER   the made objects as models with
+                                                         expectations, for `joda evaluate proposer`
 
 Each joint is given its behaviour by `joda generate`'s loop (rules, at most three rounds, no
 pictures), once with its names and once with all names removed; `articulated.py` says what each
@@ -31,7 +31,7 @@ from joda.propose.offline import Offline
 from joda.propose.wishes import read_wishes, unmet
 from joda.template import read_templates
 
-MODELS = Path(__file__).parents[1] / "models"
+MODELS = Path(__file__).parents[2] / "models"
 SEED, ROUNDS, PROPOSALS = 1, 2, 3
 Expected = dict[str, Any]
 
@@ -286,7 +286,3 @@ def main() -> None:
                         f"    {result.row.source} {result.row.part}: {', '.join(lost)} "
                         f"[{result.took}, {result.sure:.2f}, {result.force:.3g} N]"
                     )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,7 @@
 """How right the diagnosis is on joints that another generator made (shared/data/foreign_cases).
 
-python tests/foreign_bench.py                  every case; a table at the end
-python tests/foreign_bench.py 3 7 --no-add     some of them, the diagnosis alone
+python tests/benchmarks foreign                  every case; a table at the end
+python tests/benchmarks foreign 3 7 --no-add     some of them, the diagnosis alone
 
 Per case: the verdict and the first name beside the answer, and the error of whole runs that nothing
 has seen, after `joda add`, in units of what the true joint misses from a start that is as noisy.
@@ -115,7 +115,3 @@ def told(row: dict) -> str:
         f"{named or '-'}; unseen {row['before']:.1f} -> {row['after']:.2f}; "
         f"{row['seconds']:.0f} s{refused}"
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,13 +1,14 @@
 """How well refinement does: the figures of docs/refine.md.
 
-python tests/refine_table.py            the paper's case, ten seeds
-python tests/refine_table.py planted    every template planted and recovered, twenty seeds
-python tests/refine_table.py planted 3 detent_internal    three seeds of one
+python tests/benchmarks refine_table            the paper's case, ten seeds
+python tests/benchmarks refine_table planted    every template planted and recovered, twenty seeds
+python tests/benchmarks refine_table planted 3 detent_internal    three seeds of one
 """
 
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import jax
 import mujoco
@@ -22,7 +23,7 @@ from joda.measured.runs import Run
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
 from joda.scenes.motion import Motion, release
 
-MODELS = __file__.rsplit("/tests/", 1)[0] + "/models"
+MODELS = str(Path(__file__).parents[2] / "models")
 STEP = 0.005
 SECONDS = 2.0
 NOISE = 5e-4
@@ -287,6 +288,6 @@ def paper_table(seeds: int = 10) -> None:
         print(f"{line}  {spent:.1f}", flush=True)
 
 
-if __name__ == "__main__":
+def main() -> None:
     what, *rest = sys.argv[1:] or ["paper"]
     {"planted": planted_table, "paper": paper_table}[what](*rest)

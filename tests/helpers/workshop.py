@@ -13,7 +13,7 @@ from PIL import Image
 import joda
 from joda.measured import runs
 
-MODELS = Path(__file__).parents[1] / "models"
+MODELS = Path(__file__).parents[2] / "models"
 
 COMMANDS = """
 add scene.xml run.csv run2.csv --joint door --diagnosis diagnosis.json -o new.xml
@@ -57,7 +57,7 @@ def fill(folder: Path) -> None:
     """Puts into the folder what all of COMMANDS work on."""
     for name in ("microwave.xml", "oven.xml"):
         shutil.copy(MODELS / name, folder)
-    shutil.copy(Path(__file__).parent / "microwave.latch.json", folder / "composed.json")
+    shutil.copy(Path(__file__).parents[1] / "microwave.latch.json", folder / "composed.json")
     joda.generate(folder / "microwave.xml", "door", folder / "gen", proposer="offline", rounds=1)
     shutil.copy(folder / "gen" / "proposal.json", folder)
     joda.attach(folder / "microwave.xml", [folder / "composed.json"], folder / "scene.xml")

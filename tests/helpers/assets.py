@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-SHARED = Path(os.environ.get("JODA_SHARED", Path(__file__).parents[2] / "shared"))
+SHARED = Path(os.environ.get("JODA_SHARED", Path(__file__).parents[3] / "shared"))
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "joda-tests"
 
 FILES = {  # in SHARED / "assets"

@@ -1,7 +1,7 @@
 """The paper's ablations: without templates, without feedback rounds, the largest for the sum.
 
-    python tests/ablation.py           with the template library beside raw control points
-    python tests/ablation.py rounds    what feedback rounds and the sum of components bring
+    python tests/benchmarks ablation           with the template library beside raw control points
+    python tests/benchmarks ablation rounds    what feedback rounds and the sum of components bring
 
 For the first, both were asked of the same Claude model in one round, twice each, with the same
 pictures and context of the ten objects in models/; tests/recorded/README.md tells how. Every answer
@@ -30,7 +30,7 @@ from joda.propose.session import Session
 from joda.propose.wishes import Wanted, unmet
 from joda.template import read_templates
 
-TESTS = Path(__file__).parent
+TESTS = Path(__file__).parents[1]
 MODELS = TESTS.parent / "models"
 
 OBJECTS: dict[str, tuple[str, tuple[Wanted, ...]]] = {
@@ -131,7 +131,7 @@ def loop(name: str, key: str) -> Loop:
     )
 
 
-def main_rounds() -> None:
+def rounds() -> None:
     print(
         f"{'object':14}{'gravity':>8}{'rounds, mean':>14}{'most':>6}", *map("{:>18}".format, WAYS)
     )
@@ -160,6 +160,8 @@ def _tell(name: str, loops: list[Loop]) -> None:
 
 
 def main() -> None:
+    if sys.argv[1:] == ["rounds"]:
+        return rounds()
     table = list(rows())
     print(f"{'object':14}{'templates':>12}{'raw':>8}{'spread: templates':>20}{'raw':>8}")
     for name in OBJECTS:
@@ -177,7 +179,3 @@ def main() -> None:
             f"answers; spread {np.nanmean([row[4] for row in mine]):.2f}"
         )
     print(json.dumps({f"{r[0]}/{r[1]}": [list(x.values()) for x in r[5]] for r in table}, indent=1))
-
-
-if __name__ == "__main__":
-    main_rounds() if sys.argv[1:] == ["rounds"] else main()

@@ -1,4 +1,4 @@
-"""The catalogue of effects as docs/effects.md shows it: python tests/effects_table.py"""
+"""The catalogue of effects as docs/effects.md shows it: python tests/benchmarks effects_table"""
 
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
 
@@ -16,5 +16,5 @@ def catalogue() -> str:
     return "\n".join(out)
 
 
-if __name__ == "__main__":
+def main() -> None:
     print(catalogue())

@@ -1,7 +1,7 @@
 """Ways to refine a joint, side by side on the paper's case, as a Markdown table.
 
-python tests/side_by_side.py          seed 0
-python tests/side_by_side.py 1        another seed
+python tests/benchmarks side_by_side          seed 0
+python tests/benchmarks side_by_side 1        another seed
 
 The case is `refine_table.cabinet`: a cabinet door that gravity opens, three measured releases, a
 profile that holds too much, and four releases that are held out. All ways get the same runs.
@@ -250,6 +250,6 @@ def table(seed: int) -> None:
                 print(row(case, way, fit, first), flush=True)
 
 
-if __name__ == "__main__":
+def main() -> None:
     logging.getLogger("absl").setLevel(logging.ERROR)  # mujoco.sysid on positions, not sensors
     table(int(sys.argv[1]) if sys.argv[1:] else 0)

@@ -1,7 +1,7 @@
 """The force that opens real cabinet doors, measured, against what is proposed from a description.
 
-    python tests/real_doors.py                  the tables of docs/real_doors.md
-    python tests/real_doors.py -o doors.png     and their picture
+    python tests/benchmarks real_doors                  the tables of docs/real_doors.md
+    python tests/benchmarks real_doors -o doors.png     and their picture
 
 Measured by a robot that hooked the handle and pulled slowly (Jain and Kemp, Autonomous Robots 35,
 2013). The data are not part of this repository; they are looked for in ../shared/data.
@@ -14,13 +14,14 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 import numpy as np
+from assets import SHARED
 
 from joda import compare, generate, refine
 from joda.measured.gauge import static_force
 from joda.measured.reading import read_measured
 from joda.measured.runs import read_run
 
-DATA = Path(__file__).parents[2] / "shared" / "data" / "pr2_cabinet_doors"
+DATA = SHARED / "data" / "pr2_cabinet_doors"
 GRID = np.arange(61.0)
 """Where forces are compared, degrees."""
 CELL = 0.5
@@ -234,7 +235,3 @@ def draw(shown: dict, path: Path) -> None:
     named = dict(zip(labels, handles, strict=True))
     panels[-1].legend(named.values(), named, frameon=False, fontsize=8)
     figure.savefig(path)
-
-
-if __name__ == "__main__":
-    main()

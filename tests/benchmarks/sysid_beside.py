@@ -1,7 +1,7 @@
 """joda beside mujoco.sysid on joints that hide an effect, as a Markdown table.
 
-python tests/sysid_beside.py          a fresh seed, which is printed
-python tests/sysid_beside.py 1        this one
+python tests/benchmarks sysid_beside          a fresh seed, which is printed
+python tests/benchmarks sysid_beside 1        this one
 
 The cases are of `joda.hidden`, an independent simulator, with hands that move the joint and a
 recorded force. Both get the same base model and the same runs.
@@ -246,6 +246,6 @@ def table(seed: int) -> None:
         print(row(case_of(seed + AGAIN * k, effect), effect), flush=True)
 
 
-if __name__ == "__main__":
+def main() -> None:
     logging.getLogger("absl").setLevel(logging.ERROR)  # mujoco.sysid on positions, not sensors
     table(int(sys.argv[1]) if sys.argv[1:] else secrets.randbits(31))

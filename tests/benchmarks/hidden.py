@@ -1,10 +1,10 @@
 """How well hidden effects are found, placed and added: joda against joda.hidden, an independent
 simulator.
 
-python tests/hidden_bench.py                        every line, a table at the end; hours
-python tests/hidden_bench.py forced --cases 50      one line
-python tests/hidden_bench.py forced --seed 7 --out forced.jsonl    goes on where it was stopped
-python tests/hidden_bench.py families --family all --cases 2       every effect of every family
+python tests/benchmarks hidden                        every line, a table at the end; hours
+python tests/benchmarks hidden forced --cases 50      one line
+python tests/benchmarks hidden forced --seed 7 --out forced.jsonl    goes on where it was stopped
+python tests/benchmarks hidden families --family all --cases 2       every effect of every family
 
 Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
 few, families, all. `few`: one to three of the runs only, and adding what is named first. `cover`:
@@ -227,7 +227,3 @@ def main() -> None:
 def count(group: str, family: str, cases: int | None) -> int:
     """How many cases a group has."""
     return (cases or CASES[group]) * (len(spread(family)) if group == "families" else 1)
-
-
-if __name__ == "__main__":
-    main()

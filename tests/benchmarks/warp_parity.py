@@ -1,6 +1,6 @@
 """joda.warp beside the plugin: random profiles, each in a world of its own.
 
-    python tests/warp_parity.py [COUNT [SEED [jumps]]]
+    python tests/benchmarks warp_parity [COUNT [SEED [jumps]]]
 
 A hinged arm that hits the floor and a drawer that pushes a ball get random profiles: components of
 all three channels, summed or the largest, and any of the effects. Printed is how far joda.warp
@@ -238,7 +238,3 @@ def main() -> None:
             f"the plugin with its state rounded to single precision: {100 * kept.mean():.1f} %, "
             f"and of these joda.warp {100 * close[kept].mean():.1f} %"
         )
-
-
-if __name__ == "__main__":
-    main()
