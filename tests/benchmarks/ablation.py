@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from joda import compile, context
-from joda._generate import run as propose
+from joda.commands.generate import run as propose
 from joda.errors import JodaError
 from joda.field import evaluate
 from joda.interaction.behaviour import behaviour

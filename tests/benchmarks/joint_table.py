@@ -24,11 +24,11 @@ import numpy as np
 from articulated import objects
 
 from joda import compile, context
-from joda._context import Context
 from joda.interaction.behaviour import Behaviour, behaviour
 from joda.propose import Task, Turn
 from joda.propose.offline import Offline
 from joda.propose.wishes import read_wishes, unmet
+from joda.scenes.context import Context
 from joda.template import read_templates
 
 MODELS = Path(__file__).parents[2] / "models"

@@ -15,12 +15,12 @@ import mujoco
 import numpy as np
 
 from joda import context, templates
-from joda._context import Context
 from joda.component import Component
 from joda.field import evaluate
 from joda.joints.rig import rig
 from joda.measured.runs import Run
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
+from joda.scenes.context import Context
 from joda.scenes.motion import Motion, release
 
 MODELS = str(Path(__file__).parents[2] / "models")

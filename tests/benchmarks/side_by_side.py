@@ -36,10 +36,10 @@ from refine_table import MODELS, NOISE, SECONDS, STEP, cabinet, problem_of, quie
 from scipy.optimize import least_squares
 
 from joda import attach
-from joda._context import Context
 from joda.joints.parameters import Parameters
 from joda.measured.runs import Run
 from joda.profile import Profile
+from joda.scenes.context import Context
 from joda.scenes.motion import release
 
 Array = np.ndarray

@@ -50,7 +50,7 @@ FEW_RUNS = 5
 
 SHAPE = {KNOWN_LAW: 0.01, FREE_CURVE: 0.07, KNOWN_SHAPE: 0.05}
 """Part of its size by which an effect's law may differ from its kind, by what is known of it;
-these and what follows were calibrated on `tests/benchmarks/hidden.py cover` (docs/reliability.md)."""
+these and what follows are calibrated by the bench `hidden cover` (docs/reliability.md)."""
 OWN_SHAPE = {
     "bistable_mechanism": 0.12,  # its force goes on growing outside the range
     "end_stop_restitution": 0.12,  # an impact lies between two samples

@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import context
 from joda.interaction.script import interaction, perform
 from joda.measured.errors import RunError, errors
 from joda.measured.reading import Measured, read_measured
+from joda.scenes.context import context
 from joda.scenes.model import find_joint, load_model
 from joda.scenes.motion import Motion
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._studio.edits import positions
-from joda._studio.motions import Replayed
+from joda.commands.studio.edits import positions
+from joda.commands.studio.motions import Replayed
 from joda.field import evaluate
 from joda.pictures.draw import PREFIXES
 from joda.pictures.style import COLOURS, GRAVITY

@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context, context
 from joda.errors import JodaError
 from joda.files import check_target, write_together
 from joda.interaction.script import Describe, interaction, perform
@@ -18,6 +17,7 @@ from joda.interaction.traces import FORCE, draw_force, draw_position, shade
 from joda.measured.runs import Run, run_text
 from joda.pictures.film import frames, write_film
 from joda.pictures.style import clean, house_style, png
+from joda.scenes.context import Context, context
 from joda.scenes.model import find_joint, joint_name, load_model, moves_with
 from joda.scenes.motion import FAST, Motion, fast, usual_speed
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from joda._add import add
-from joda._add import sentences as of_added
-from joda._compare import compare
-from joda._diagnose import diagnose
-from joda._diagnose import sentences as of_diagnosis
+from joda.commands.add import add
+from joda.commands.add import sentences as of_added
+from joda.commands.compare import compare
+from joda.commands.diagnose import diagnose
+from joda.commands.diagnose import sentences as of_diagnosis
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import named, percent
 from joda.diagnosis.share import overlap

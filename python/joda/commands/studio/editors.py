@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from joda._studio import charts, edits
-from joda._studio.curves import Curves
-from joda._studio.shared import Shared, told
+from joda.commands.studio import charts, edits
+from joda.commands.studio.curves import Curves
+from joda.commands.studio.shared import Shared, told
 from joda.profile import CHANNELS, Channel, Profile
 
 

@@ -9,8 +9,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._attach import attached
-from joda._context import Context, context
 from joda.diagnosis.plausible import Needs, implausible
 from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
@@ -25,6 +23,8 @@ from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.refining.curvefit import CurveProblem
 from joda.refining.refinement import history, picture, unseen
+from joda.scenes.attaching import attached
+from joda.scenes.context import Context, context
 from joda.scenes.model import find_joint, joint_name, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of

@@ -9,11 +9,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._bench import SWING, hinges, seconds
+from joda.commands.bench import SWING, seconds
 from joda.component import Component
 from joda.files import check_target
 from joda.pictures.style import COLOURS, INK, house_style, write_png
 from joda.profile import Channel, Channels, Joint, Profile, Resistance
+from joda.scenes.hinges import hinges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,7 +4,7 @@ from typing import Any
 
 from nicegui import ui
 
-from joda._studio.shared import Shared, told
+from joda.commands.studio.shared import Shared, told
 from joda.diagnosis.phrases import named, percent
 
 

@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from joda._context import context
-from joda._generate import ROUNDS, check_rounds, choose, only_joint
-from joda._generate_all import find_jobs
+from joda.commands.generate import ROUNDS, check_rounds, choose, only_joint
+from joda.commands.generate_all import find_jobs
 from joda.component import Frozen
 from joda.propose import BatchProposer, Proposer, Task, Usage, total
 from joda.propose.asking import Effort, VisionModel
 from joda.propose.batch import HALF
 from joda.propose.session import PICTURES
+from joda.scenes.context import context
 from joda.template import read_templates
 
 

@@ -8,7 +8,7 @@ from nicegui.events import GenericEventArguments
 
 
 class Curves(Element, component="curves.js", default_classes="curves"):
-    """The editor of one channel, see `joda._studio.charts.editor` for what it shows."""
+    """The editor of one channel, see `joda.commands.studio.charts.editor` for what it shows."""
 
     def __init__(self, view: dict[str, Any], told: Callable[[str, dict[str, Any]], None]) -> None:
         """Shows a view.

@@ -5,9 +5,9 @@ from typing import Any
 
 from nicegui import events, ui
 
-from joda._studio import charts
-from joda._studio.motions import Replayed
-from joda._studio.shared import Shared, told
+from joda.commands.studio import charts
+from joda.commands.studio.motions import Replayed
+from joda.commands.studio.shared import Shared, told
 from joda.plain import plain
 
 

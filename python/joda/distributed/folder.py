@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from joda._generate_all import MODELS, find_jobs
+from joda.commands.generate_all import MODELS, find_jobs
 from joda.distributed.pool import by_processes, by_ray
 from joda.distributed.task import Result, Task, What, folder_of
 from joda.errors import JodaError

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from joda._simulate import Simulated, simulate
 from joda.cases import CASES, Case
 from joda.cases.base import bundled, told_unit
 from joda.cases.gallery import Shown, command, gallery
 from joda.cases.picture import draw_case
 from joda.cases.tried import Tried, try_case, write_baselines
+from joda.commands.simulate import Simulated, simulate
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, write_bytes, write_text
 from joda.pictures.offscreen import NoRenderer

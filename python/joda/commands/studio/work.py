@@ -86,7 +86,7 @@ class Work:
     async def _answered(self, request: dict[str, Any], told: Told) -> dict[str, Any]:
         """What a child of its own answers."""
         pipe = asyncio.subprocess.PIPE
-        command = (sys.executable, "-m", "joda._studio.work")
+        command = (sys.executable, "-m", "joda.commands.studio.work")
         # In a session of its own: Ctrl-C is for the studio, which stops it. And without OpenGL,
         # for which MuJoCo starts yet another process, which complains when this one is stopped.
         process = await asyncio.create_subprocess_exec(
@@ -143,7 +143,7 @@ def _do(request: dict[str, Any], told: Told) -> dict[str, Any]:
         scene, joint, request["diagnosis"], runs, output, effect=request["effect"],
         passive=passive, force=True, progress=lambda what: told(None, what),
     )  # fmt: skip
-    from joda._add import sentences
+    from joda.commands.add import sentences
 
     return added.as_json() | {"sentences": sentences(added)}
 

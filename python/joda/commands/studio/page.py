@@ -7,13 +7,13 @@ from pathlib import Path
 from nicegui import app, background_tasks, ui
 from starlette.responses import Response
 
-from joda._studio.editors import Editors
-from joda._studio.guard import HOST, Guard
-from joda._studio.lacks import Lacks
-from joda._studio.shared import Shared, say, told
-from joda._studio.solids import Shape, shape
-from joda._studio.trajectories import Trajectories
-from joda._studio.view3d import View3D
+from joda.commands.studio.editors import Editors
+from joda.commands.studio.guard import HOST, Guard
+from joda.commands.studio.lacks import Lacks
+from joda.commands.studio.shared import Shared, say, told
+from joda.commands.studio.solids import Shape, shape
+from joda.commands.studio.trajectories import Trajectories
+from joda.commands.studio.view3d import View3D
 from joda.errors import JodaError
 from joda.plain import plain
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from nicegui import Event, app, ui
 
-from joda._studio.desk import Desk
-from joda._studio.live import Live
-from joda._studio.work import Stopped, Work
+from joda.commands.studio.desk import Desk
+from joda.commands.studio.live import Live
+from joda.commands.studio.work import Stopped, Work
 from joda.errors import JodaError
 from joda.profile import Profile
 

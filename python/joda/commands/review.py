@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from joda._generate import Generated, choose, run
+from joda.commands.generate import Generated, choose, run
 from joda.errors import JodaError
 from joda.propose import Proposer
 from joda.propose.session import Session

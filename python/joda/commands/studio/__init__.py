@@ -40,8 +40,8 @@ def studio(
     """
     if find_spec("nicegui") is None:
         raise JodaError('joda studio needs NiceGUI: install it with: pip install "joda[studio]"')
-    from joda._studio.desk import Desk
-    from joda._studio.guard import free_port
+    from joda.commands.studio.desk import Desk
+    from joda.commands.studio.guard import free_port
 
     place = Path(folder) if folder is not None else None
     with closing(Desk(Path(scene), joint, place, passive)) as desk:
@@ -49,7 +49,7 @@ def studio(
             desk.add_run(Path(run).absolute())
         number = free_port(port)
 
-        from joda._studio.page import serve
-        from joda._studio.shared import Shared
+        from joda.commands.studio.page import serve
+        from joda.commands.studio.shared import Shared
 
         serve(Shared(desk), number, browser, ready)

@@ -6,7 +6,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from joda._diagnose import check_effect
+from joda.commands.diagnose import check_effect
 from joda.diagnosis.findings import read_diagnosis
 from joda.diagnosis.mending import Error, Mended, error, mend
 from joda.diagnosis.outcome import (

@@ -10,17 +10,17 @@ from itertools import count
 from pathlib import Path
 from threading import Lock
 
-from joda._attach import attach
-from joda._context import context
-from joda._studio import edits
-from joda._studio.folder import Folder
-from joda._studio.timeline import Timeline
+from joda.commands.studio import edits
+from joda.commands.studio.folder import Folder
+from joda.commands.studio.timeline import Timeline
 from joda.diagnosis.outcome import scene_files
 from joda.errors import JodaError
 from joda.files import check_target, make_folder, write_bytes, write_together
 from joda.measured.reading import read_measured
 from joda.plain import plain
 from joda.profile import Profile
+from joda.scenes.attaching import attach
+from joda.scenes.context import context
 from joda.scenes.model import describe_joint, find_joint, joint_name, joint_type, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of

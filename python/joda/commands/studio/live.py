@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from joda._studio.desk import Desk
-from joda._studio.motions import Outdated, Replayed, Stale, replayed, simulated
+from joda.commands.studio.desk import Desk
+from joda.commands.studio.motions import Outdated, Replayed, Stale, replayed, simulated
 from joda.errors import JodaError
 from joda.profile import Profile
 from joda.scenes.motion import Motion

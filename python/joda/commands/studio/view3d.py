@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from nicegui import ui
 
-from joda._studio.shared import Shared
-from joda._studio.solids import Shape
+from joda.commands.studio.shared import Shared
+from joda.commands.studio.solids import Shape
 from joda.scenes.motion import Motion
 
 FOVY = 32.0

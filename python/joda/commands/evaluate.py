@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from joda._generate import ROUNDS, begin, check_rounds, choose, run
-from joda._generate_all import MODELS
+from joda.commands.generate import ROUNDS, begin, check_rounds, choose, run
+from joda.commands.generate_all import MODELS
 from joda.component import Frozen
 from joda.errors import JodaError
 from joda.files import file_name, fresh, make_folder, occupied, write_text

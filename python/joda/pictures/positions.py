@@ -60,7 +60,7 @@ def render(
     if count < 2:
         raise JodaError(f"count is {count}; give at least 2 pictures, one for each end.")
     request = [str(model), joint, str(output), count, force]
-    return [Path(target) for target in ask("joda._render", request)]
+    return [Path(target) for target in ask("joda.pictures.positions", request)]
 
 
 def _make(request: Any) -> list[str]:

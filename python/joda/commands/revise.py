@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from joda._generate import choose
+from joda.commands.generate import choose
 from joda.component import LONGEST_TEXT
 from joda.errors import JodaError
 from joda.pictures.changes import changes, overlay

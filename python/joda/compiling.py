@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
-from joda._context import Context, context
 from joda.component import Component
 from joda.errors import JodaError
 from joda.files import check_target, write_text
 from joda.profile import CHANNELS, Channels, Profile, rounded
 from joda.proposal import EffectProposal, Label, Proposal
+from joda.scenes.context import Context, context
 from joda.template import Template, read_templates
 
 BANDS: dict[Label, tuple[float, float]] = {

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from joda._context import context
-from joda._generate import generate
+from joda.commands.generate import generate
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied, write_bytes
 from joda.interaction.hand import pull
@@ -18,6 +17,7 @@ from joda.measured.runs import Run, write_run
 from joda.pictures.offscreen import Image, NoRenderer, render
 from joda.pictures.style import house_style, write_png
 from joda.propose.history import History
+from joda.scenes.context import context
 from joda.scenes.model import find_joint, load_model
 from joda.scenes.motion import Motion, release
 

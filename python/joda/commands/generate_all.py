@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from joda._generate import ROUNDS, Generated, begin, check_rounds, choose, ranged, run
-from joda._review import Decide
-from joda._review import review as walk
+from joda.commands.generate import ROUNDS, Generated, begin, check_rounds, choose, ranged, run
+from joda.commands.review import Decide
+from joda.commands.review import review as walk
 from joda.errors import JodaError
 from joda.files import file_name, make_folder, read_text, write_text
 from joda.propose import Ask, BatchProposer, Proposer
