@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from test_compare import door, runs_of, scene_of
 
-from joda.commands.refine import _worse
 from joda.component import Component
 from joda.diagnosis.better import improves, risen
+from joda.diagnosis.mending import Error
 from joda.diagnosis.plausible import EXCESS, Needs, implausible, unseen_place
 from joda.effects import StribeckFriction
 from joda.measured.reading import read_measured
 from joda.measured.visited import unvisited, unvisited_part, visited_share
 from joda.profile import Channels
+from joda.refining.acceptance import refused
 
 
 @pytest.mark.parametrize(
@@ -54,17 +55,17 @@ def measured(tmp_path_factory):
 def test_a_force_that_nothing_needs_is_refused(measured):
     needs = Needs(measured).force
     assert 1.0 < needs < 200.0  # pushes of some N·m
-    for force, refused in ((2 * needs, False), (2 * EXCESS * needs, True)):
+    for force, absurd in ((2 * needs, False), (2 * EXCESS * needs, True)):
         effect = StribeckFriction(velocity=0.1, y=(force, force))
         reason = implausible(
             Needs(measured), measured.profile.with_effect(effect), "stribeck_friction"
         )
-        assert bool(reason) == refused, reason
+        assert bool(reason) == absurd, reason
         part = Component(
             label="detent_internal", interval=(0.3, 0.6), x=(0, 0.5, 1), y=(0, force, 0)
         )
         profile = measured.profile.with_component("conservative", part)
-        assert bool(implausible(Needs(measured), profile, "detent_internal")) == refused
+        assert bool(implausible(Needs(measured), profile, "detent_internal")) == absurd
 
 
 def test_a_joint_without_resistance_that_moves_by_itself_is_refused(measured):
@@ -106,16 +107,44 @@ def test_an_effect_is_not_placed_where_nobody_was(measured):
 
 
 @pytest.mark.parametrize(
-    ("errors", "windows", "apart", "said"),
+    ("whole", "windows", "apart", "said"),
     [
         ((0.1, 0.01), (0.05, 0.002), None, None),
         ((0.1, 0.01), (0.05, 0.002), (0.1, 0.104), None),
         ((0.1, 0.01), (0.05, 0.002), (0.1, 0.2), "held out (--check) is missed by 0.2"),
         ((0.1, 0.2), (0.05, 0.06), None, "missed by 0.2 instead of 0.1"),
         ((0.1, 0.2), (0.05, 0.002), None, None),  # near a barrier whole runs part
+        ((0.731, 0.775), (0.413, 0.396), None, "missed by 0.775 instead of 0.731 in whole runs"),
+        ((0.1, 0.1), (0.05, 0.05), None, "missed by 0.1 instead of 0.1"),
         ((0.0004, 0.0005), (0.0004, 0.0005), None, None),  # all of it noise
     ],
 )
-def test_refine_writes_nothing_that_is_worse(errors, windows, apart, said):
-    reason = _worse(errors, windows, apart, noise=1e-3)
+def test_refine_writes_nothing_that_is_worse(whole, windows, apart, said, tmp_path):
+    measured = read_measured(scene_of(door(), tmp_path), "joint", runs_of(door(), tmp_path, 1))
+    held = apart and (Error(apart[0], 0.01), Error(apart[1], 0.01))
+    fitted = tuple(Error(*both) for both in zip(whole, windows, strict=True))
+    same = measured.profile, measured.profile
+    reason = refused(fitted, held or None, 1e-3, same, Needs(measured))
     assert (reason is None) if said is None else (said in reason)
+
+
+@pytest.mark.parametrize(("times", "left", "hopeless"), [(2, 0.3, 0), (5, 0.3, 1), (5, 0.005, 0)])
+def test_a_fit_that_changes_all_and_explains_little_is_refused(times, left, hopeless, tmp_path):
+    """Friction of another joint: what is left is hundreds of times the noise."""
+    measured = read_measured(scene_of(door(), tmp_path), "joint", runs_of(door(), tmp_path, 1))
+    channels = measured.profile.channels
+    stiff = channels.friction.model_copy(
+        update={
+            "components": tuple(
+                part.model_copy(update={"y": tuple(times * y for y in part.y)})
+                for part in channels.friction.components
+            )
+        }
+    )
+    after = measured.profile.model_copy(
+        update={"channels": channels.model_copy(update={"friction": stiff})}
+    )
+    fitted = Error(0.5, 0.4), Error(0.4, left)
+    reason = refused(fitted, None, 1e-3, (measured.profile, after), Needs(measured))
+    assert bool(reason) == hopeless
+    assert not reason or f"friction would be {times} times what it was" in reason

@@ -300,7 +300,7 @@ def test_refine_tells_errors_in_the_joints_unit(kind, unit, tmp_path, monkeypatc
         f"the measurement's noise is 0.0005 {unit}.",
         f"The same over windows of 0.4 s: 0.01 → 0.0008 {unit}.",
         f"On the runs held out: 0.03 → 0.002 {unit} RMS.",
-        "The data tell little of friction at s = 0.10 to 0.25; there it is as it was before.",
+        "The data tell little of friction at s = 0.10 to 0.25: it is hardly measured there.",
         "A note.",
         *(str(getattr(result, name)) for name in ("scene", "composed", "picture", "history")),
     ]

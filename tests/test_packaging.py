@@ -80,7 +80,7 @@ def test_it_works_in_a_fresh_environment_and_leaves_nothing(wheel, tmp_path):
     (site / "others.pth").write_text(str(PACKAGES))
     pip = sys.executable, "-m", "pip", "--python", python
     run(*pip, "install", "-q", "--no-deps", "--ignore-installed", wheel)
-    code = "import mujoco, joda, sys; from joda import _doctor; print(_doctor._plugin()[0])"
+    code = "import mujoco, joda, sys; from joda.commands.doctor import _plugin; print(_plugin()[0])"
     told = run(python, "-P", "-c", code)
     assert f"{site / 'joda' / 'plugins' / 'libjoda_plugin'}" in told
     assert "gives the right force" in told

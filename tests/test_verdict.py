@@ -4,7 +4,10 @@ import re
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from gauging import FRICTION, SCENE
+from scenes import write as write_scene
 from test_compare import door, runs_of, scene_of
 
 from joda import add, diagnose
@@ -191,3 +194,32 @@ def test_numbers_are_off_only_by_more_than_their_errors(tmp_path):
     factor, error = map(float, re.search(r"([\d.]+) ± ([\d.e-]+\d)", told).groups())
     assert factor == pytest.approx(0.5, abs=0.05) and 0 < error < 0.1
     assert told.count("±") == 1  # the friction is right
+
+
+def springy(folder, ways, extra=0.0, times=1.0):
+    """A curve of a joint with a spring and friction, beside a constant force; and its model."""
+    rng = np.random.default_rng()
+    q = np.concatenate([np.linspace(0.02, 1.47, 120)[::way] for way in ways])
+    force = 1.2 * q + 0.6 * np.repeat(ways, 120) + extra + rng.normal(0, 0.02, len(q))
+    rows = "".join(f"{a},{times * b:.9g}\n" for a, b in zip(q, force, strict=True))
+    (folder / "curve.csv").write_text("position,force\n" + rows)
+    text = SCENE.replace(f'frictionloss="{FRICTION}"', 'frictionloss="0.6" stiffness="1.2"')
+    return diagnose(write_scene(folder, text, "m.xml"), "door", [folder / "curve.csv"])
+
+
+@pytest.mark.parametrize("extra", [0.4, -0.4])
+def test_one_way_friction_and_a_force_are_both_named_if_neither_is_sure(extra, tmp_path):
+    """A constant force looks like friction that is off where the joint was moved one way only."""
+    told = springy(tmp_path, (1,), extra)
+    assert told.verdict == "unexplained"
+    assert told.summary.startswith("Either the model's own numbers are off (native friction")
+    assert "or a force is missing: the joint was moved in one direction only" in told.summary
+    assert told.next_experiment == "Measure the way back too, as slowly."
+
+
+@pytest.mark.parametrize(("times", "asked_for"), [(0.1, False), (0.001, True)])
+def test_one_factor_on_a_curve_is_told(times, asked_for, tmp_path):
+    """Newtons without their lever arm, or kN·m: all that is measured is off by one factor."""
+    told = springy(tmp_path, (1, -1), times=times)
+    assert ("is it in another unit" in " ".join(told.notes)) == asked_for
+    assert asked_for or "All by one factor, about 0.1:" in told.summary, told

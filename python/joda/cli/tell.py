@@ -245,7 +245,7 @@ def tell_errors(result: "Refined", unit: str) -> None:
     for channel, places in result.unseen.items():
         if places:
             where = ", ".join(f"s = {a:.2f} to {b:.2f}" for a, b in places)
-            say(f"The data tell little of {channel} at {where}; there it is as it was before.")
+            say(f"The data tell little of {channel} at {where}: it is hardly measured there.")
 
 
 def tell_ratios(rows: "Iterable[Row]") -> None:

@@ -1,7 +1,7 @@
 """Gradient refinement: bends a joint's profile until simulation matches measured motions."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -9,7 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.plausible import Needs, implausible
+from joda.diagnosis.coverage import hardly_moved
+from joda.diagnosis.mending import Error, error
+from joda.diagnosis.outcome import parting
+from joda.diagnosis.plausible import Needs
 from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
 from joda.files import check_targets, write_together
@@ -21,6 +24,7 @@ from joda.measured.reading import checked, taken
 from joda.measured.runs import QuasiStatic, Run
 from joda.pictures.changes import changes
 from joda.pictures.style import png
+from joda.refining.acceptance import refused
 from joda.refining.curvefit import CurveProblem
 from joda.refining.refinement import history, picture, unseen
 from joda.scenes.attaching import attached
@@ -37,10 +41,6 @@ Array = NDArray[np.float64]
 ITERATIONS = 60
 STILL: tuple[Kind, ...] = ("values", "intervals", "strengths")
 """What quasi-static curves can tell."""
-WORSE = 1.05
-"""How much more what is held out may be missed by after a fit, as a factor."""
-PARTED = 5.0
-"""Whole runs that are missed by so many times more than windows have parted from the measured."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class Refined:
     Attributes:
         scene, composed, picture, history: the files that were written.
         changes: a line per changed component.
-        before, after: RMS position error of whole runs from their starts, which are fitted within
-            the measurement's error, rad or m; of curves, RMS error of the force, N·m or N.
+        before, after: RMS position error of whole runs, as `joda compare` tells it, rad or m; of
+            curves, RMS error of the force, N·m or N.
         windows: the same of windows of 0.4 s, before and after; None of curves.
         noise: of the measured position or force.
         checked: the same error where it was held out of the fit; None without such.
@@ -128,7 +128,9 @@ def refine(
     beside = {
         kind: target.with_suffix(f".{kind}") for kind in ("composed.json", "png", "history.json")
     }
-    check_targets([target, *beside.values()], force, runs)
+    check_targets([target, *beside.values()], force, [*runs, *check])
+    if twice := _both(runs, check):
+        raise JodaError(f"{twice}: is fitted too; what is held out (--check) must not be.")
     if unknown := set(fit) - set(KINDS):
         raise JodaError(f"fit: '{sorted(unknown)[0]}' is none of {', '.join(KINDS)}.")
     if not runs:
@@ -157,32 +159,39 @@ def refine(
     for _ in range(finer):
         begin = resolved(begin)
     timed = [one for one in clear.measured if isinstance(one, Run)]
+    still = [one for one in clear.measured if not isinstance(one, Run)]
     parts, _, cut = excerpts(timed)
     notes += cut
     unit = gravity_scale(found, begin)
     parameters = Parameters(begin, fit, keep_shape=keep_shape, gravity=unit)
     if not len(parameters.start):
         raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
+    at_first = taken(compiled, number, found, whole, replace(clear, measured=[*parts, *still]))
     problem = _problem(found, compiled, number, parameters, parts if timed else clear.measured)
+    if why := hardly_moved(at_first):
+        raise JodaError(f"{', '.join(one.name for one in clear.measured)}: {why}")
     result = problem.fit(
         iterations, method, lambda stage, k, rms: progress(stage, k, iterations, rms)
     )
     after = parameters.written(result.theta)
-    errors = problem.rms(parameters.start), problem.rms(result.theta)
-    windows = problem.windows(result.theta)
-    apart = None
-    if other:
-        unseen_runs = _problem(found, compiled, number, parameters, other.measured)
-        apart = unseen_runs.rms(parameters.start), unseen_runs.rms(result.theta)
-    if reason := _worse(errors, windows, apart, problem.sigma):
-        raise JodaError(f"{target}: not written, as {reason}.")
-    needs = Needs(taken(compiled, number, found, whole, clear)) if timed else None
-    if reason := implausible(needs, after):
-        raise JodaError(f"{target}: not written, as {reason}.")
+    mended = whole_profile(compiled, number, after)
+    held = taken(compiled, number, found, whole, other) if other else None
+    if set(fit) <= set(STILL):
+        errors = error(at_first), error(at_first, mended)
+        apart = (error(held), error(held, mended)) if held else None
+    else:  # what MuJoCo replays is not only the profile that has changed
+        unseen_runs = (
+            _problem(found, compiled, number, parameters, other.measured) if other else None
+        )
+        errors, apart = _errors(problem, result.theta), None
+        apart = _errors(unseen_runs, result.theta) if unseen_runs else None
+    if reason := refused(errors, apart, problem.sigma, (whole, mended), Needs(at_first)):
+        noted = "".join(f" {note}" for note in clear.notes)
+        raise JodaError(f"{target}: not written, as {reason}.{noted}")
     hidden = unseen(begin, parameters, result.covariance)
-    also, mended = _beyond(parameters, result.theta, compiled, number, found)
+    also, besides = _beyond(parameters, result.theta, compiled, number, found)
     scene, said = attached(source, after, target, joint=name, also=also)
-    notes += [*said, *mended, *problem.notes]
+    notes += [*said, *besides, *problem.notes]
     balance = np.array(found.positions), -np.array(found.gravity_force)
     figure = picture(before, after, balance, problem, result, hidden)
     write_together(
@@ -190,13 +199,16 @@ def refine(
             target: scene,
             beside["composed.json"]: after.to_json(),
             beside["png"]: png(figure),
-            beside["history.json"]: history(result, errors, problem.sigma, apart, hidden),
+            beside["history.json"]: history(
+                result, _told(errors), problem.sigma, _told(apart) if apart else None, hidden
+            ),
         }
     )
-    if windows and errors[1] > PARTED * max(windows[1], problem.sigma):
+    notes += parting(errors[1], problem.sigma, blocks=False)
+    if not check:
         notes.append(
-            "Whole runs still part from the measured ones although windows of 0.4 s do not: near "
-            "a barrier a small difference decides to which side a joint snaps."
+            "Nothing was held out: these are errors of what was fitted. Give other runs with "
+            "--check to see the others."
         )
     if result.interrupted:
         notes.append(f"Interrupted; the best of {len(result.history)} iterations was kept.")
@@ -206,32 +218,35 @@ def refine(
         picture=beside["png"],
         history=beside["history.json"],
         changes=tuple(changes(before, after)),
-        before=errors[0],
-        after=errors[1],
-        windows=windows,
+        before=_told(errors)[0],
+        after=_told(errors)[1],
+        windows=(errors[0].window, errors[1].window) if timed else None,
         noise=problem.sigma,
-        checked=apart,
+        checked=_told(apart) if apart else None,
         unseen=hidden,
         iterations=len(result.history),
         notes=tuple(notes),
     )
 
 
-def _worse(
-    errors: tuple[float, float],
-    windows: tuple[float, float] | None,
-    apart: tuple[float, float] | None,
-    noise: float,
-) -> str | None:
-    """Why the fitted profile is no better than it was, as a clause; None if it is."""
-    if apart and apart[1] > WORSE * max(apart[0], noise):
-        return (
-            f"what was held out (--check) is missed by {apart[1]:.3g} with it instead of "
-            f"{apart[0]:.3g}"
-        )
-    if errors[1] > errors[0] > noise and (windows is None or windows[1] > windows[0]):
-        return f"it is missed by {errors[1]:.3g} instead of {errors[0]:.3g} after the fit"
-    return None
+def _both(runs: Sequence[str | Path], check: Sequence[str | Path]) -> str | None:
+    """A file that is among both; None if there is none."""
+    fitted = {Path(run).resolve() for run in runs}
+    return next((str(run) for run in check if Path(run).resolve() in fitted), None)
+
+
+def _errors(problem: "Problem | CurveProblem", theta: Array) -> tuple[Error, Error]:
+    """Errors of the problem's own replays, before and after."""
+    first, windows = problem.parameters.start, problem.windows(theta)
+    if windows is None:
+        return Error(None, problem.rms(first)), Error(None, problem.rms(theta))
+    return Error(problem.rms(first), windows[0]), Error(problem.rms(theta), windows[1])
+
+
+def _told(errors: tuple[Error, Error]) -> tuple[float, float]:
+    """Of whole runs before and after; of curves, of the force."""
+    before, after = (one.window if one.whole is None else one.whole for one in errors)
+    return before, after
 
 
 def _of_one_kind(measured: Sequence[Run | QuasiStatic]) -> bool:

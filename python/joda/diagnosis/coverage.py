@@ -30,16 +30,24 @@ def _samples(curve: Gauged) -> NDArray[np.float64]:
     return np.array([np.sum(curve.direction > 0), np.sum(curve.direction < 0)], float)
 
 
+def hardly_moved(measured: Measured) -> str:
+    """That hardly any of the range was visited, a sentence; nothing if that is not so."""
+    logs = [*measured.runs] if measured.runs else [one.curve for one in measured.curves]
+    visited = float(np.ptp(np.concatenate([log.position for log in logs])))
+    if (share := visited / float(np.ptp(measured.profile.joint.range))) < VISITED:
+        what = "runs" if measured.runs else "curves"
+        return f"The {what} visit only {100 * share:.1g} % of the joint's range."
+    return ""
+
+
 def too_little(measured: Measured) -> str:
     """Why a model that misses nothing may lack much, as a sentence; nothing if that is not so."""
+    if why := hardly_moved(measured):
+        return why
     windows = windows_for(measured)
     if not measured.runs:
         told = len(windows.position)
         return f"{told} samples are too few; record {SAMPLES}." if told < SAMPLES else ""
-    span = float(np.ptp(measured.profile.joint.range))
-    visited = float(np.ptp(windows.position)) / span
-    if visited < VISITED:
-        return f"The runs visit only {100 * visited:.1g} % of the joint's range."
     own = [windows.position[row[row >= 0]] for row in windows.rows[usable(windows)]]
     moving = sum(bool(np.ptp(position) > MOVES * max(measured.sigma)) for position in own)
     if moving < WINDOWS:

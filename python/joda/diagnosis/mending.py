@@ -127,7 +127,7 @@ def mend(
         tried = [one for start in starts for one in trials.reshaped(start, effect, told)]
         loss = trials.unseen.loss(train.profile)
 
-    needs = Needs(train) if train.runs else None
+    needs = Needs(train)
 
     def best(some: Iterable[Tried]) -> tuple[Tried | None, Error, str]:
         """The likeliest that may be added, and its error; else why the first may not."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from joda.diagnosis.mending import Error
 from joda.files import check_targets
+from joda.measured.errors import MULTIPLE
 from joda.measured.excerpts import excerpts
 from joda.measured.maps import draw_models, draw_runs, shade
 from joda.measured.reading import Measured, read_measured
@@ -73,7 +74,9 @@ def scene_files(
 
 def parting(after: Error, noise: float, blocks: bool) -> list[str]:
     """A sentence where what was held out parts as a whole although windows of it do not."""
-    if after.whole is None or after.whole < PARTED * max(after.window, noise):
+    if after.whole is None or after.window > MULTIPLE * noise:
+        return []
+    if after.whole < PARTED * max(after.window, noise):
         return []
     return [
         f"{wholes(blocks).capitalize()} still part from the measured ones although windows of "

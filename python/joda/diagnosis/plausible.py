@@ -20,6 +20,7 @@ from joda.field import merge
 from joda.joints.resistance import damping, friction_bounds
 from joda.measured import smoothing
 from joda.measured.reading import Measured
+from joda.measured.runs import QuasiStatic, Run
 from joda.measured.visited import visited_share
 from joda.profile import CHANNELS, Profile
 
@@ -36,16 +37,14 @@ GRID = 201
 """Positions at which a curve's largest value is looked for."""
 
 
-def implausible(needs: "Needs | None", profile: Profile, effect: str | None = None) -> str | None:
+def implausible(needs: "Needs", profile: Profile, effect: str | None = None) -> str | None:
     """Why a fitted profile cannot be meant, as a clause; None if it can.
 
     Args:
-        needs: what the runs can need of the joint; None where there are none, but only curves.
+        needs: what the measurements can need of the joint.
         profile: the fitted one.
         effect: name of what was added; None: all of the profile counts.
     """
-    if needs is None:
-        return None
     if needs.unresisted(profile):
         return (
             "it works only in a joint with next to no friction and damping, much less than the "
@@ -74,7 +73,7 @@ def unseen_place(measured: Measured, interval: Interval | None) -> str | None:
 
 
 class Needs:
-    """The largest motion and force of measured runs.
+    """The largest motion and force of measured runs, or of curves, in which nothing moves.
 
     Attributes:
         speed: rad/s or m/s.
@@ -87,20 +86,21 @@ class Needs:
     """
 
     def __init__(self, measured: Measured) -> None:
-        """Looks through all runs."""
+        """Looks through all of them."""
         lo, hi = measured.profile.joint.range
-        position = np.concatenate([run.position for run in measured.runs])
+        logs: list[Run | QuasiStatic] = [*measured.runs]
+        logs = logs or [curve.curve for curve in measured.curves]
+        position = np.concatenate([log.position for log in logs])
         first, last = np.clip((np.array([position.min(), position.max()]) - lo) / (hi - lo), 0, 1)
         self.visited = float(first), float(last)
-        self.speed = max(_speed(run.time, run.position) for run in measured.runs)
-        travel = max(float(np.ptp(run.position)) for run in measured.runs)
-        self.acceleration = max(_acceleration(measured), self.speed**2 / (2 * travel))
-        applied = max(float(np.nanmax(np.abs(run.force), initial=0.0)) for run in measured.runs)
+        self.speed = max((_speed(run.time, run.position) for run in measured.runs), default=0.0)
+        self.acceleration = _acceleration(measured, self.speed) if measured.runs else 0.0
+        applied = max(float(np.nanmax(np.abs(log.force), initial=0.0)) for log in logs)
         gravity = max(map(abs, measured.context.gravity_force))
         inertia = measured.single.inertia * self.acceleration
         self.force = inertia + applied + gravity + self.exerted(measured.profile)
         self.resistance = self._resisted(measured.profile)
-        self.forced = any(run.forced for run in measured.runs)
+        self.forced = not measured.runs or any(run.forced for run in measured.runs)
 
     def exerted(self, profile: Profile) -> float:
         """Largest force of a profile where and as fast as runs went, N·m or N."""
@@ -145,9 +145,10 @@ def _speed(time: Array, position: Array) -> float:
     return float(np.max(np.abs(position[n:] - position[:-n]) / (time[n:] - time[:-n])))
 
 
-def _acceleration(measured: Measured) -> float:
-    """Largest from one window of the runs to the next."""
+def _acceleration(measured: Measured, speed: float) -> float:
+    """Largest from one window of the runs to the next, or to reach the largest speed."""
     windows = windows_for(measured)
     same = ~windows.fresh[1:]
     change = np.abs(np.diff(windows.start[:, 1]))[same] / (np.diff(windows.at)[same] * windows.h)
-    return float(change.max(initial=0.0))
+    travel = max(float(np.ptp(run.position)) for run in measured.runs)
+    return max(float(change.max(initial=0.0)), speed**2 / (2 * travel) if travel else 0.0)

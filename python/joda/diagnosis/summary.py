@@ -1,6 +1,7 @@
 """The verdict as a sentence."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from joda.diagnosis import phrases
 from joda.diagnosis.baseline import Base
@@ -8,7 +9,10 @@ from joda.diagnosis.findings import Finding
 from joda.diagnosis.guessing import Guess
 from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.weighing import MUCH, Weighed
+from joda.measured.gauge import compared
 from joda.measured.reading import Measured
+
+Array = NDArray[np.float64]
 
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
@@ -32,16 +36,31 @@ BLIND = (
 
 
 def strengths_off(ranking: Ranking) -> str:
-    """Which of the model's own strengths are off, as a further sentence: by more than 5 % and than
-    three of their standard errors."""
+    """Which of the model's own strengths are off, by more than 5 % and than three of their standard
+    errors, with these; empty if none is."""
     base, x = ranking.asked.base, ranking.asked.fit.x
-    errors = np.sqrt(np.diag(ranking.asked.covariance))
-    factors = ", ".join(
-        f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.2f} ± {error:.2g}"
-        for place, factor, error in zip(base.places, x, errors, strict=True)
+    return ", ".join(
+        f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.3g} ± {error:.2g}"
+        for place, factor, error in zip(base.places, x, _errors(ranking), strict=True)
         if abs(factor - 1) > max(OFF, CLEARLY * error)
     )
-    return f" Its own numbers are off: {factors}." if factors else ""
+
+
+def by_one_factor(ranking: Ranking) -> str:
+    """That all strengths that the data tell are off by one factor, a further sentence: then it may
+    be the force's."""
+    x = ranking.asked.fit.x[_errors(ranking) < OFF]
+    mean = float(x.mean()) if len(x) > 1 else 1.0
+    if abs(mean - 1) < FAR_OFF or np.abs(x / mean - 1).max() > ALIKE:
+        return ""
+    return (
+        f" All by one factor, about {mean:.2g}: the measured force may be in another unit, or its "
+        "lever arm another."
+    )
+
+
+def _errors(ranking: Ranking) -> Array:
+    return np.asarray(np.sqrt(np.diag(ranking.asked.covariance)))
 
 
 def strengths_beside(base: Base, guess: Guess) -> str:
@@ -75,7 +94,7 @@ def other_unit(measured: Measured) -> str | None:
     """That the force of a curve may be in another unit, a clause; None if not."""
     if not (times := measured.doubtful_unit):
         return None
-    return f"the measured force is up to {times:.0f} times the model's: see to its unit first"
+    return f"{compared(times)}: see to its unit first"
 
 
 def _label(base: Base, place: tuple[str, int]) -> str:

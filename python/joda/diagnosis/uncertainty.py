@@ -169,7 +169,7 @@ def from_data(fitted: _Fitted, tolerance: float = 0.0) -> Array:
     worse = judge.overdispersion(fitted.found.fit.squares)
     covariance = worse * np.linalg.pinv(H.sum(axis=0) + prior)
     rng = np.random.default_rng(0)
-    normal = rng.multivariate_normal(x, covariance, DRAWS, method="svd")
+    normal = rng.multivariate_normal(x, covariance, DRAWS, "ignore", method="svd")
     drawn = _bootstrap(fitted, H, slopes, prior, rng)
     profiled = _profiled(fitted, (1 + tolerance / worse) * covariance, worse + tolerance)
     parts = np.stack([_spread(fitted, normal), _spread(fitted, drawn), profiled])

@@ -18,6 +18,8 @@ from joda.diagnosis.ranking import Ranking, Told
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import (
     BOUNCY,
+    SAME,
+    by_one_factor,
     one_factor,
     other_unit,
     strengths_beside,
@@ -25,7 +27,7 @@ from joda.diagnosis.summary import (
     summarised,
 )
 from joda.diagnosis.uncertainty import uncertainty
-from joda.diagnosis.weighing import LITTLE, MUCH, Evidence, Verdict, Weighed
+from joda.diagnosis.weighing import LITTLE, MUCH, Evidence, Verdict, Weighed, weigh
 from joda.diagnosis.whole import BEYOND, worst
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
@@ -69,6 +71,7 @@ WITHOUT = (
     " Whole runs are missed by up to {:.0f} times the noise all the same, but by no more than "
     "noise, start and force explain; joda compare says where."
 )
+EITHER = "Either the model's own numbers are off ({}), or a force is missing"
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
 OUT_THERE = (
@@ -171,6 +174,10 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     if (left := worst(measured, ranking.asked)) > BEYOND:
         return _said(measured, "unexplained", DRIFTING.format(left), (), AGAIN)
     off, worst_run = strengths_off(ranking), worst_missed(measured)
+    if off and moved_one_way(measured):
+        experiment = _next(measured, ranking, weigh(ranking), one_way=True)
+        return _said(measured, "unexplained", EITHER.format(off) + SAME + ".", (), experiment)
+    off = f" Its own numbers are off: {off}.{by_one_factor(ranking)}" if off else ""
     missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
     if off and worst_run and worst_run.fault:
@@ -178,6 +185,8 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     else:
         summary = f"The model is adequate: {noise} that an effect would explain.{off}"
         summary += WITHOUT.format(missed) if missed > MULTIPLE else ""
+    if doubt := other_unit(measured):
+        summary += f" But {doubt}."
     return _said(measured, "adequate", summary, (), None)
 
 

@@ -97,10 +97,30 @@ class Gauged:
         return float(np.abs(self.curve.force).max()) / own if own > 0 else 0.0
 
     @property
+    def doubtful(self) -> float:
+        """The same where it is so much or so little that the unit is in doubt, else 0."""
+        times = self.times_the_model
+        return 0.0 if 1 / OTHER_UNIT < times < OTHER_UNIT else times
+
+    @property
+    def repeated(self) -> bool:
+        """Whether both ways were measured at the same places, which tells the gauge's noise from
+        what the joint's force does from sample to sample."""
+        curve = self.curve
+        return bool(np.isfinite(_between_ways(curve.position, curve.force, self.direction)))
+
+    @property
     def cautious(self) -> Array:
         """The doubt of each excess, where the noise is more than it was estimated."""
         doubt = self.doubt[self.direction != 0]
         return np.asarray(doubt * (1 + CAUTION / np.sqrt(len(doubt))))
+
+
+def compared(times: float) -> str:
+    """How many times the model's force the measured one is, a clause."""
+    if times < 1:
+        return f"the model's force is up to {1 / times:.0f} times the measured one"
+    return f"the measured force is up to {times:.0f} times the model's"
 
 
 def static_force(
@@ -304,10 +324,10 @@ def gauged(curve: QuasiStatic, profile: Profile, context: Context) -> tuple[Gaug
     sigma = max(noise, 1e-6 * float(np.abs(curve.force).max()))
     empty = np.zeros(len(position))
     found = Gauged(curve, direction, blur, empty, sigma, empty).against(profile, context)
-    if found.times_the_model > OTHER_UNIT:
+    if times := found.doubtful:
         arm = ", times the gauge's lever arm" if unit == "N·m" else ""
         notes.append(
-            f"{curve.name}: the measured force is up to {found.times_the_model:.0f} times the "
-            f"model's; is it in another unit (grams, m{unit})? It must be in {unit}{arm}."
+            f"{curve.name}: {compared(times)}; is it in another unit (grams, m{unit}, k{unit})? It "
+            f"must be in {unit}{arm}."
         )
     return found, notes

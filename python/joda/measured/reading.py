@@ -12,7 +12,7 @@ from joda.errors import JodaError
 from joda.joints.single import Single, single
 from joda.measured import smoothing
 from joda.measured.driven import read_logs
-from joda.measured.gauge import OTHER_UNIT, Gauged, gauged
+from joda.measured.gauge import Gauged, gauged
 from joda.measured.obstructed import Clear, clear_of_contacts
 from joda.measured.replay import Replayer
 from joda.measured.runs import QuasiStatic, Run
@@ -102,10 +102,10 @@ class Measured:
 
     @property
     def doubtful_unit(self) -> float:
-        """How many times the model's largest force that of a curve is, where that is so much that
-        its unit is in doubt; else 0, and where there are runs, beside which curves are not used."""
-        times = max((c.times_the_model for c in self.curves if not self.runs), default=0.0)
-        return times if times > OTHER_UNIT else 0.0
+        """How many times the model's largest force that of a curve is, where that is so much or so
+        little that its unit is in doubt; else 0, and where there are runs, beside which curves are
+        not used."""
+        return next((c.doubtful for c in self.curves if c.doubtful and not self.runs), 0.0)
 
     def paths(self) -> list[Array]:
         """Predicted positions of all runs, rad or m; NaN from where the force is not known."""

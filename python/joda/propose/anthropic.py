@@ -197,7 +197,7 @@ class Anthropic(VisionModel):
         return message
 
     def _reply(self, message: "Message") -> Reply:
-        said = "".join(block.text for block in message.content if block.type == "text")
+        said = "".join(getattr(one, "text", "") for one in message.content if _kind(one) == "text")
         text = self._credentials.hide(said)
         if message.stop_reason == "refusal":
             details = getattr(message, "stop_details", None)

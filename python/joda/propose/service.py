@@ -1,5 +1,6 @@
 """The services that are asked: keys and addresses, and what is never told of them."""
 
+import json
 import os
 import re
 from typing import Any
@@ -11,6 +12,8 @@ SHORTEST_SECRET = 6
 """Letters; less is no secret but a word."""
 MOST_TOKENS = 10**9
 """Of an answer."""
+ESCAPED = re.compile(r"\\(?:u00([2-7][0-9A-Fa-f])|.)", re.DOTALL)
+"""An escape of JSON, with the number of the character if it is one of ASCII's that are seen."""
 
 
 class Credentials:
@@ -45,10 +48,22 @@ class Credentials:
         self._secrets = sorted((s for s in sent if len(s) >= SHORTEST_SECRET), key=len)[::-1]
 
     def hide(self, said: str) -> str:
-        """What the service says, without the secrets that it may echo."""
+        """What the service says, without the secrets that it may echo, escaped as in JSON or not.
+
+        JSON stays JSON of the same meaning, but for the secrets.
+        """
+        said = ESCAPED.sub(_plainly, said)
         for secret in self._secrets:
-            said = said.replace(secret, "[secret]")
+            for form in (secret, json.dumps(secret)[1:-1]):
+                said = said.replace(form, "[secret]")
         return said
+
+
+def _plainly(escape: re.Match[str]) -> str:
+    """A character that JSON need not escape as it is, any other in its shortest escape."""
+    if not escape[1]:
+        return "/" if escape[0] == r"\/" else escape[0]
+    return json.dumps(chr(int(escape[1], 16)))[1:-1]
 
 
 def host(client: Any) -> str:

@@ -1,0 +1,97 @@
+"""Whether a fitted profile is to be written: better than it was, and nothing absurd."""
+
+import numpy as np
+
+from joda.diagnosis.mending import Error
+from joda.diagnosis.plausible import Needs, implausible
+from joda.field import evaluate
+from joda.measured.errors import MULTIPLE
+from joda.profile import CHANNELS, Profile
+
+WORSE = 1.05
+"""How much more what is held out may be missed by after a fit, as a factor."""
+LESS = 0.999
+"""What is left of an error, as a factor, that has fallen."""
+FAR = 3.0
+"""By which factor a channel must have changed to be another joint's."""
+HOPELESS, HARDLY = 10.0, 0.2
+"""Error in units of the noise, and of that before, from which such a change explains too little."""
+GRID = np.linspace(0, 1, 201)
+PARTS = {"whole": "whole runs", "window": "windows of 0.4 s"}
+
+
+def refused(
+    fitted: tuple[Error, Error],
+    held: tuple[Error, Error] | None,
+    noise: float,
+    profiles: tuple[Profile, Profile],
+    needs: Needs,
+) -> str | None:
+    """Why a fitted profile is not written, as a clause; None if it is.
+
+    Args:
+        fitted: errors of what was fitted, before and after.
+        held: of what was held out; None without such.
+        noise: of the measurement, in the same unit.
+        profiles: before and after.
+        needs: what the measurements can need of the joint.
+    """
+    return (
+        (held and _held_out(*held, noise))
+        or _no_better(*fitted, noise)
+        or _hopeless(*fitted, noise, *profiles)
+        or implausible(needs, profiles[1])
+    )
+
+
+def _held_out(before: Error, after: Error, noise: float) -> str | None:
+    for part, was, now in _parts(before, after):
+        if now > WORSE * max(was, noise):
+            return (
+                f"what was held out (--check) is missed by {now:.3g} with it instead of {was:.3g}"
+                f"{_in(after, part)}"
+            )
+    return None
+
+
+def _no_better(before: Error, after: Error, noise: float) -> str | None:
+    """Near a barrier either kind of error may grow by chance: both together must not, and what is
+    more than noise must fall."""
+    parts = _parts(before, after)
+    ratio = np.prod([max(now, noise) / max(was, noise) for _, was, now in parts])
+    if ratio < LESS or (ratio <= 1.0 and after.window <= MULTIPLE * noise):
+        return None
+    what = " and ".join(
+        f"{now:.3g} instead of {was:.3g}{_in(after, part)}" for part, was, now in parts
+    )
+    return f"what was fitted is missed by {what}"
+
+
+def _hopeless(before: Error, after: Error, noise: float, old: Profile, new: Profile) -> str | None:
+    left = after.window
+    if left <= max(HOPELESS * noise, HARDLY * before.window):
+        return None
+    for name in CHANNELS:
+        was, now = (_size(profile, name) for profile in (old, new))
+        if was > 0 and not 1 / FAR < now / was < FAR:
+            return (
+                f"its {name} would be {now / was:.2g} times what it was, and what was fitted would "
+                f"still be missed by {left / noise:.0f} times the noise{_in(after, 'window')}: the "
+                "unit, sign or joint of the measurement may be another, or an effect be missing "
+                "(joda diagnose)"
+            )
+    return None
+
+
+def _parts(before: Error, after: Error) -> list[tuple[str, float, float]]:
+    pairs = [(part, getattr(before, part), getattr(after, part)) for part in PARTS]
+    return [(part, was, now) for part, was, now in pairs if was is not None and now is not None]
+
+
+def _in(error: Error, part: str) -> str:
+    return "" if error.whole is None else f" in {PARTS[part]}"
+
+
+def _size(profile: Profile, name: str) -> float:
+    curve = evaluate(getattr(profile.channels, name), GRID)[0]
+    return float(np.sqrt(np.mean(curve**2)))
