@@ -1,6 +1,7 @@
 """JODA: joint dynamics for articulated objects in MuJoCo.
 
-Every command is a function here, of the same name and meaning: `joda.attach`, `joda.plot`, ...
+Every command is a function here, of the same name and meaning: `joda.attach`, `joda.plot`, ...;
+but `joda import` is `joda.import_log`, as Python has `import` for itself.
 They are loaded when they are first used, and the plugin with them, so that `import joda` stays
 light: it imports neither MuJoCo nor NumPy. Only a MuJoCo before 4.0, which looks for no plugins,
 is imported at once.
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from joda._generate import generate
     from joda._generate_all import generate_all
     from joda._hidden_effect import hidden_effect
+    from joda._import_log import import_log
     from joda._improve import improve
     from joda._plot import plot
     from joda._refine import refine
@@ -67,6 +69,7 @@ __all__ = [
     "generate",
     "generate_all",
     "hidden_effect",
+    "import_log",
     "improve",
     "plot",
     "plugin_path",
@@ -97,6 +100,7 @@ COMMANDS = (
     "experiments",
     "export",
     "generate",
+    "import",
     "improve",
     "plot",
     "refine",
@@ -118,10 +122,13 @@ _LAZY = {
     "read_profiles": "joda.scenes.scene",
     "set_profile": "joda.scenes.scene",
     **{name: f"joda._{name}" for name in COMMANDS},
+    "import_log": "joda._import_log",
 }
 
 
 def __getattr__(name: str) -> Any:
+    if name == "import":  # a word of Python's own, which nobody can write
+        name = "import_log"
     if name in _MODULES:
         return import_module(f"joda.{name}")
     if name not in _LAZY:
