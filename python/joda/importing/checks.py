@@ -81,8 +81,7 @@ def follows(made: Sequence[Rows], position: str, command: str, gear: float) -> F
         even = np.arange(0.0, one.time[-1], step)
         count += len(even)
         moved = np.diff(np.interp(even, one.time, one.columns[position]))
-        held = np.searchsorted(one.time, even + 1e-9 * step, "right") - 1
-        told = np.diff(one.columns[command][held] / gear)
+        told = np.diff(np.interp(even, one.time, one.columns[command] / gear))
         for k, lag in enumerate(lags):
             a = told[: len(told) - lag] if lag >= 0 else told[-lag:]
             b = moved[lag:] if lag >= 0 else moved[: len(moved) + lag]

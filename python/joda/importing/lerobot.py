@@ -27,6 +27,8 @@ INFO = Path("meta/info.json")
 INDEX, FRAME, STAMP = "episode_index", "frame_index", "timestamp"
 CALIBRATED = ("rad", "deg", "-100..100")
 """Units of a robot's joints: info.json does not have them."""
+MOST = 1e9
+"""Numbers of episodes and frames are less."""
 GRIPPERS = re.compile("gripper", re.IGNORECASE)
 PERCENT = re.compile(r"(so100|so101|koch|moss|lekiwi)(_follower)?|so_follower", re.IGNORECASE)
 """Robots whose gripper LeRobot gives as 0..100 of its range, whatever the other joints are in."""
@@ -185,11 +187,11 @@ def _recordings(
         if own and episodes and int(own[1]) not in episodes:
             continue
         columns, rows = _columns(file, signals)
-        numbers = columns.get(INDEX)
-        if numbers is None and not own:
+        if INDEX not in columns and not own:
             raise JodaError(f"{file}: no column '{INDEX}'.")
-        index = np.full(rows, int(own[1])) if numbers is None and own else numbers
-        for number in dict.fromkeys(index.astype(int).tolist()) if index is not None else ():
+        index = columns[INDEX] if INDEX in columns else np.full(rows, float(own[1]) if own else 0.0)
+        _check_counts(file, INDEX, index)
+        for number in dict.fromkeys(index.astype(int).tolist()):
             if episodes and number not in episodes:
                 continue
             if number in seen:
@@ -210,9 +212,7 @@ def _episode(
     """One episode: its rows of the file's columns."""
     frames = columns[FRAME][rows] if FRAME in columns else np.arange(len(rows), dtype=float)
     time = columns[STAMP][rows] if STAMP in columns else frames / info.fps
-    bad = np.flatnonzero(~np.isfinite(frames))
-    if len(bad):
-        raise JodaError(f"{file}, row {rows[bad[0]]}: {FRAME} is not a number.")
+    _check_counts(file, FRAME, frames)
     clock = Clock(time, f"{file}, episode {number}", "frame", frames.astype(np.intp))
     tracks = {
         signal.name: Track(clock, columns[feature][rows, k])
@@ -220,6 +220,13 @@ def _episode(
         for k, signal in enumerate(some)
     }
     return Recording(f"episode_{number:06d}", tracks)
+
+
+def _check_counts(file: Path, name: str, values: Array) -> None:
+    """Raises JodaError for what is no number of an episode or a frame."""
+    bad = np.flatnonzero(~((values >= 0) & (values < MOST)))
+    if len(bad):
+        raise JodaError(f"{file}, row {bad[0]}: {name} is {values[bad[0]]:g}, no number of one.")
 
 
 def _columns(file: Path, signals: dict[str, tuple[Signal, ...]]) -> tuple[dict[str, Array], int]:

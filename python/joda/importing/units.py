@@ -150,13 +150,14 @@ def decided(seen: Sequence[Seen], units: Sequence[str]) -> tuple[str, str]:
     if len(fit) == 1 and (fit[0] in ("rad", "m") or _sure(seen, fit[0], units)):
         others = ", ".join(unit for unit in units if unit != fit[0])
         return fit[0], f"by its range: not {others}" if others else "no other is possible"
-    shown = max(seen, key=lambda one: one.high - one.low)
-    readings = [_reading(shown, unit) for unit in units]
+    told = fit if len(fit) > 1 else units
+    shown = max(seen, key=lambda x: (sum(not x.within(unit) for unit in told), x.high - x.low))
+    readings = [_reading(shown, unit) for unit in told]
     what = f"{len(fit)} units fit" if len(fit) > 1 else "its unit is not sure"
     name = shown.name if len(seen) == 1 else f"{shown.name} and {len(seen) - 1} more"
     raise JodaError(
         f"{name}: {what}: it goes from {shown.low:.4g} to {shown.high:.4g}, which would be "
-        f"{'; '.join(readings)}{_model(shown)}. Say --unit '{shown.name}={_proposed(fit, units)}'"
+        f"{'; '.join(readings)}{_model(shown)}. Say --unit '{shown.name}={' or '.join(told)}'"
         f"{_several(seen)}."
     )
 
@@ -185,10 +186,6 @@ def _model(seen: Seen) -> str:
         return ", and the model's joint has no range"
     lo, hi = seen.limits
     return f", and the model's range is {lo:.4g} to {hi:.4g}"
-
-
-def _proposed(fit: Sequence[str], units: Sequence[str]) -> str:
-    return " or ".join(fit or units)
 
 
 def _several(seen: Sequence[Seen]) -> str:
