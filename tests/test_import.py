@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from test_cli import fails, joda
@@ -486,6 +487,21 @@ def test_nan_of_drivers_is_no_column_and_nan_between_numbers_is_refused(arm, tmp
     assert read(made.runs[0])["position:elbow_flex"] == pytest.approx(q[5:])
 
 
+def test_a_bag_of_ros_1(arm, tmp_path):
+    types = get_typestore(Stores.ROS1_NOETIC)
+    q, _ = motion(50)
+    time = types.types["builtin_interfaces/msg/Time"]
+    with Writer1(tmp_path / "old.bag") as bag:
+        topic = bag.add_connection("/joint_states", JOINTS, typestore=types)
+        for k in range(50):
+            head = types.types["std_msgs/msg/Header"](k, time(7, 20_000_000 * k), "")
+            message = types.types[JOINTS](head, ["elbow_flex"], q[k, 1:2], np.zeros(0), np.zeros(0))
+            bag.write(topic, 8 * 10**9 + k, types.serialize_ros1(message, JOINTS))
+    run = read(import_log(tmp_path / "old.bag", arm, tmp_path / "runs").runs[0])
+    assert run["position:elbow_flex"] == pytest.approx(q[:, 1])
+    assert run["time"] == pytest.approx(STEP * np.arange(50), abs=1e-8)
+
+
 def test_what_is_no_bag_or_has_no_joints(arm, tmp_path):
     types = store()
     kind = "std_msgs/msg/Float64"
@@ -548,6 +564,17 @@ def test_a_csv_in_degrees_with_names_of_its_own(arm, tmp_path):
     assert known["ctrl:push"] == ("raw", "no position servo: its own unit")
 
 
+def test_times_in_units_and_the_same_for_all_other_columns(arm, tmp_path):
+    q = np.linspace(-80, 70, 50)
+    log = write_csv(tmp_path / "log.csv", {"T": np.arange(0, 1000, 20), "elbow_flex.pos": q})
+    sentence("--unit T=ms, us or ns", log, arm, tmp_path / "no", units=["*=deg"])
+    made = import_log(log, arm, tmp_path / "runs", units=["*=deg", "T=ms"])
+    run = read(made.runs[0])
+    assert run["time"] == pytest.approx(np.arange(50) / 50)
+    assert run["position:elbow_flex"] == pytest.approx(np.deg2rad(q))
+    sentence("times are in 's', 'ms'", log, arm, tmp_path / "no", units=["T=deg"])
+
+
 def test_a_run_of_ones_own_is_read_as_it_is(arm, tmp_path):
     q, u = motion()
     columns = {
@@ -559,6 +586,26 @@ def test_a_run_of_ones_own_is_read_as_it_is(arm, tmp_path):
     again = import_log(made.runs[0], arm, tmp_path / "again")
     assert made.runs[0].read_text().splitlines()[2:] == again.runs[0].read_text().splitlines()[2:]
     assert read(made.runs[0])["ctrl:pan_servo"] == pytest.approx(u[:, 0])
+
+
+def test_a_run_of_one_joint_stays_one(arm, tmp_path):
+    time, q = STEP * np.arange(100), np.sin(STEP * np.arange(100))
+    columns = {"Time": time, "position": q, "velocity": np.cos(time), "force": 0.1 * q}
+    log = write_csv(tmp_path / "log.csv", columns)
+    made = import_log(log, arm, tmp_path / "runs", joint="elbow_flex")
+    run, own = read_run(made.runs[0]), read_run(log)
+    assert run.position == pytest.approx(own.position)
+    assert run.velocity == pytest.approx(own.velocity)
+    assert run.force == pytest.approx(own.force)
+    text = log.read_text().replace(f",{columns['force'][7]}", ",")  # an empty cell: not known
+    log.write_text(text)
+    made = import_log(log, arm, tmp_path / "hole", joint="elbow_flex", units=["force=-raw"])
+    force = read_run(made.runs[0]).force
+    assert np.flatnonzero(np.isnan(force)).tolist() == [7]
+    assert force[:7] == pytest.approx(-own.force[:7])
+    made = import_log(log, arm, tmp_path / "less", columns=["position:rail=position"])
+    assert [one.target for one in made.columns] == ["position:rail"]
+    assert "it tells no joint; --column 'velocity:JOINT=velocity'" in made.unused[0].why
 
 
 def test_sign_zero_and_delay_that_are_wrong_are_said(arm, tmp_path):

@@ -91,8 +91,8 @@ def import_log(
         raise JodaError(f"{folder}: is a file; give a folder for the runs.")
     time = named.pop("time", "")
     read = open_log(source, list(named.values()), time, unit_of, episodes, topics, progress)
-    read = _left(read, without, [time])
-    _check_known(read, {**unit_of, **zero_of}, time)
+    read = _left(read, without)
+    _check_known(read, {**unit_of, **zero_of})
     chosen, unused = picked(read, names, named, only)
     if only is not None:
         commands = [pick for pick in chosen if pick.role == "ctrl"]
@@ -154,7 +154,7 @@ def _number(name: str, text: str) -> float:
     return value
 
 
-def _left(log: Log, without: Sequence[str], also: Sequence[str]) -> Log:
+def _left(log: Log, without: Sequence[str]) -> Log:
     """The log without some of its signals; raises JodaError for one that it does not have."""
     for pattern in without:
         if not any(given({pattern: ""}, s) is not None for s in log.signals):
@@ -164,14 +164,11 @@ def _left(log: Log, without: Sequence[str], also: Sequence[str]) -> Log:
     return replace(log, signals=tuple(kept))
 
 
-def _check_known(log: Log, options: Mapping[str, object], time: str) -> None:
+def _check_known(log: Log, options: Mapping[str, object]) -> None:
     """Raises JodaError for an option of a column that is not there."""
     for name in options:
-        own = {name: ""}
-        if name == time or (log.format == "CSV" and not log.signals):
-            continue
-        if not any(given(own, s) is not None for s in log.signals):
-            log.named(name)
+        if name != log.times and not any(given({name: ""}, s) is not None for s in log.signals):
+            log.named(name)  # says what there is
 
 
 def _inputs(log: Path, model: str | Path) -> list[str | Path]:

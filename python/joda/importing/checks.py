@@ -44,8 +44,8 @@ class Follows:
 def span(made: Sequence[Rows], target: str) -> tuple[float, float]:
     """The least and largest number of a column in all runs, in the model's units."""
     return (
-        min(float(one.columns[target].min()) for one in made),
-        max(float(one.columns[target].max()) for one in made),
+        min(float(np.nanmin(one.columns[target])) for one in made),
+        max(float(np.nanmax(one.columns[target])) for one in made),
     )
 
 

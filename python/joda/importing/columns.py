@@ -211,7 +211,9 @@ def _matched(names: Names, signal: Signal, only: int | None) -> Pick | Unused:
         actuator = names.actuator(signal.of)
         if actuator is None:
             joint = names.joint(signal.of)
-            if joint is not None:
+            if joint is not None and names.driven[joint]:
+                what = f"the actuator on joint '{joint_name(names.model, joint)}' has no name"
+            elif joint is not None:
                 what = f"the model has no actuator on joint '{joint_name(names.model, joint)}'"
             else:
                 what = f"no actuator and no joint is called '{signal.of}'"

@@ -1,7 +1,6 @@
 """CSV files with columns of any names."""
 
 from collections.abc import Mapping, Sequence
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ def read_csv(path: Path, wanted: Sequence[str], time: str, units: Mapping[str, s
         path: of it.
         wanted: names of columns that are to be read although their names do not say what they are.
         time: name of the column of times; empty for the only one that has such a name.
-        units: of columns, by name or pattern; only that of the times is used here.
+        units: of columns by name; only that of the times is used here.
 
     Raises:
         JodaError: it is no such file, a wanted column is not there, or it has no times.
@@ -36,7 +35,7 @@ def read_csv(path: Path, wanted: Sequence[str], time: str, units: Mapping[str, s
     if missing:
         raise JodaError(f"{path}: no column '{missing[0]}'; it has {listed(names)}.")
     signals = tuple(_signal(name) for name in names if name != clock)
-    read = [one.name for one in signals if (one.role and one.of) or one.name in wanted]
+    read = [one.name for one in signals if one.role or one.name in wanted]
     table = read_table(path, [clock, *read], "columns that have names")
     if not len(table.lines):
         raise JodaError(f"{path}: has a header and no rows.")
@@ -47,7 +46,7 @@ def read_csv(path: Path, wanted: Sequence[str], time: str, units: Mapping[str, s
         raise JodaError(f"{path}, line {line}: {clock} is empty; give each row its time.")
     shared = Clock(times * TIMES[seconds], str(path), "line", table.lines)
     tracks = {name: Track(shared, table.columns[name]) for name in read}
-    return Log(path, "CSV", signals, (Recording(path.stem, tracks),))
+    return Log(path, "CSV", signals, (Recording(path.stem, tracks),), times=clock)
 
 
 def _signal(name: str) -> Signal:
@@ -85,11 +84,10 @@ def _stem(name: str) -> tuple[str, str]:
 
 
 def _time_unit(path: Path, name: str, times: np.ndarray, units: Mapping[str, str]) -> str:
-    for pattern, unit in units.items():
-        if pattern == name or fnmatchcase(name, pattern):
-            if unit not in TIMES:
-                raise JodaError(f"--unit {name}={unit}: times are in {listed(TIMES)}.")
-            return unit
+    if (unit := units.get(name)) is not None:
+        if unit not in TIMES:
+            raise JodaError(f"--unit {name}={unit}: times are in {listed(TIMES)}.")
+        return unit
     if unit := _stem(name)[1]:
         return unit
     usual = float(np.median(np.abs(np.diff(times)))) if len(times) > 1 else 0.0

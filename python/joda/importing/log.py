@@ -88,6 +88,7 @@ class Log:
         signals: its columns.
         recordings: at least one.
         notes: what a reader of it should know, a sentence each.
+        times: the column of times, where that is one of the log's own.
     """
 
     path: Path
@@ -95,6 +96,7 @@ class Log:
     signals: tuple[Signal, ...]
     recordings: tuple[Recording, ...]
     notes: tuple[str, ...] = ()
+    times: str = ""
 
     def named(self, name: str, role: Role = "") -> Signal:
         """The signal of a name, whole or short; of several with a short name, that of the role.

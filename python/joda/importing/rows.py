@@ -20,7 +20,7 @@ class Rows:
     Attributes:
         name: of its run.
         time: s, from 0.
-        columns: by target.
+        columns: by target; NaN where a force is not known.
         notes: what was left out, a sentence each.
     """
 
@@ -49,7 +49,8 @@ def rows(log: Log, recording: Recording, columns: Sequence[Scaled], interpolate:
         known = np.flatnonzero(np.isfinite(track.values))
         if not len(known):
             raise JodaError(f"{track.clock.at(0)}: {one.pick.signal.name} has no numbers there.")
-        begin = max(begin, track.clock.time[known[0]])
+        if one.pick.role != "force":  # which may be unknown
+            begin = max(begin, track.clock.time[known[0]])
         same = track.clock is base or np.array_equal(track.clock.time, base.time)
         if one.pick.role == "ctrl":
             _check_known(one, track, known[0])
@@ -70,9 +71,9 @@ def rows(log: Log, recording: Recording, columns: Sequence[Scaled], interpolate:
     inside = (base.time >= begin) & (base.time <= end)
     for one in columns:
         bad = np.flatnonzero(inside & ~np.isfinite(out[one.pick.target]))
-        if len(bad):
+        if len(bad) and one.pick.role != "force":
             raise _unknown(one, base, int(bad[0]))
-        if np.abs(out[one.pick.target][inside]).max(initial=0.0) > LARGEST:
+        if np.nanmax(np.abs(out[one.pick.target][inside]), initial=0.0) > LARGEST:
             raise JodaError(
                 f"{base.place}: {one.pick.signal.name} has numbers too large to be meant."
             )
@@ -97,7 +98,7 @@ def text(made: Rows, columns: Sequence[Scaled], comment: str, alone: Pick | None
         head = "".join(f"# {line}\n" for line in comment.splitlines())
         lines = [",".join(["time", *made.columns])]
         lines += [
-            ",".join(f"{x:.9g}" for x in row)
+            ",".join("" if x != x else f"{x:.9g}" for x in row)
             for row in np.column_stack([made.time, *made.columns.values()]).tolist()
         ]
         return head + "\n".join(lines) + "\n"

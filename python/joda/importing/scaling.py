@@ -152,7 +152,7 @@ def _scaled(
     unit, why = told
     if unit == MODEL:
         unit = "rad" if hinge else "m"
-    if pick.role == "force" and unit != RAW:
+    if pick.role == "force" and unit.removeprefix("-") != RAW:
         raise JodaError(f"{where}: a force is in N·m or N; say --unit '{name}=raw' if it is.")
     if unit.removeprefix("-") == RAW:
         sign = -1.0 if unit != RAW else 1.0
