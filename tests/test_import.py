@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from test_cli import fails, joda
 
 from joda import JodaError, compare, import_log
-from joda.importing.rosbag import CONTROLLER, FIRST, HUMBLE, JOINTS
+from joda.importing.ros_messages import CONTROLLER, FIRST, HUMBLE, JOINTS
 from joda.measured.runs import read_run
 
 ARM = """<mujoco><compiler angle="radian"/><worldbody><body>

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from joda.errors import JodaError
 from joda.files import check_targets, file_name, make_folder, write_together
-from joda.importing.columns import Names, Unused, columns_given, picked
+from joda.importing.columns import Unused, columns_given, picked
 from joda.importing.log import Log
+from joda.importing.model_names import Names
 from joda.importing.opening import open_log
 from joda.importing.rows import rows, text
 from joda.importing.scaling import given, scaled

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from joda.errors import JodaError
 from joda.importing.csv_file import read_csv
-from joda.importing.lerobot import INFO, read_lerobot
+from joda.importing.lerobot import read_lerobot
+from joda.importing.lerobot_info import INFO
 from joda.importing.log import Log
 from joda.importing.rosbag import read_bag
 

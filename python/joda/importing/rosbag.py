@@ -1,7 +1,6 @@
 """Bags of ROS 2 (folders, .db3, MCAP) and ROS 1, read without ROS."""
 
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,9 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.importing.log import Array, Clock, Log, Recording, Role, Signal, Track, listed
+from joda.importing.ros_messages import CONTROLLER, JOINTS, library_errors, opened
 from joda.importing.units import MODEL
 
-JOINTS, CONTROLLER = "sensor_msgs/msg/JointState", "control_msgs/msg/JointTrajectoryControllerState"
 FIELDS: dict[str, tuple[tuple[str, str, Role], ...]] = {
     JOINTS: (
         ("position", "position", "position"),
@@ -33,18 +32,6 @@ FIELDS: dict[str, tuple[tuple[str, str, Role], ...]] = {
 """Of each message: the place of its numbers, how they are called here, and what they are."""
 OLDER = {"actual": "feedback", "actual_velocity": "feedback_velocity", "desired": "reference"}
 """Names of the same in older messages; some have both."""
-POINT = "trajectory_msgs/JointTrajectoryPoint"
-MULTI = "trajectory_msgs/MultiDOFJointTrajectoryPoint"
-PLACES = ("reference", "feedback", "error", "output", "desired", "actual")
-HUMBLE = "std_msgs/Header header\nstring[] joint_names\n" + "".join(
-    [f"{POINT} {name}\n" for name in PLACES]
-    + ["string[] multi_dof_joint_names\n"]
-    + [f"{MULTI} multi_dof_{name}\n" for name in PLACES]
-)
-FIRST = "std_msgs/Header header\nstring[] joint_names\n" + "".join(
-    f"{POINT} {name}\n" for name in ("desired", "actual", "error")
-)
-"""The controller's message in bags that do not have its definition, as those of Humble."""
 
 
 @dataclass
@@ -69,7 +56,7 @@ def read_bag(path: Path, topics: Collection[str], progress: Callable[[int, int, 
         JodaError: it is no bag or damaged, rosbags is not installed, or none of its messages is
             read.
     """
-    with _library_errors(path), _opened(path) as (bag, deserialize):
+    with library_errors(path), opened(path) as (bag, deserialize):
         read = [one for one in bag.connections if one.msgtype in FIELDS]
         there = {one.topic: one.msgtype for one in bag.connections}
         if unknown := next((one for one in topics if one not in there), None):
@@ -174,45 +161,3 @@ def _log(path: Path, streams: dict[tuple[str, tuple[str, ...]], Stream], several
 def _clock(place: str, stream: Stream, origin: int) -> Clock:
     time: NDArray[np.float64] = np.array([t - origin for t in stream.times], np.float64) * 1e-9
     return Clock(time, place, "message", np.array(stream.numbers, np.intp))
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[tuple[Any, Callable[[bytes, str], Any]]]:
-    """The opened bag, and what makes messages of its bytes."""
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    stores = []
-    for text in (HUMBLE, FIRST):
-        store = get_typestore(Stores.ROS2_HUMBLE)
-        if CONTROLLER not in store.fielddefs:
-            store.register(get_types_from_msg(text, CONTROLLER))
-        stores.append(store)
-    with AnyReader([path], default_typestore=stores[0]) as bag:
-        told = any(one.msgdef.data for one in bag.connections if one.msgtype == CONTROLLER)
-
-        def deserialize(raw: bytes, kind: str) -> Any:
-            if kind != CONTROLLER or told or not bag.is2:
-                return bag.deserialize(raw, kind)
-            try:
-                return stores[0].deserialize_cdr(raw, kind)
-            except Exception:  # the message has another form
-                return stores[1].deserialize_cdr(raw, kind)
-
-        yield bag, deserialize
-
-
-@contextmanager
-def _library_errors(path: Path) -> Iterator[None]:
-    """What rosbags and the libraries below it raise of a damaged bag, which may be anything."""
-    try:
-        yield
-    except JodaError:
-        raise
-    except ImportError:
-        raise JodaError('ROS bags need rosbags; run: pip install ".[import]"') from None
-    except Exception as error:
-        told = str(error).partition("\n")[0].rstrip(".") or type(error).__name__
-        raise JodaError(
-            f"{path}: cannot be read as a ROS bag ({told}); record or convert it anew."
-        ) from None
