@@ -26,7 +26,7 @@ FEATURES: dict[str, Role] = {
 CALIBRATED = ("rad", "deg", "-100..100")
 """Units of a robot's joints: info.json does not have them."""
 GRIPPERS = re.compile("gripper", re.IGNORECASE)
-PERCENT = re.compile(r"(so100|so101|koch|moss|lekiwi)(_follower)?|so_follower", re.IGNORECASE)
+PERCENT = re.compile(r"so10[01](_follower)?|so_follower", re.IGNORECASE)
 """Robots whose gripper LeRobot gives as 0..100 of its range, whatever the other joints are in."""
 
 
