@@ -4,8 +4,11 @@ session; `--whole` runs all."""
 import os
 import random
 import secrets
+import sys
 from collections import defaultdict
+from pathlib import Path
 
+sys.path[:0] = [str(Path(__file__).parent / name) for name in ("helpers", "benchmarks")]
 # tests run side by side: threads within matrix products would only be in each other's way
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SEED = "JODA_SWEEPS"

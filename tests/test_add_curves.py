@@ -7,8 +7,8 @@ import pytest
 from gauging import FRICTION, LAWS, SPAN, gauged
 
 from joda import add, diagnose, improve
-from joda._add import sentences as told_added
-from joda._improve import sentences as told
+from joda.commands.add import sentences as told_added
+from joda.commands.improve import sentences as told
 from joda.diagnosis.mending import error
 from joda.diagnosis.split import parted
 from joda.measured.gauge import static_force

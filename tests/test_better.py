@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_compare import door, runs_of, scene_of
 
-from joda._refine import _worse
+from joda.commands.refine import _worse
 from joda.component import Component
 from joda.diagnosis.better import improves, risen
 from joda.diagnosis.plausible import EXCESS, Needs, implausible, unseen_place

@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 
 from joda import COMMANDS, JodaError, Profile, bench, demo, plot
-from joda._bench import hinges, without_plugin
-from joda._bench_plot import bench_plot
-from joda._bench_plot import profile as plotted
-from joda._refine import Refined
 from joda.cli import app, main
 from joda.cli.tell import tell_viewer
+from joda.commands.bench_plot import bench_plot
+from joda.commands.bench_plot import profile as plotted
+from joda.commands.refine import Refined
+from joda.scenes.hinges import hinges, without_plugin
 
 MODELS = Path(__file__).parents[1] / "models"
 LATCH = Path(__file__).parent / "microwave.latch.json"
@@ -230,7 +230,7 @@ class TestBench:
     """Only what is measured is tested here, not how fast it is."""
 
     def test_rows_are_ratios_of_times(self, folder, monkeypatch):
-        monkeypatch.setattr("joda._bench.ROUNDS", 3)
+        monkeypatch.setattr("joda.commands.bench.ROUNDS", 3)
         joda("attach", "microwave.xml", "microwave.latch.json", "-o", "scene.xml", cwd=folder)
         for rows in (bench(), bench(folder / "scene.xml")):
             for row in rows:
@@ -249,8 +249,8 @@ class TestBench:
 
     @pytest.mark.long
     def test_the_plot_shows_how_the_cost_grows(self, folder, monkeypatch):
-        monkeypatch.setattr("joda._bench_plot.ROUNDS", 2)
-        monkeypatch.setattr("joda._bench_plot.JOINTS", (1, 3))
+        monkeypatch.setattr("joda.commands.bench_plot.ROUNDS", 2)
+        monkeypatch.setattr("joda.commands.bench_plot.JOINTS", (1, 3))
         growth = bench_plot(folder / "cost.png")
         assert (folder / "cost.png").read_bytes().startswith(b"\x89PNG")
         assert growth.joints == (1, 3) and min(growth.ours + growth.rows) > 0
@@ -291,7 +291,7 @@ def test_refine_tells_errors_in_the_joints_unit(kind, unit, tmp_path, monkeypatc
         iterations=4,
         notes=("A note.",),
     )
-    monkeypatch.setattr("joda._refine.refine", lambda *_, **__: result)
+    monkeypatch.setattr("joda.commands.refine.refine", lambda *_, **__: result)
     command = ["refine", "scene.xml", "run.csv", "--joint", "door", "-o", "better.xml"]
     app(command, standalone_mode=False)
     assert capsys.readouterr().out.splitlines() == [

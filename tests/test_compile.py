@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from joda import JodaError, compile, context
-from joda._compile import BANDS, TRAVEL_TIME, reference_scales
+from joda.compiling import BANDS, TRAVEL_TIME, reference_scales
 from joda.field import evaluate
 from joda.proposal import Proposal
 

@@ -14,8 +14,8 @@ from hidden_cases import clear_case
 from test_cli import fails
 
 from joda import JodaError, add, compare, diagnose, hidden_effect, improve
-from joda._add import sentences as of_added
-from joda._diagnose import sentences
+from joda.commands.add import sentences as of_added
+from joda.commands.diagnose import sentences
 from joda.diagnosis import improving
 from joda.diagnosis.outcome import read_runs
 from joda.diagnosis.phrases import NAMES
@@ -290,5 +290,6 @@ def test_the_demo_opens_the_seal(tmp_path):
 
 
 def test_nothing_imports_jax():
-    code = "import sys, joda._improve, joda._hidden_effect; sys.exit('jax' in sys.modules)"
+    commands = "joda.commands.improve, joda.commands.hidden_effect"
+    code = f"import sys, {commands}; sys.exit('jax' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

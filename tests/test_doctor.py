@@ -11,7 +11,7 @@ import mujoco
 import pytest
 
 import joda
-from joda import _doctor
+from joda.commands import doctor
 
 
 def python(code, *arguments, **environment):
@@ -27,10 +27,10 @@ def python(code, *arguments, **environment):
 
 def checks(*parts, **environment):
     """What these parts of it find, by name."""
-    calls = ", ".join(f"*_doctor._{part}" for part in parts)
+    calls = ", ".join(f"*doctor._{part}" for part in parts)
     code = f"""
 import json, sys
-from joda import _doctor
+from joda.commands import doctor
 json.dump([{{**vars(check), "fatal": check.fatal}} for check in [{calls}]], sys.stdout)"""
     result = python(code, **environment)
     assert (result.returncode, result.stderr) == (0, "")
@@ -80,8 +80,8 @@ def test_a_plugin_that_is_no_library(package):
 
 
 def test_a_plugin_with_a_wrong_answer(monkeypatch):
-    monkeypatch.setattr(_doctor, "FORCE", 1.4)
-    [plugin] = _doctor._plugin()
+    monkeypatch.setattr(doctor, "FORCE", 1.4)
+    [plugin] = doctor._plugin()
     assert plugin.state == "broken"
     assert "gives a force of 1.3 N·m where 1.4 is right" in plugin.found
 

@@ -13,8 +13,8 @@ from messages_server import serve
 from test_prompts import answers
 
 from joda import JodaError, evaluate, schema
-from joda._evaluate import Evaluation
 from joda.cli import main
+from joda.commands.evaluate import Evaluation
 from joda.proposal import Proposal
 from joda.propose import Answer, Usage
 

@@ -20,7 +20,7 @@ from test_generate import (  # noqa: F401
 from test_prompts import answers, texts
 
 from joda import JodaError, generate, generate_all
-from joda._generate import Generated
+from joda.commands.generate import Generated
 from joda.proposal import Proposal
 from joda.propose import session
 from joda.propose.offline import Offline

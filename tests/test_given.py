@@ -8,8 +8,8 @@ from lids import FRICTION, thrown
 from test_compare import door, runs_of, scene_of
 
 from joda import add
-from joda._add import sentences
-from joda._improve import _departures as told_by_improve
+from joda.commands.add import sentences
+from joda.commands.improve import _departures as told_by_improve
 from joda.component import Component
 from joda.diagnosis import mending
 from joda.diagnosis.given import DOUBT, Departures, departures, moved, restored

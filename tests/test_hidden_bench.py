@@ -1,11 +1,11 @@
-"""A small sample of tests/hidden_bench.py: what is named on joints that nobody has seen."""
+"""A small sample of tests/benchmarks/hidden.py: what is named on joints that nobody has seen."""
 
 import secrets
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_bench import said
+from hidden import said
 from hidden_cases import case_of, dice, job_of, read, spread
 from hidden_families import by_effect
 from hidden_figures import fine, told

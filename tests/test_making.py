@@ -40,7 +40,8 @@ def test_a_package_without_the_library_makes_it_once(cache, capfd):
     package = cache / "site" / "joda"
     shutil.copytree(Path(joda.__file__).parent, package)
     shutil.rmtree(package / "plugins")
-    code = "import joda; from joda import _doctor; print(joda.plugin_path(), _doctor._plugin()[0])"
+    code = "from joda.commands.doctor import _plugin; import joda; "
+    code += "print(joda.plugin_path(), _plugin()[0])"
     environment = os.environ | {"PYTHONPATH": str(package.parent)}
     told = []
     for _ in range(2):

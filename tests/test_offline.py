@@ -10,7 +10,6 @@ import pytest
 from assets import NAMES, asset
 
 from joda import compile, context
-from joda._context import Context
 from joda.field import evaluate
 from joda.interaction.behaviour import Behaviour, behaviour
 from joda.proposal import Proposal
@@ -19,6 +18,7 @@ from joda.propose.checks import Seen
 from joda.propose.offline import Offline
 from joda.propose.recognise import recognise
 from joda.propose.wishes import WISHES, Wanted, read_wishes, unmet
+from joda.scenes.context import Context
 from joda.scenes.model import joint_name, joint_type, load_model
 from joda.template import read_templates
 

@@ -122,7 +122,7 @@ def test_every_field_of_the_answer_is_explained(part):
 
 
 def test_the_labels_mean_what_the_compiler_makes_of_them():
-    from joda._compile import BANDS
+    from joda.compiling import BANDS
 
     text = prompt.system(TEMPLATES)
     for label, (low, high) in BANDS.items():

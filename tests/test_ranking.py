@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hidden_cases import clear_case, read
 
-from joda._templates import templates
+from joda.commands.templates import templates
 from joda.diagnosis import asking, ranking
 from joda.diagnosis.asking import asked
 from joda.diagnosis.guessing import beside

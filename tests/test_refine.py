@@ -14,7 +14,7 @@ from scenes import attached, model_of, write
 from scipy.optimize import least_squares
 
 from joda import JodaError, Profile, attach, context, refine
-from joda._refine import Refined
+from joda.commands.refine import Refined
 from joda.measured.runs import Run, write_run
 from joda.scenes.scene import read_profiles
 

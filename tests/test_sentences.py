@@ -57,7 +57,7 @@ def pieces(parts: list[str]) -> set[str]:
 def test_every_sentence_is_in_a_test():
     tested = "\n".join(
         text.replace("\\", "")
-        for path in (ROOT / "tests").glob("*.py")
+        for path in (ROOT / "tests").rglob("*.py")
         for text in texts(ast.parse(path.read_text("utf-8")))
     )
     found = {place: pieces(parts) for place, parts in sentences().items()}

@@ -15,15 +15,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from joda import JodaError, Profile, attach, compare, read_profiles, simulate, studio
-from joda._studio import charts, edits
-from joda._studio.desk import Desk
-from joda._studio.folder import Folder
-from joda._studio.guard import Guard, free_port
-from joda._studio.live import Live
-from joda._studio.motions import Outdated, replayed, simulated
-from joda._studio.solids import shape
-from joda._studio.timeline import Timeline
-from joda._studio.work import Stopped, Work
+from joda.commands.studio import charts, edits
+from joda.commands.studio.desk import Desk
+from joda.commands.studio.folder import Folder
+from joda.commands.studio.guard import Guard, free_port
+from joda.commands.studio.live import Live
+from joda.commands.studio.motions import Outdated, replayed, simulated
+from joda.commands.studio.solids import shape
+from joda.commands.studio.timeline import Timeline
+from joda.commands.studio.work import Stopped, Work
 from joda.component import Component
 from joda.effects import AddedInertia
 from joda.field import evaluate
@@ -635,7 +635,9 @@ def test_without_nicegui_it_says_what_to_install(tmp_path):
     )
 
 
-@pytest.mark.parametrize("name", ["joda", "joda.cli", "joda._studio.desk", "joda._studio.work"])
+@pytest.mark.parametrize(
+    "name", ["joda", "joda.cli", "joda.commands.studio.desk", "joda.commands.studio.work"]
+)
 def test_nothing_else_imports_the_page_library(name):
     code = f"import {name}, sys; sys.exit('nicegui' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -18,7 +18,7 @@ import pytest
 from matplotlib.image import imread
 
 from joda import Profile, add, attach, compare, diagnose, simulate
-from joda._studio.desk import Desk
+from joda.commands.studio.desk import Desk
 from joda.component import Component
 from joda.measured.runs import Run, write_run
 

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from joda import context, templates
-from joda._context import Context
 from joda.component import Component
 from joda.interaction.hand import pull
 from joda.joints.rig import rig
@@ -22,6 +21,7 @@ from joda.measured.runs import QuasiStatic, Run, read_run
 from joda.measured.smoothing import resolution
 from joda.measured.suspicions import suspicions
 from joda.profile import Channel, Channels, Joint, Profile, Resistance
+from joda.scenes.context import Context
 from joda.scenes.motion import Motion, release
 
 ROOT = Path(__file__).parents[1]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_bench import said
+from hidden import said
 from hidden_cases import case_of, dice, job_of, read
 from hidden_coverage import pulls
 from test_hidden_bench import RELIABLE, RUNS

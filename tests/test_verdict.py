@@ -8,7 +8,7 @@ import pytest
 from test_compare import door, runs_of, scene_of
 
 from joda import add, diagnose
-from joda._hidden_effect import _judged
+from joda.commands.hidden_effect import _judged
 from joda.diagnosis import verdict
 from joda.diagnosis.asking import asked
 from joda.diagnosis.findings import Diagnosis, Finding

@@ -15,36 +15,36 @@ from joda.errors import JodaError
 from joda.plugin import load, load_into_older, plugin_path
 
 if TYPE_CHECKING:
-    from joda._add import add
-    from joda._attach import attach
-    from joda._bench import bench
-    from joda._compare import compare
-    from joda._compile import compile
-    from joda._context import context
-    from joda._demo import demo
-    from joda._diagnose import diagnose
-    from joda._distribute import distribute
-    from joda._doctor import doctor
-    from joda._estimate import estimate
-    from joda._evaluate import evaluate
-    from joda._experiments import experiments
-    from joda._export import export
-    from joda._generate import generate
-    from joda._generate_all import generate_all
-    from joda._hidden_effect import hidden_effect
-    from joda._import_log import import_log
-    from joda._improve import improve
-    from joda._plot import plot
-    from joda._refine import refine
-    from joda._render import render
-    from joda._review import Decision
-    from joda._revise import revise
-    from joda._schema import schema
-    from joda._simulate import simulate
-    from joda._studio import studio
-    from joda._templates import templates
-    from joda._weigh import weigh
+    from joda.cases.experiments import experiments
+    from joda.commands.add import add
+    from joda.commands.bench import bench
+    from joda.commands.compare import compare
+    from joda.commands.demo import demo
+    from joda.commands.diagnose import diagnose
+    from joda.commands.doctor import doctor
+    from joda.commands.estimate import estimate
+    from joda.commands.evaluate import evaluate
+    from joda.commands.export import export
+    from joda.commands.generate import generate
+    from joda.commands.generate_all import generate_all
+    from joda.commands.hidden_effect import hidden_effect
+    from joda.commands.import_log import import_log
+    from joda.commands.improve import improve
+    from joda.commands.plot import plot
+    from joda.commands.refine import refine
+    from joda.commands.review import Decision
+    from joda.commands.revise import revise
+    from joda.commands.schema import schema
+    from joda.commands.simulate import simulate
+    from joda.commands.studio import studio
+    from joda.commands.templates import templates
+    from joda.commands.weigh import weigh
+    from joda.compiling import compile
+    from joda.distributed.folder import distribute
+    from joda.pictures.positions import render
     from joda.profile import Profile
+    from joda.scenes.attaching import attach
+    from joda.scenes.context import context
     from joda.scenes.scene import read_profiles, set_profile
 
 __version__ = "0.1.0"
@@ -114,15 +114,21 @@ COMMANDS = (
 )
 _MODULES = ("effects", "field", "mjx", "warp")
 _LAZY = {
-    "Decision": "joda._review",
+    **{name: f"joda.commands.{name}" for name in COMMANDS},
+    "Decision": "joda.commands.review",
     "Profile": "joda.profile",
-    "estimate": "joda._estimate",
-    "generate_all": "joda._generate_all",
-    "hidden_effect": "joda._hidden_effect",
+    "attach": "joda.scenes.attaching",
+    "compile": "joda.compiling",
+    "context": "joda.scenes.context",
+    "distribute": "joda.distributed.folder",
+    "estimate": "joda.commands.estimate",
+    "experiments": "joda.cases.experiments",
+    "generate_all": "joda.commands.generate_all",
+    "hidden_effect": "joda.commands.hidden_effect",
+    "import_log": "joda.commands.import_log",
     "read_profiles": "joda.scenes.scene",
+    "render": "joda.pictures.positions",
     "set_profile": "joda.scenes.scene",
-    **{name: f"joda._{name}" for name in COMMANDS},
-    "import_log": "joda._import_log",
 }
 
 

@@ -1,10 +1,10 @@
 """What the numbers that decide a diagnosis should be, judged on families that they were not set on.
 
-    python tests/hidden_bench.py families --family all --cases 2 --out rows.jsonl    (hours)
-    python tests/benchmarks/calibrate.py rows.jsonl                                  (a minute)
+    python tests/benchmarks hidden families --family all --cases 2 --out rows.jsonl    (hours)
+    python tests/benchmarks calibrate rows.jsonl                                  (a minute)
 
 Of each family in turn: `joda.diagnosis.weighing.Settings` are fitted to the other families' cases
-(coordinate descent on the mean log loss over "nothing", "none of these" and every effect) and judged
+(coordinate descent on the mean log loss of "nothing", "none of these" and every effect) and judged
 on its own, beside those in use; then they are fitted to all of them. The rows hold the evidence of
 each case, so nothing is simulated or fitted again.
 """
@@ -16,9 +16,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from hidden_figures import SURE, hides
 
 from joda.diagnosis.weighing import SETTINGS, Evidence, Settings, Weighed, decide, second_counts
@@ -139,7 +136,3 @@ def main() -> None:
     found = fitted(rows)
     print(f"| all | in use | {told(rows, SETTINGS)} |")
     print(f"| | all | {told(rows, found)} |   {changed(found)}")
-
-
-if __name__ == "__main__":
-    main()

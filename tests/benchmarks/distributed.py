@@ -1,6 +1,6 @@
 """What a task costs beside its work, and the bytes that it moves, on Ray's workers here.
 
-    python tests/benchmarks/distributed.py [JOINTS [EMPTY]]
+    python tests/benchmarks distributed [JOINTS [EMPTY]]
 
 JOINTS simulated doors are diagnosed by two workers; then EMPTY whose run says nothing, so that only
 the way there and back takes time.
@@ -10,8 +10,6 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from distributed_cases import make
 
@@ -38,7 +36,3 @@ def main() -> None:
                 f"{sum(not one.failed for one in done)} diagnosed; "
                 f"{there / count / 1e3:.1f} kB there, {back / count / 1e3:.1f} kB back each"
             )
-
-
-if __name__ == "__main__":
-    main()

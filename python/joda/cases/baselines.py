@@ -13,14 +13,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._compile import reference_scales
-from joda._context import Context
 from joda.cases.subject import Subject
+from joda.compiling import reference_scales
 from joda.component import Component
 from joda.field import evaluate
 from joda.joints.single import single
 from joda.measured.gauge import static_force
 from joda.profile import Channel, Channels, Profile, Resistance
+from joda.scenes.context import Context
 from joda.scenes.engine import set_strength
 from joda.scenes.model import find_joint, load, load_model
 from joda.scenes.motion import Motion

@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from joda._attach import attach
-from joda._context import Context, context
-from joda._improve import improve
 from joda.cases.base import Case, bundled
 from joda.cases.subject import Subject
+from joda.commands.improve import improve
 from joda.component import Component
 from joda.errors import JodaError
 from joda.measured.runs import Run, write_run
 from joda.profile import Channel, Channels, Profile, Resistance
+from joda.scenes.attaching import attach
+from joda.scenes.context import Context, context
 from joda.scenes.model import load_model
 from joda.scenes.motion import Motion
 

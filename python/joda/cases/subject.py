@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from joda._context import Context
 from joda.interaction.hand import Grip, Hand, finest
 from joda.interaction.pulling import FIRMNESS, SLOW, grip
 from joda.interaction.robot import AFTER, read_targets
 from joda.interaction.traces import shown
+from joda.scenes.context import Context
 from joda.scenes.model import find_joint
 from joda.scenes.motion import Motion, leaning, play
 

@@ -5,17 +5,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from joda._attach import attach
-from joda._context import Context
-from joda._generate import ROUNDS, run
 from joda.cases.base import Case, bundled
 from joda.cases.baselines import Baseline, fit_forces, fit_motions
 from joda.cases.improved import SCENE, Predicted, improved, measure
 from joda.cases.subject import Subject
+from joda.commands.generate import ROUNDS, run
 from joda.files import write_text
 from joda.profile import Profile
 from joda.propose.offline import Offline
 from joda.propose.session import Session
+from joda.scenes.attaching import attach
+from joda.scenes.context import Context
 from joda.scenes.model import load_model
 from joda.scenes.motion import Motion
 

@@ -13,7 +13,7 @@ from joda.cli.say import say
 from joda.cli.tell import print_json, tell_understood
 
 if TYPE_CHECKING:
-    from joda._import_log import Imported
+    from joda.commands.import_log import Imported
 
 FILES = 3
 """So many runs are named; of more only how many there are."""

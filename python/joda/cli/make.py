@@ -165,7 +165,7 @@ def generate(
         "vlm": vlm, "base_url": base_url, "effort": effort,
     }  # fmt: skip
     if estimate or not (as_json or resume):
-        from joda._estimate import estimate as cost
+        from joda.commands.estimate import estimate as cost
 
         expected = cost(model, joint, output, **asked)
         if estimate or expected:
@@ -174,7 +174,7 @@ def generate(
             return
     options = {**asked, "key": key, "resume": resume, "force": force}
     if model.is_dir():
-        from joda._generate_all import SHEET
+        from joda.commands.generate_all import SHEET
 
         with progress_bar() as bar:
             done = run_all(model, output, joint=joint, progress=bar, **options)

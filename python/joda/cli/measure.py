@@ -166,7 +166,7 @@ def bench(
 
 def _bench_plot(plot: Path, force: bool, as_json: bool) -> None:
     """`joda bench --plot`."""
-    from joda._bench_plot import bench_plot as run
+    from joda.commands.bench_plot import bench_plot as run
 
     with spinner("bench") as progress:
         growth = run(plot, force=force, progress=progress)

@@ -37,7 +37,7 @@ def diagnose(
         joda diagnose hidden/model.xml hidden/run?.csv --joint joint --json diagnosis.json
     """
     from joda import diagnose as run
-    from joda._diagnose import sentences
+    from joda.commands.diagnose import sentences
 
     with progress_bar() as bar:
         found = run(
@@ -73,7 +73,7 @@ def add(
         joda add hidden/model.xml hidden/run?.csv --joint joint --diagnosis diagnosis.json -o new.xml
     """  # noqa: E501
     from joda import add as run
-    from joda._add import sentences
+    from joda.commands.add import sentences
 
     with spinner("add") as progress:
         added = run(
@@ -106,7 +106,7 @@ def improve(
         joda improve hidden/model.xml hidden/run?.csv --joint joint -o improved.xml
     """
     from joda import improve as run
-    from joda._improve import sentences
+    from joda.commands.improve import sentences
 
     with spinner("improve") as progress:
         result = run(

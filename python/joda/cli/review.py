@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from joda.cli.say import say
 
 if TYPE_CHECKING:
-    from joda._generate import Generated
-    from joda._review import Decision
+    from joda.commands.generate import Generated
+    from joda.commands.review import Decision
 
 HELP = (
     "Enter: it is right; a number: it is that; k KIND: it is one of joda's kinds; any other words: "
@@ -16,7 +16,7 @@ HELP = (
 
 def look_at(label: str, made: "Generated") -> "Decision | None":
     """Tells what a joint was taken for, and asks; the end of the input is no more."""
-    from joda._review import Decision
+    from joda.commands.review import Decision
 
     last = made.history.rounds[-1]
     found = last.recognised

@@ -16,14 +16,14 @@ from joda.errors import JodaError
 from joda.plain import line, plain
 
 if TYPE_CHECKING:
-    from joda._bench import Row
-    from joda._demo import Demo
-    from joda._doctor import Check
-    from joda._estimate import Estimate
-    from joda._evaluate import Evaluation
-    from joda._generate import Generated
-    from joda._refine import Refined
     from joda.cases.gallery import Shown
+    from joda.commands.bench import Row
+    from joda.commands.demo import Demo
+    from joda.commands.doctor import Check
+    from joda.commands.estimate import Estimate
+    from joda.commands.evaluate import Evaluation
+    from joda.commands.generate import Generated
+    from joda.commands.refine import Refined
     from joda.exporting.nearest import Nearest
     from joda.importing.understood import Understood
     from joda.propose import Usage

@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._templates import templates
 from joda.diagnosis.baseline import (
     Base,
     base_of,
@@ -31,6 +30,7 @@ from joda.diagnosis.judge import Fit, Judge
 from joda.diagnosis.knocks import knock_guess
 from joda.joints.single import Single
 from joda.measured.reading import Measured
+from joda.template import read_templates
 
 Array = NDArray[np.float64]
 
@@ -133,6 +133,6 @@ def asked(measured: Measured, length: float | None = None, near: Array | None = 
         tried.append((near, judge.started(base.solo(near)).start))
     fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in tried]
     fit = judge.refit(base.solo, base.unknowns, min(fits, key=lambda f: f.loss))
-    every = hypotheses(units_of(windows, measured), templates(), measured.profile)
+    every = hypotheses(units_of(windows, measured), read_templates(), measured.profile)
     begun = begins(judge.coarser, base.coarser(), given, fit)
     return Asked(judge, base, measured.single, fit, begun, tuple(every))

@@ -11,9 +11,9 @@ from joda.files import read_json
 from joda.plain import plain
 from joda.scenes.contacts import Contact
 
-NO_SIZE = 0.05
+NO_SIZE = 0.025
 """Size of an effect, in its standard deviations, up to which it is none; that of one which is seen
-from afar only is a tenth (`joda.diagnosis.uncertainty`)."""
+from afar only is a thirtieth (`joda.diagnosis.uncertainty`)."""
 
 
 @dataclass(frozen=True)

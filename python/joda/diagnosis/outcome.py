@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from joda._attach import attached
 from joda.diagnosis.mending import Error
 from joda.files import check_targets
 from joda.measured.excerpts import excerpts
@@ -17,6 +16,7 @@ from joda.measured.visited import unvisited
 from joda.pictures.changes import draw_channels
 from joda.pictures.style import house_style
 from joda.profile import Profile
+from joda.scenes.attaching import attached
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure

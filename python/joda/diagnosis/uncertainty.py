@@ -50,7 +50,7 @@ FEW_RUNS = 5
 
 SHAPE = {KNOWN_LAW: 0.01, FREE_CURVE: 0.07, KNOWN_SHAPE: 0.05}
 """Part of its size by which an effect's law may differ from its kind, by what is known of it;
-these and what follows were calibrated on `tests/hidden_bench.py cover` (docs/reliability.md)."""
+these and what follows are calibrated by the bench `hidden cover` (docs/reliability.md)."""
 OWN_SHAPE = {
     "bistable_mechanism": 0.12,  # its force goes on growing outside the range
     "end_stop_restitution": 0.12,  # an impact lies between two samples
@@ -67,8 +67,9 @@ part that is not left."""
 FARTHEST = 10.0
 """Largest doubt of what is there, or is extrapolated, in units of the magnitude: nothing is known
 of how large it is."""
-REACHING = 0.5
-"""Part of the range over which a pull to an end is felt that is more than a local one's."""
+REACHING, AFAR = 0.5, 30.0
+"""Part of the range over which a pull to an end is felt that is more than a local one's; its doubt
+then, in units of the magnitude, as that may be the far end of a much stronger one."""
 STRETCHED = 0.125
 """Doubt of an extrapolated effect's ends, by that of its magnitude, in units of the width."""
 PLAUSIBLE = 2.0
@@ -142,10 +143,10 @@ def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
     seen, visited = _seen(asked, found)
     beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
     if from_afar := _at_bound(found) or (_pulls(found) and b - a > REACHING):
-        beyond = FARTHEST
+        beyond = AFAR
     most = FARTHEST * magnitude if _there(found) else np.inf
     size = np.linalg.norm([min(data[0], most), part * magnitude, beyond * magnitude])
-    width = max(DEFINITION, part, STRETCHED * beyond) * (b - a)
+    width = max(DEFINITION, part, STRETCHED * min(beyond, FARTHEST)) * (b - a)
     free = from_afar or found.hypothesis.ends == 2
     ends = tuple(
         float(np.linalg.norm([spread, width * (free or 0.0 < end < 1.0), gap]))

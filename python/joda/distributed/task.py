@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from joda._diagnose import diagnose
-from joda._generate import generate, ranged
-from joda._improve import improve
+from joda.commands.diagnose import diagnose
+from joda.commands.generate import generate, ranged
+from joda.commands.improve import improve
 from joda.errors import JodaError
 from joda.scenes.model import load_model
 

@@ -7,13 +7,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.component import Frozen
 from joda.interaction.pulling import Pull, apart, number, pulled
 from joda.interaction.surroundings import Surroundings, touching
 from joda.joints.rig import rig
 from joda.plain import line
 from joda.profile import Profile
+from joda.scenes.context import Context
 from joda.scenes.motion import Motion, settle
 
 Array = NDArray[np.float64]

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.component import Frozen
 from joda.interaction.hand import finest, pull
+from joda.scenes.context import Context
 from joda.scenes.motion import FAST, Motion
 
 Array = NDArray[np.float64]

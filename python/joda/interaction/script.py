@@ -9,12 +9,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._compile import HAND_FORCE
-from joda._context import Context
+from joda.compiling import HAND_FORCE
 from joda.errors import JodaError
 from joda.interaction.hand import Grip, Hand, finest
 from joda.interaction.pulling import FIRMNESS, SLOW, grip
 from joda.interaction.robot import AFTER, read_targets
+from joda.scenes.context import Context
 from joda.scenes.motion import Act, Motion, at_home, idle, leaning, play
 
 KINDS = ("release", "push", "impulse", "hand", "open", "robot")

@@ -8,10 +8,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from joda._attach import attach
 from joda.profile import Profile
 from joda.scenes.actuators import acting_on
 from joda.scenes.assembly import put, taut
+from joda.scenes.attaching import attach
 from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact, contacts_along
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model

@@ -11,12 +11,12 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.component import Component
 from joda.effects import Backlash, Effect
 from joda.effects.mechanics import HEAVIEST
 from joda.joints.least_squares import Inequalities
 from joda.profile import CHANNELS, Profile, rounded
+from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 Kind = Literal["values", "intervals", "strengths", "damping_ratio", "inertia", "gravity", "effects"]

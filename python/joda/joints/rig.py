@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._attach import attach
-from joda._context import Context
 from joda.profile import Profile
+from joda.scenes.attaching import attach
+from joda.scenes.context import Context
 from joda.scenes.model import load_model
 
 GRAVITY = 9.81

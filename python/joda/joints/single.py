@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import mujoco
 
-from joda._context import Context
 from joda._core import Solo
 from joda.effects import EndStopRestitution
 from joda.joints.rig import gravity_factors
 from joda.profile import CHANNELS, Profile
+from joda.scenes.context import Context
 from joda.scenes.limits import limit_parameters
 
 if TYPE_CHECKING:

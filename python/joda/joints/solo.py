@@ -13,7 +13,6 @@ import jax
 import jax.numpy as jnp
 import mujoco
 
-from joda._context import Context
 from joda.field import jaxeffects, jaxfield
 from joda.field.jaxeffects import Effects, from_effects
 from joda.joints import laws
@@ -21,6 +20,7 @@ from joda.joints.parameters import Slot
 from joda.joints.rig import gravity_factors
 from joda.joints.stiffness import implicit_stiffness, reach, stays_beyond
 from joda.profile import CHANNELS, Profile
+from joda.scenes.context import Context
 
 Array = jax.Array
 

@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.field import merge
 from joda.measured import smoothing
 from joda.measured.runs import QuasiStatic, Run
 from joda.profile import Profile
 from joda.scenes.contacts import Contact, pressing
+from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.effects import GravityOffset, LoadDependentFriction
 from joda.errors import JodaError
 from joda.field import merge
@@ -18,6 +17,7 @@ from joda.joints.rig import gravity_factors
 from joda.measured import smoothing
 from joda.measured.runs import QuasiStatic
 from joda.profile import Profile
+from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 

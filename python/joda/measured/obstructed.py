@@ -11,13 +11,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.errors import JodaError
 from joda.measured import smoothing
 from joda.measured.barrier import Barrier
 from joda.measured.runs import LEAST, QuasiStatic, Run, known
 from joda.profile import Joint, Profile
 from joda.scenes.contacts import Contact, contacts_along
+from joda.scenes.context import Context
 
 Measurement = Run | QuasiStatic
 

@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context, context
 from joda.errors import JodaError
 from joda.joints.single import Single, single
 from joda.measured import smoothing
@@ -23,6 +22,7 @@ from joda.profile import Profile
 from joda.scenes.angles import range_doubt
 from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact
+from joda.scenes.context import Context, context
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of

@@ -11,12 +11,12 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.joints.rig import rig
 from joda.joints.single import Single
 from joda.measured import smoothing
 from joda.measured.runs import Run
 from joda.profile import Profile
+from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from joda._context import Context
 from joda.component import Frozen
 from joda.errors import JodaError
 from joda.interaction.behaviour import Behaviour
@@ -17,6 +16,7 @@ from joda.profile import Profile
 from joda.proposal import Proposal
 from joda.propose.archetype import Archetype
 from joda.propose.recognise import Recognition
+from joda.scenes.context import Context
 from joda.template import Template
 
 

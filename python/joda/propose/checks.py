@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joda._context import Context
 from joda.interaction.behaviour import Behaviour, Stretch
+from joda.scenes.context import Context
 
 SOFT = 0.5
 """Speed (m/s) at the end of the lever arm up to which closing is soft."""

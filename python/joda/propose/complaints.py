@@ -10,8 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from joda._compile import contributions
-from joda._context import Context
+from joda.compiling import contributions
 from joda.errors import JodaError
 from joda.field import evaluate
 from joda.profile import CHANNELS
@@ -19,6 +18,7 @@ from joda.profile import Channel as Curves
 from joda.proposal import EffectProposal, Proposal, Strength
 from joda.propose.mend import rescale
 from joda.propose.wishes import LONGEST_CLAUSE
+from joda.scenes.context import Context
 from joda.template import Template
 
 Channel = Literal["conservative", "friction", "damping"]

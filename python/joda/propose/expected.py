@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from joda._context import Context
 from joda.component import Frozen
 from joda.interaction.behaviour import Behaviour
 from joda.profile import File
 from joda.propose.wishes import WISHES, Wanted, read_wishes, unmet
+from joda.scenes.context import Context
 
 ENDING = ".expected.json"
 MOVES, OPENS = WISHES["moves"].says, "opens towards {}q"

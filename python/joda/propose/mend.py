@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._compile import contributions, reference_scales
-from joda._context import Context
+from joda.compiling import contributions, reference_scales
 from joda.component import Component
 from joda.field import evaluate
 from joda.interaction.pulling import SLOW, grip
@@ -20,6 +19,7 @@ from joda.profile import Channel
 from joda.proposal import EffectProposal, Proposal
 from joda.propose.checks import ABOUT, FELT, share
 from joda.propose.wishes import Wanted, read_wishes
+from joda.scenes.context import Context
 from joda.template import Template
 
 Array = NDArray[np.float64]

@@ -11,8 +11,7 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from joda._compile import BANDS, reference_scales
-from joda._context import Context
+from joda.compiling import BANDS, reference_scales
 from joda.errors import JodaError
 from joda.interaction.pulling import SLOW
 from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
@@ -25,6 +24,7 @@ from joda.propose.mend import mend, rescale
 from joda.propose.parts import Part
 from joda.propose.recognise import Recognition, recognise
 from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
+from joda.scenes.context import Context
 
 APART = 0.785
 """Angle (rad) between the positions of a knob, where nobody says how many it has."""

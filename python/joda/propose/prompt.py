@@ -14,13 +14,13 @@ from importlib.resources import files
 from string import Template as Text
 from typing import Any
 
-from joda._compile import BANDS, reference_scales
-from joda._context import Context
+from joda.compiling import BANDS, reference_scales
 from joda.errors import JodaError
 from joda.profile import CHANNELS
 from joda.propose import Task, Turn
 from joda.propose.replies import closed_object, schema
 from joda.propose.wishes import WISHES
+from joda.scenes.context import Context
 from joda.template import Template
 
 MAX_TOKENS = 16_000

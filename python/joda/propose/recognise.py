@@ -10,11 +10,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from joda._compile import reference_scales
-from joda._context import Context
+from joda.compiling import reference_scales
 from joda.component import Frozen
 from joda.propose.archetype import Archetype, Feature, Force, forces, read_archetypes
 from joda.propose.naming import Concepts, concepts, said
+from joda.scenes.context import Context
 
 Gravity = Literal["level", "opens", "closes"]
 

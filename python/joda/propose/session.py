@@ -17,15 +17,13 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from joda._attach import attach
-from joda._compile import compile
-from joda._context import Context, context
-from joda._render import render
+from joda.compiling import compile
 from joda.errors import JodaError
 from joda.files import make_folder, read_text, write_bytes, write_text
 from joda.interaction.behaviour import Behaviour, behaviour
 from joda.interaction.surroundings import surroundings
 from joda.pictures.draw import draw
+from joda.pictures.positions import render
 from joda.pictures.style import png
 from joda.plain import plain
 from joda.profile import Profile, describe
@@ -36,6 +34,8 @@ from joda.propose.checks import Seen, takes
 from joda.propose.history import Failure, History, Round
 from joda.propose.recognise import recognise
 from joda.propose.wishes import Wanted, read_wishes, unmet
+from joda.scenes.attaching import attach
+from joda.scenes.context import Context, context
 from joda.template import read_templates
 
 PICTURES = 5

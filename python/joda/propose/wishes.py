@@ -9,10 +9,10 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from joda._context import Context
 from joda.interaction.behaviour import Behaviour
 from joda.propose import checks
 from joda.propose.checks import Seen
+from joda.scenes.context import Context
 
 Check = Callable[[Seen], str]
 

@@ -11,12 +11,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.joints.least_squares import Fit, adam, levenberg_marquardt
 from joda.joints.parameters import Parameters
 from joda.measured.gauge import gauged, static_force
 from joda.measured.runs import QuasiStatic
 from joda.profile import Profile
+from joda.scenes.context import Context
 from joda.scenes.native import whole_profile
 
 Array = NDArray[np.float64]

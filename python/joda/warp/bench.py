@@ -12,8 +12,8 @@ import mujoco_warp
 import numpy as np
 import warp as wp
 
-from joda._bench import hinges, hinges_text, without_plugin
 from joda.profile import Profile
+from joda.scenes.hinges import hinges, hinges_text, without_plugin
 from joda.scenes.scene import read_profiles
 from joda.warp.fields import attach, put_fields
 from joda.warp.scene import open_scene, take_profiles

@@ -4,7 +4,6 @@ A check speaks only when it is sure: what good measurements do too (knocks, latc
 encoders, slow pulls) is no suspicion.
 """
 
-from joda._context import Context
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.smoothing import resolution
 from joda.measured.suspicions.base import Kind, Suspicion, suspect
@@ -15,6 +14,7 @@ from joda.measured.suspicions.force import balance_of_curve, balance_of_run, too
 from joda.measured.suspicions.position import coarse, hardly_moved, noise, placed, strays
 from joda.measured.suspicions.timing import gapped, repeated, slowly_sampled, uneven
 from joda.measured.suspicions.velocity import wrong_velocity
+from joda.scenes.context import Context
 
 LEAST_RUN, LEAST_CURVE = 20, 5
 """Fewest samples of which anything can be told."""

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.measured.runs import Run
 from joda.measured.suspicions.timing import longest
+from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.measured import smoothing
 from joda.measured.runs import QuasiStatic, Run
+from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.measured import smoothing
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.suspicions.base import Kind, Suspicion, suspect
+from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 

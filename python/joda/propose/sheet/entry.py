@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._context import Context
 from joda.field import evaluate
 from joda.files import write_bytes
 from joda.profile import Profile
 from joda.propose.history import History
+from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 

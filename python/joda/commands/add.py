@@ -1,0 +1,215 @@
+"""Adds a diagnosed effect to a joint's profile, if that lowers the error on runs held out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from joda.commands.diagnose import check_effect
+from joda.diagnosis.findings import read_diagnosis
+from joda.diagnosis.mending import Error, Mended, error, mend
+from joda.diagnosis.outcome import (
+    beside,
+    mended_picture,
+    nearby,
+    parting,
+    read_runs,
+    scene_files,
+    told_errors,
+)
+from joda.diagnosis.phrases import extrapolated, named
+from joda.diagnosis.share import places
+from joda.diagnosis.split import held_out, in_blocks, parted
+from joda.errors import JodaError
+from joda.files import write_together
+from joda.measured.visited import unvisited_part
+from joda.pictures.changes import changes
+from joda.pictures.style import png
+
+
+@dataclass(frozen=True)
+class Added:
+    """What came of adding an effect.
+
+    Attributes:
+        scene, composed, picture: the files that were written; None where nothing was added: then
+            nothing is written.
+        effect: its name.
+        added: whether the scene has it.
+        reason: why it has not, a clause; None if it has.
+        before, after: errors on what was held out of the fit.
+        noise_floor: of what was measured there.
+        unit: of the errors and the noise: rad or m; N·m or N where there are only curves.
+        held_out: what was held out, in words.
+        blocks: whether that are blocks of runs, not whole runs.
+        departures: where what was added is not what the model gave or where it was diagnosed, in
+            sentences.
+        changes: a line per changed component.
+        notes: what the user should be told, a sentence each.
+    """
+
+    scene: Path | None
+    composed: Path | None
+    picture: Path | None
+    effect: str
+    added: bool
+    reason: str | None
+    before: Error
+    after: Error
+    noise_floor: float
+    unit: str
+    held_out: str
+    blocks: bool
+    departures: tuple[str, ...]
+    changes: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """The same for JSON, which has no paths."""
+        content = asdict(self)
+        paths = {key: content[key] for key in ("scene", "composed", "picture")}
+        return content | {key: path and str(path) for key, path in paths.items()}
+
+
+def add(
+    model: str | Path,
+    joint: str,
+    diagnosis: str | Path,
+    runs: Sequence[str | Path],
+    output: str | Path,
+    *,
+    effect: str | None = None,
+    passive: bool = False,
+    force: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> Added:
+    """Adds an effect to a joint's profile and fits everything together.
+
+    Of four or more runs every fourth is held out of the fit, of fewer every fourth block in which
+    the joint moves; of fewer quasi-static curves, where there are no runs, every fourth stretch.
+    The effect is added only if it is plausible and clearly lowers the error there; else nothing is
+    written.
+
+    Args:
+        model: MJCF or URDF, with or without a profile on the joint.
+        joint: its name or address, see `joda.scenes.model.find_joint`.
+        diagnosis: what `joda.diagnose` wrote as JSON.
+        runs: CSV files with time, position and perhaps force, or quasi-static curves.
+        output: scene to write; beside it, with its name, go .composed.json and .png.
+        effect: which one; None: the diagnosis' first.
+        passive: whether the actuators on the joint, if there are any, were off.
+        force: overwrite what exists.
+        progress: told what is being done.
+
+    Returns:
+        what was written, and the errors before and after.
+
+    Raises:
+        JodaError: a file cannot be read or written, is no diagnosis of this joint or names no
+            effect.
+    """
+    target = Path(output)
+    composed, picture = beside(target, force, [*runs, diagnosis])
+    told = read_diagnosis(Path(diagnosis))
+    name, direction, near = _chosen(told, Path(diagnosis), effect)
+    measured = read_runs(model, joint, runs, passive)
+    own = measured.profile.joint
+    if told.get("joint", own.name) != own.name:
+        raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
+    train, held = parted(measured)
+    if reason := _no_help(told, name) or (None if effect else _in_doubt(told)):
+        before = error(held)
+        mended = Mended(train.profile, None, before, before, reason)
+    else:
+        mended = mend(train, held, name, direction, near, progress)
+    notes: list[str] = []
+    if mended.effect:
+        there = places(mended.profile, name, measured.profile)[0]
+        if away := extrapolated(unvisited_part(measured, there)).strip():
+            notes.append(away)
+        progress("drawing")
+        files, more = scene_files(Path(model), mended.profile, target, composed)
+        notes += more
+        write_together(files | {picture: png(mended_picture(held, mended.profile))})
+    added = mended.effect is not None
+    return Added(
+        scene=target if added else None,
+        composed=composed if added else None,
+        picture=picture if added else None,
+        effect=name,
+        added=added,
+        reason=mended.reason,
+        before=mended.before,
+        after=mended.after,
+        noise_floor=held.floor,
+        unit=held.unit,
+        held_out=held_out(measured, held),
+        blocks=in_blocks(measured, held),
+        departures=mended.departs.sentences,
+        changes=tuple(changes(measured.profile, mended.profile)),
+        notes=(*measured.notes, *notes),
+    )
+
+
+def sentences(added: Added) -> list[str]:
+    """What came of it, for a person."""
+    what = named(added.effect)
+    errors = told_errors(added.before, added.after, added.noise_floor, added.unit, added.blocks)
+    if added.added:
+        out = [f"Added {what}. On what was held out of the fit ({added.held_out}): {errors}."]
+    else:
+        near, error = nearby(added.before, added.blocks), added.before.window
+        missed = f"{near} {error:.3g} {added.unit}, " if isfinite(error) else ""
+        out = [
+            f"Not added: {what}, as {added.reason} ({added.held_out}; {missed}"
+            f"noise {added.noise_floor:.2g} {added.unit}). Nothing was written."
+        ]
+    told = parting(added.after, added.noise_floor, added.blocks) if added.added else []
+    return [*out, *told, *added.departures, *added.changes, *added.notes]
+
+
+def _chosen(
+    told: dict[str, Any], path: Path, effect: str | None
+) -> tuple[str, str | None, tuple[float, float] | None]:
+    """Name, direction and place of the effect to add; None for what the diagnosis does not say."""
+    found = {one["effect"]: one for one in reversed(told["effects"])}
+    if effect is None:
+        if told.get("verdict") in ("adequate", "unexplained") or not found:
+            verdict = told.get("verdict", "no effect")
+            raise JodaError(
+                f"{path}: names no effect to add (verdict: {verdict}); choose one with --effect."
+            )
+        effect = told["effects"][0]["effect"]
+    check_effect(effect)
+    said = found.get(effect, {})
+    return effect, said.get("direction"), _interval(said.get("interval"), path)
+
+
+def _no_help(told: dict[str, Any], effect: str) -> str | None:
+    """Why an effect need not be tried, a clause: the diagnosis itself found it no better."""
+    for one in told["effects"]:
+        before, after = one.get("held_out_error_before"), one.get("held_out_error_after")
+        known = isinstance(before, float) and isinstance(after, float)
+        if one["effect"] == effect and known and after >= before:
+            return (
+                "the diagnosis found windows held out of its fit missed by no less with it "
+                f"({before:.2g} → {after:.2g})"
+            )
+    return None
+
+
+def _in_doubt(told: dict[str, Any]) -> str | None:
+    """Why nothing is added before somebody asks for it by name, a clause; None if nothing is in
+    doubt."""
+    doubt = told.get("doubt")
+    return f"{doubt}; --effect adds it all the same" if isinstance(doubt, str) else None
+
+
+def _interval(said: Any, path: Path) -> tuple[float, float] | None:
+    if said is None:
+        return None
+    numbers = isinstance(said, list) and all(isinstance(end, int | float) for end in said)
+    if not numbers or len(said) != 2 or not 0 <= said[0] < said[1] <= 1:
+        raise JodaError(f"{path}: interval must be two increasing numbers from 0 to 1, not {said}.")
+    return said[0], said[1]

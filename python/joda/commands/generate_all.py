@@ -1,0 +1,240 @@
+"""The main job for every joint of every model below a folder."""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from joda.commands.generate import ROUNDS, Generated, begin, check_rounds, choose, ranged, run
+from joda.commands.review import Decide
+from joda.commands.review import review as walk
+from joda.errors import JodaError
+from joda.files import file_name, make_folder, read_text, write_text
+from joda.propose import Ask, BatchProposer, Proposer
+from joda.propose.asking import Effort
+from joda.propose.session import Session
+from joda.propose.sheet import Entry, sheet
+from joda.scenes.model import load_model
+
+Advance = Callable[[int, int, str], None]
+Results = dict[str, Generated | JodaError]
+
+SHEET = "sheet.html"
+"""The contact sheet."""
+
+MODELS = (".xml", ".urdf")
+"""How names of models end."""
+
+
+class Job(NamedTuple):
+    """A joint, and the folder for it."""
+
+    model: Path
+    joint: str
+    folder: Path
+
+
+def generate_all(
+    models: str | Path,
+    output: str | Path,
+    *,
+    joint: str | None = None,
+    proposer: str | Path | Proposer | None = None,
+    rounds: int = ROUNDS,
+    describe: str = "",
+    templates: Sequence[str | Path] = (),
+    key: str = "",
+    vlm: str | None = None,
+    base_url: str | None = None,
+    effort: Effort | None = None,
+    resume: bool = False,
+    force: bool = False,
+    review: Decide | None = None,
+    progress: Advance = lambda done, total, what: None,
+) -> Results:
+    """`joda.generate` for all hinges and slides with a range, of all models below a folder.
+
+    Ends with a contact sheet, `sheet.html` in the folder: every joint's pictures, profile,
+    behaviours, force at the handle, and how sure the proposer was.
+
+    A `joda.propose.BatchProposer`, as anthropic's with its Message Batches, is asked for a round
+    of all joints at once. Interrupted, the same call with `resume` goes on.
+
+    Args:
+        models: folder with MJCF and URDF files; those that are only parts of others, and cannot be
+            loaded by themselves, are passed over.
+        output: folder to fill, with a folder per model and in it one per joint.
+        joint: only the joints of this name.
+        proposer, rounds, describe, templates, key, vlm, base_url, effort: as for `joda.generate`.
+        resume: go on with what the folder holds; what is complete stays.
+        force: overwrite what another generation left in the folder, with `resume` profiles that
+            were edited by hand.
+        review: asked about the joints that are doubtful, the least sure first: given the label and
+            what was made, returns a `joda.Decision`, or None for no more. What it has been asked
+            before it is not asked again.
+        progress: told how many joints are done, of how many, and what is being done.
+
+    Returns:
+        "model/joint" to what was made, or to the reason why nothing was; "model" to the reason why
+        it cannot be loaded.
+
+    Raises:
+        JodaError: no joint is found, the folder holds files already, or the proposer is not to be
+            had.
+    """
+    check_rounds(rounds)
+    source, target = Path(models), Path(output)
+    _check_target(target, force or resume)
+    chosen = choose(proposer, key, vlm, base_url, effort)
+    done: Results = {}
+    jobs = find_jobs(source, target, joint, done)
+    make_folder(target)
+    further = [Path(path) for path in templates]
+    sessions: dict[str, Session] = {}
+    batched = chosen if isinstance(chosen, BatchProposer) else None
+    for number, (label, job) in enumerate(jobs.items()):
+        progress(number, len(jobs), label)
+        try:
+            session = begin(job.folder, job.model, job.joint, describe, further, key, resume)
+            if batched is None:
+                own = choose(proposer, session.history.key, vlm, base_url, effort)
+                run(session, own, rounds, force)
+            elif session.pending(rounds) and not force:
+                session.check_unedited()
+            sessions[label] = session
+        except JodaError as error:
+            done[label] = error
+    if batched is not None:
+        _run_many(sessions, batched, rounds, target / "batch.json", done, progress)
+    for label, session in sessions.items():
+        if label not in done:
+            done[label] = Generated(session.folder, session.history, tuple(session.notes))
+    progress(len(jobs), len(jobs), "drawing the contact sheet")
+    write_sheet(target, done)
+    progress(len(jobs), len(jobs), "done")
+    if review is not None:
+        for label, changed in walk(done, review, rounds, proposer, vlm, force):
+            done[label] = changed
+        write_sheet(target, done)
+    return dict(sorted(done.items()))
+
+
+def write_sheet(folder: Path, done: Results) -> None:
+    """Writes the contact sheet of what is in a folder; raises JodaError."""
+    entries = [
+        Entry(label, failed=str(one))
+        if isinstance(one, JodaError)
+        else Entry.read(label, one.folder, one.history, one.notes)
+        for label, one in sorted(done.items())
+    ]
+    write_text(folder / SHEET, sheet(entries, folder, f"Joints of {folder.resolve().name}"))
+
+
+def _run_many(
+    sessions: dict[str, Session],
+    proposer: BatchProposer,
+    rounds: int,
+    store: Path,
+    failed: Results,
+    progress: Advance,
+) -> None:
+    """Rounds of all sessions at once, until all are complete or have failed."""
+    while True:
+        left = {
+            label: session
+            for label, session in sessions.items()
+            if label not in failed and session.pending(rounds)
+        }
+        if not left:
+            return
+        closed = len(sessions) - len(left)
+
+        def told(done: int, total: int, closed: int = closed) -> None:
+            progress(closed, len(sessions), f"asking {proposer.name}, {done} of {total} answered")
+
+        asks = [Ask(label, session.task, session.turns) for label, session in left.items()]
+        for label, answer in proposer.propose_many(asks, store, told):
+            progress(closed, len(sessions), f"simulating {label}")
+            try:
+                left[label].take(answer, proposer.name)
+            except JodaError as error:
+                failed[label] = error
+
+
+def _check_target(folder: Path, allowed: bool) -> None:
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not allowed)):
+        raise JodaError(
+            f"{folder}: exists already; choose another folder with -o, add --force or go on with "
+            "--resume."
+        )
+
+
+def find_jobs(source: Path, target: Path, joint: str | None, failed: Results) -> dict[str, Job]:
+    """The joints to be done, by label; models that cannot be loaded are added to `failed`."""
+    jobs: dict[str, Job] = {}
+    others = set()
+    for path, stem, part in _models(source, target):
+        try:
+            names = ranged(load_model(path))
+        except JodaError as error:
+            if not part:
+                failed[stem] = error
+            continue
+        taken: set[str] = set()
+        for name in names:
+            folder = target / stem / _unique(file_name(name), taken)
+            if joint in (None, name):
+                jobs[f"{stem}/{name}"] = Job(path, name, folder)
+            else:
+                others.add(name)
+    if not jobs and others:
+        listed = ", ".join(f"'{name}'" for name in sorted(others))
+        raise JodaError(f"{source}: no model has a joint '{joint}'; there are: {listed}.")
+    if not jobs:
+        reasons = " ".join(map(str, failed.values()))
+        raise JodaError(
+            reasons or f"{source}: holds no model with a hinge or slide that has a range."
+        )
+    return jobs
+
+
+def _models(source: Path, target: Path) -> Iterator[tuple[Path, str, bool]]:
+    """MJCF and URDF files below the folder, but for what joda made there.
+
+    Yields:
+        path, a name of its own (the path without its ending, where that is the only one), and
+        whether another file includes it.
+    """
+    if not source.is_dir():
+        raise JodaError(f"{source}: no such folder.")
+    made = target.resolve()
+    texts = {
+        path: _text(path)
+        for path in sorted(source.rglob("*"))
+        if path.suffix.lower() in MODELS and made not in path.resolve().parents
+    }
+    includes = re.compile(r"<include\s[^<>]*\bfile\s*=\s*[\"']([^\"']*)")
+    parts = {Path(file).name for text in texts.values() for file in includes.findall(text)}
+    taken: set[str] = set()
+    for path, text in texts.items():
+        if re.search(r"<(?:mujoco|robot)\b", text):
+            stem = path.relative_to(source).with_suffix("").as_posix()
+            yield path, _unique(stem, taken), path.name in parts
+
+
+def _text(path: Path) -> str:
+    """What the file says but for comments; where it cannot be read, that it is a model."""
+    try:
+        return re.sub(r"<!--.*?(?:-->|\Z)", "", read_text(path), flags=re.DOTALL)
+    except JodaError:
+        return "<mujoco>"
+
+
+def _unique(name: str, taken: set[str]) -> str:
+    """The name, or the first of name_2, name_3, ... that is not taken; it then is."""
+    number, free = 1, name
+    while free.lower() in taken:
+        number += 1
+        free = f"{name}_{number}"
+    taken.add(free.lower())
+    return free

@@ -1,0 +1,55 @@
+"""`joda studio`: a page in the browser, on this machine only, to look at a joint and change it."""
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from importlib.util import find_spec
+from pathlib import Path
+
+from joda.errors import JodaError
+
+
+def studio(
+    scene: str | Path,
+    joint: str | None = None,
+    runs: Sequence[str | Path] = (),
+    *,
+    passive: bool = False,
+    folder: str | Path | None = None,
+    port: int | None = None,
+    browser: bool = True,
+    ready: Callable[[str], None] = lambda address: None,
+) -> None:
+    """Serves a page on which a joint's profile is seen and changed, until it is interrupted.
+
+    Once in a process: NiceGUI has one application.
+
+    Args:
+        scene: MJCF or URDF, with or without a profile on the joint. It is never changed.
+        joint: its name or address, see `joda.scenes.model.find_joint`; by default the one that
+            carries a profile, or that is the only one.
+        runs: measured CSV files to show beside the model; more can be added on the page.
+        passive: whether the actuators on the joint, if there are any, were off.
+        folder: of the project: nothing outside of it is read or written. By default the scene's.
+        port: of the page on 127.0.0.1; by default 8642, or if that is taken another one.
+        browser: whether to open the page in a browser.
+        ready: told the page's address, with its token, when it answers.
+
+    Raises:
+        JodaError: NiceGUI is not installed, a file cannot be read or lies outside the folder, the
+            joint is not clear, or the port is taken.
+    """
+    if find_spec("nicegui") is None:
+        raise JodaError('joda studio needs NiceGUI: install it with: pip install "joda[studio]"')
+    from joda.commands.studio.desk import Desk
+    from joda.commands.studio.guard import free_port
+
+    place = Path(folder) if folder is not None else None
+    with closing(Desk(Path(scene), joint, place, passive)) as desk:
+        for run in runs:
+            desk.add_run(Path(run).absolute())
+        number = free_port(port)
+
+        from joda.commands.studio.page import serve
+        from joda.commands.studio.shared import Shared
+
+        serve(Shared(desk), number, browser, ready)

@@ -1,0 +1,229 @@
+"""How well hidden effects are found, placed and added: joda against joda.hidden, an independent
+simulator.
+
+python tests/benchmarks hidden                        every line, a table at the end; hours
+python tests/benchmarks hidden forced --cases 50      one line
+python tests/benchmarks hidden forced --seed 7 --out forced.jsonl    goes on where it was stopped
+python tests/benchmarks hidden families --family all --cases 2       every effect of every family
+
+Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
+few, families, all. `few`: one to three of the runs only, and adding what is named first. `cover`:
+whether the true size and place lie within what is said, where only the true effect is asked for.
+`sure`: forced and free, the same and how sure the answers are. `families`: nothing, every effect
+with force and by positions only, and laws of no catalogue, so many cases of each; a table family by
+effect, and the error on unseen whole runs. Every run draws a new master seed, from which all cases
+follow.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import secrets
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from dataclasses import asdict
+from pathlib import Path
+
+from hidden_cases import Job, case_of, job_of, read, spread
+from hidden_families import by_effect
+from hidden_figures import fine, table, told
+from hidden_floor import floor_of
+
+from joda.diagnosis.improving import improved
+from joda.diagnosis.mending import error, mend
+from joda.diagnosis.split import parted
+from joda.diagnosis.verdict import diagnosed
+from joda.hidden import FAMILIES, Case
+from joda.hidden.cases import FAMILY
+from joda.measured.reading import Measured
+
+CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
+CASES |= {"two": 10, "cover": 96, "few": 50, "families": 1}
+"""Groups of cases, and how many there are unless told; of `families`, of each effect."""
+APART = ("place", "cover", "few", "families")
+NEEDS = {"all": [group for group in CASES if group not in APART]}
+NEEDS |= {"sure": ["forced", "free"]}
+NEEDS |= {"confident": ["none", "forced", "free", "hard", "outside"]}
+NEEDS |= {"rose": ["add"], "time": ["add"]} | {group: [group] for group in CASES}
+"""Groups of each line."""
+
+
+# --- what joda says and does
+def examined(job: Job) -> dict:
+    """One case: a row of the .jsonl."""
+    row = {**vars(job), "exclude": list(job.exclude)}
+    try:
+        case = case_of(job)
+        row |= {"seed": case.seed, "visible": min(case.visible, 1e6), "noise": case.noise}
+        row |= {"seal": case.seal, "samples": sum(len(run.time) for run in case.train)}
+        row["effect"] = case.seal["effect"]
+        train, held_out = read(case)
+        if job.second:
+            row["second"] = case.seal["second"]["effect"]
+            return row | both(case, train, held_out)
+        if job.runs:
+            return row | few(case, train.changed(runs=job.runs), held_out)
+        row |= said(train, job.exclude)
+        if job.group == "families":
+            row |= unseen(row, case, train, held_out)
+        if job.group == "none" and job.family == FAMILY:
+            row["floor"] = floor_of(case, held_out)
+        if job.wrong:
+            row |= added(job, row, case, train, held_out)
+        return row
+    except Exception:
+        return row | {"failed": traceback.format_exc()}
+
+
+def said(train: Measured, exclude: tuple[str, ...] = ()) -> dict:
+    """The diagnosis, in short."""
+    begun = time.perf_counter()
+    found = diagnosed(train, exclude)
+    diagnosis = found.diagnosis
+    keys = ("effect", "probability", "interval", "interval_error", "direction", "magnitude")
+    keys += ("magnitude_error", "held_out_error_after", "indistinguishable_from")
+    return {
+        "seconds": time.perf_counter() - begun,
+        "verdict": diagnosis.verdict,
+        "looks": [asdict(look) for look in found.looks],
+        "named": [{key: getattr(one, key) for key in keys} for one in diagnosis.effects],
+    }
+
+
+def added(job: Job, row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
+    """Held-out errors after adding what was named first, and after adding a wrong effect."""
+    kept, held = parted(train)
+    before = error(held_out).window
+    out = {"before": before, "floor": floor_of(case, held_out)}
+    tried = {"wrong": (job.wrong,)}
+    if row["named"]:
+        tried["after"] = tuple(row["named"][0][key] for key in ("effect", "direction", "interval"))
+    for key, effect in tried.items():
+        begun = time.perf_counter()
+        mended = mend(kept, held, *effect)
+        out[f"{key}_seconds"] = time.perf_counter() - begun
+        new = error(held_out, mended.profile).window if mended.effect else before
+        out[f"{key}_error"] = new
+    return out
+
+
+def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
+    """Errors on unseen whole runs, of what the true joint misses; after adding what was named."""
+    before = after = error(held_out).whole
+    if row["verdict"] == "missing_effect":
+        first = row["named"][0]
+        mended = mend(*parted(train), first["effect"], first["direction"], first["interval"])
+        after = error(held_out, mended.profile).whole if mended.effect else before
+    least = case.achievable.together
+    return {"unseen_before": before / least, "unseen": after / least}
+
+
+def few(case: Case, train: Measured, held_out: Measured) -> dict:
+    """What is named of few runs, and the error on others before and after it is added."""
+    row = said(train)
+    before = error(held_out).window
+    out = row | {"before": before, "after_error": before, "added": [], "reason": None}
+    if not row["named"]:
+        return out
+    first = tuple(row["named"][0][key] for key in ("effect", "direction", "interval"))
+    mended = mend(*parted(train), *first)
+    if not mended.effect:
+        return out | {"reason": mended.reason}
+    after = error(held_out, mended.profile).window
+    departs = list(mended.departs.sentences)
+    return out | {"after_error": after, "added": [mended.effect], "departs": departs}
+
+
+def both(case: Case, train: Measured, held_out: Measured) -> dict:
+    """What improve adds to a joint that hides two effects."""
+    begun = time.perf_counter()
+    steps, why = improved(train)
+    return {
+        "seconds": time.perf_counter() - begun,
+        "added": [step.effect for step in steps[1:]],
+        "why": why,
+        "before": error(held_out).window,
+        "after_error": error(held_out, steps[-1].profile).window,
+        "floor": floor_of(case, held_out),
+    }
+
+
+# --- running
+def begin(numbers) -> None:
+    """A worker: on a core of its own, stopped by the bench; MuJoCo logs outside the repository."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.chdir(tempfile.gettempdir())
+    if hasattr(os, "sched_setaffinity"):
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[(numbers.get() + os.getppid()) % len(cores)]})
+
+
+def rows_of(path: Path, jobs: list[Job]) -> list[dict]:
+    """What is there of some jobs already."""
+    wanted = {(job.master, *place(vars(job))) for job in jobs}
+    lines = path.read_text().splitlines() if path.exists() else []
+    rows = [json.loads(line) for line in lines if line.endswith("}")]
+    return [row for row in rows if (row["master"], *place(row)) in wanted]
+
+
+def place(row: dict) -> tuple[str, str, int]:
+    """Which of a master seed's cases it is."""
+    return row.get("family", FAMILY), row["group"], row["number"]
+
+
+def bench(jobs: list[Job], workers: int, path: Path) -> list[dict]:
+    """Rows of all jobs; each is written as soon as it is there."""
+    rows = rows_of(path, jobs)
+    there = {place(row) for row in rows}
+    left = [job for job in jobs if place(vars(job)) not in there]
+    os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
+    context = multiprocessing.get_context("spawn")
+    numbers = context.Queue()
+    for k in range(workers):
+        numbers.put(k)
+    with path.open("a") as file, context.Pool(workers, begin, (numbers,)) as pool:
+        try:
+            for row in pool.imap_unordered(examined, left):
+                file.write(json.dumps(row) + "\n")
+                file.flush()
+                rows.append(row)
+                mark = "  " if fine(row) else "! "
+                print(f"{len(rows):4} of {len(jobs)} {mark}{told(row)}", file=sys.stderr)
+        except KeyboardInterrupt:
+            print(f"stopped; go on with --seed {jobs[0].master} --out {path}", file=sys.stderr)
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("line", nargs="?", default="all", choices=NEEDS)
+    parser.add_argument("--family", default=FAMILY, choices=[*FAMILIES, "all"])
+    parser.add_argument("--cases", type=int, help="of each group; of `families`, of each effect")
+    parser.add_argument("--seed", type=int, default=secrets.randbits(32))
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path)
+    args = parser.parse_args()
+    if args.family != FAMILY and {"add", "two"} & set(NEEDS[args.line]):
+        parser.error(f"{args.line} needs the true joint as a profile, which only {FAMILY} has")
+    path = args.out or Path(tempfile.gettempdir()) / f"hidden_bench_{args.seed}.jsonl"
+    print(f"master seed {args.seed}, rows in {path}\n", flush=True)
+    jobs = [
+        job_of(args.seed, group, number, family)
+        for family in (FAMILIES if args.family == "all" else [args.family])
+        for group in NEEDS[args.line]
+        for number in range(count(group, family, args.cases))
+    ]
+    rows = bench(jobs, args.workers, path.resolve())
+    if args.line == "families":
+        by_effect(rows)
+    else:
+        table(rows)
+
+
+def count(group: str, family: str, cases: int | None) -> int:
+    """How many cases a group has."""
+    return (cases or CASES[group]) * (len(spread(family)) if group == "families" else 1)
