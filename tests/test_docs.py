@@ -54,7 +54,9 @@ def run(command: str, folder: Path) -> str:
 
 def masked(text: str) -> set[str]:
     """The lines without their numbers: other machines round otherwise."""
-    return {re.sub(r"-?\d[\d.e]*", "#", re.sub(" +", " ", line)) for line in text.splitlines()}
+    return {
+        re.sub(r"-?\d[\d.e]*", "#", re.sub(" +", " ", line).rstrip()) for line in text.splitlines()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +87,19 @@ def test_a_log_of_mujoco_becomes_a_run(my_door):
     assert "the measurement's noise" in run("joda compare door.xml log.csv --joint hinge", folder)
 
 
+def test_a_csv_with_other_units_becomes_a_run(tmp_path):
+    write_files("howto/logs.md", tmp_path)
+    run("python swing.py", tmp_path)
+    told = [run(command, tmp_path) for command in blocks("howto/logs.md", "sh")[0].splitlines()]
+    assert masked(blocks("howto/logs.md", "text")[0]) == masked(told[0])
+    assert "the measurement's noise" in told[1]
+    done = read_run(tmp_path / "runs" / "swing.csv")
+    assert done.time == pytest.approx(np.arange(400) / 100)
+    assert done.position[0] == pytest.approx(np.deg2rad(40))
+
+
 def test_a_ros_bag_becomes_a_run(tmp_path):
+    """As the page says, with the effort as the force."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     names = "sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
     state, header, time = (store.types[name] for name in names)
@@ -98,11 +112,14 @@ def test_a_ros_bag_becomes_a_run(tmp_path):
             message = state(header(stamp, ""), ["lamp", "hinge"], *numbers)
             bag.write(topic, round(1e9 * (t + 9)), store.serialize_cdr(message, names[0]))
     write_files("howto/logs.md", tmp_path)
-    run("python from_bag.py", tmp_path)
-    done = read_run(tmp_path / "run.csv")
+    (command,) = re.findall(r"`(joda import recording .+?)`", (DOCS / "howto/logs.md").read_text())
+    (column,) = re.findall(r"`(--column force:hinge=.+?)`", (DOCS / "howto/logs.md").read_text())
+    run(f"{command.replace('arm.xml', 'lamp.xml')} --joint hinge {column}", tmp_path)
+    done = read_run(tmp_path / "runs" / "recording.csv")
     assert done.time == pytest.approx(at, abs=1e-6)
     assert done.position == pytest.approx(np.sin(at))
-    assert done.force == pytest.approx(0.1 * at)
+    assert done.velocity == pytest.approx(np.cos(at))
+    assert done.force == pytest.approx(0.1 * at, abs=1e-9)
 
 
 def test_templates_effects_and_proposers_of_ones_own(my_door):

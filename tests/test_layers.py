@@ -23,7 +23,7 @@ LAYERS = [
     {"exporting", "compiling", "joints"},
     {"mjx", "pictures", "warp"},
     {"measured"},
-    {"hidden", "interaction", "diagnosis"},
+    {"hidden", "importing", "interaction", "diagnosis"},
     {"refining", "propose"},
     {"commands"},
     {"cases", "distributed"},

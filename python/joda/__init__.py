@@ -1,6 +1,7 @@
 """JODA: joint dynamics for articulated objects in MuJoCo.
 
-Every command is a function here, of the same name and meaning: `joda.attach`, `joda.plot`, ...
+Every command is a function here, of the same name and meaning: `joda.attach`, `joda.plot`, ...;
+but `joda import` is `joda.import_log`, as Python has `import` for itself.
 They are loaded when they are first used, and the plugin with them, so that `import joda` stays
 light: it imports neither MuJoCo nor NumPy. Only a MuJoCo before 4.0, which looks for no plugins,
 is imported at once.
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from joda.commands.generate import generate
     from joda.commands.generate_all import generate_all
     from joda.commands.hidden_effect import hidden_effect
+    from joda.commands.import_log import import_log
     from joda.commands.improve import improve
     from joda.commands.plot import plot
     from joda.commands.refine import refine
@@ -67,6 +69,7 @@ __all__ = [
     "generate",
     "generate_all",
     "hidden_effect",
+    "import_log",
     "improve",
     "plot",
     "plugin_path",
@@ -97,6 +100,7 @@ COMMANDS = (
     "experiments",
     "export",
     "generate",
+    "import",
     "improve",
     "plot",
     "refine",
@@ -121,6 +125,7 @@ _LAZY = {
     "experiments": "joda.cases.experiments",
     "generate_all": "joda.commands.generate_all",
     "hidden_effect": "joda.commands.hidden_effect",
+    "import_log": "joda.commands.import_log",
     "read_profiles": "joda.scenes.scene",
     "render": "joda.pictures.positions",
     "set_profile": "joda.scenes.scene",
@@ -128,6 +133,8 @@ _LAZY = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "import":  # a word of Python's own, which nobody can write
+        name = "import_log"
     if name in _MODULES:
         return import_module(f"joda.{name}")
     if name not in _LAZY:

@@ -29,6 +29,7 @@ experiments switch --seeds 1 -o new
 generate microwave.xml --joint door -o new --rounds 1 --describe latches
 generate gen -o new --rounds 1
 generate microwave.xml --joint door -o gen --resume
+import run.csv --model scene.xml --joint door -o new --unit position=deg
 improve scene.xml run.csv run2.csv --joint door -o new.xml --report new.html
 plot composed.json -o new.png
 plot scene.xml --joint door -o new.png

@@ -14,6 +14,7 @@ from joda import __version__
 from joda.cli import interrupt
 from joda.cli.act import experiments, simulate, with_usual
 from joda.cli.edit import studio
+from joda.cli.logs import import_log
 from joda.cli.make import attach, compile, demo, export, generate, revise, weigh
 from joda.cli.many import distribute, evaluate
 from joda.cli.measure import bench, compare, refine
@@ -65,11 +66,12 @@ def _help(command: Callable[..., None]) -> str:
 
 
 for command in (
-    demo, attach, compile, context, generate, revise, plot, simulate, compare, diagnose, add,
-    improve, refine, render, experiments, studio, export, distribute, evaluate,
+    demo, attach, compile, context, generate, revise, plot, simulate, import_log, compare,
+    diagnose, add, improve, refine, render, experiments, studio, export, distribute, evaluate,
     bench, schema, templates, weigh, doctor,
 ):  # fmt: skip
-    app.command(help=_help(command))(command)
+    name = "import" if command is import_log else None  # Python has that word for itself
+    app.command(name, help=_help(command))(command)
 
 
 def main() -> None:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from joda.commands.generate import Generated
     from joda.commands.refine import Refined
     from joda.exporting.nearest import Nearest
+    from joda.importing.understood import Understood
     from joda.propose import Usage
     from joda.propose.history import Round
     from joda.template import Template
@@ -345,3 +346,39 @@ def _paragraph(template: "Template") -> str:
     width = min(shutil.get_terminal_size((100, 24)).columns, 100)
     wrap = textwrap.TextWrapper(width, initial_indent="  ", subsequent_indent="  ")
     return "\n".join((template.name, *map(wrap.fill, texts)))
+
+
+def tell_understood(columns: "Iterable[Understood]") -> None:
+    """The table of `joda import`."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    heads = ("column", "becomes", "unit", "known by", "range", "model's", "sign", "zero", "delay")
+    table = Table(*heads, box=None, pad_edge=False)
+    for one in columns:
+        texts = (
+            one.column, one.target, one.unit, one.why, _ends(one.range), _ends(one.model_range),
+            one.sign or "-", _zero(one), _delay(one),
+        )  # fmt: skip
+        table.add_row(*(Text(plain(text)) for text in texts))
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
+
+
+def _ends(span: tuple[float, float] | None) -> str:
+    return "-" if span is None else f"{span[0]:.3g} to {span[1]:.3g}"
+
+
+def _zero(one: "Understood") -> str:
+    """Whether the zero can be the model's; of a command how far its joint is from it."""
+    if one.offset is not None:
+        return f"off by {one.offset:.2g}"
+    if one.model_range is None:
+        return "-"
+    return f"{100 * one.outside:.2g} % outside" if one.outside else "inside"
+
+
+def _delay(one: "Understood") -> str:
+    if one.delay is None or one.delay_resolution is None:
+        return "-"
+    return f"{1e3 * one.delay:.0f} ms (samples: {1e3 * one.delay_resolution:.3g})"
