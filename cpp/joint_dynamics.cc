@@ -33,20 +33,30 @@ int CountPositive(const mjtNum* values, int n) {
   return static_cast<int>(std::count_if(values, values + n, [](mjtNum x) { return x > 0; }));
 }
 
-// Generalised force of gravity on the joint, over all bodies that it moves, and of what is applied
-// to it.
-double LoadOn(const mjModel* m, const mjData* d, int joint, int body) {
+// Generalised force on the joint of gravity, less what gravcomp takes off, and of what is applied
+// to it and to the bodies that it moves.
+double ExternalForce(const mjModel* m, const mjData* d, int joint, int body) {
+  const bool hinge = m->jnt_type[joint] == mjJNT_HINGE;
   const mjtNum* axis = d->xaxis + 3 * joint;
-  mjtNum direction[3];  // in which the centre of mass moves
-  mju_copy3(direction, axis);
-  if (m->jnt_type[joint] == mjJNT_HINGE) {
-    mjtNum arm[3];
-    mju_sub3(arm, d->subtree_com + 3 * body, d->xanchor + 3 * joint);
-    mju_cross(direction, axis, arm);
+  const auto along = [&](const mjtNum force[3], const mjtNum point[3]) {
+    if (!hinge) return mju_dot3(axis, force);
+    mjtNum arm[3], torque[3];
+    mju_sub3(arm, point, d->xanchor + 3 * joint);
+    mju_cross(torque, arm, force);
+    return mju_dot3(axis, torque);
+  };
+  const int dof = m->jnt_dofadr[joint];
+  double out = d->qfrc_applied[dof];
+  if (!(m->opt.disableflags & mjDSBL_GRAVITY)) {
+    out += m->body_subtreemass[body] * along(m->opt.gravity, d->subtree_com + 3 * body);
   }
-  const bool weightless = m->opt.disableflags & mjDSBL_GRAVITY;
-  const double weight = weightless ? 0 : m->body_subtreemass[body];
-  return weight * mju_dot3(direction, m->opt.gravity) + d->qfrc_applied[m->jnt_dofadr[joint]];
+  if (!m->jnt_actgravcomp[joint]) out += d->qfrc_gravcomp[dof];  // else it is the actuator's
+  for (int b = body; b < m->nbody && (b == body || m->body_parentid[b] >= body); ++b) {
+    const mjtNum* applied = d->xfrc_applied + 6 * b;
+    out += along(applied, d->xipos + 3 * b);
+    if (hinge) out += mju_dot3(axis, applied + 3);
+  }
+  return out;
 }
 
 // What has no row becomes a force that at most stops the joint within the step.
@@ -98,8 +108,9 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
     CheckProfile(m, joint, profile);
     if (CountStates(mine.profile.effects.get()) != CountStates(profile.effects.get())) {
       throw std::invalid_argument(JointName(m, joint) +
-                                  " would gain or lose the effect \"backlash\", whose state needs "
-                                  "room in the model; attach the profile and compile anew");
+                                  " would gain or lose the effect \"backlash\" or "
+                                  "\"load_dependent_friction\", whose state needs room in the "
+                                  "model; attach the profile and compile anew");
     }
     mine.profile = std::move(profile);
     mine.load = {};
@@ -121,19 +132,20 @@ double JointDynamics::SetFrictionRow(const Step& step, mjData* d, int row, const
 void JointDynamics::SetStops(const mjModel* m, const Step& step, mjData* d, const Joint& joint) {
   const EndStops& stops = joint.profile.effects->stops;
   if (!stops.low && !stops.high) return;
-  const int first = d->ne + d->nf, last = first + d->nl;
-  const auto is_own = [&](int row) {
-    return row >= first && row < last && d->efc_type[row] == mjCNSTR_LIMIT_JOINT &&
-           d->efc_id[row] == joint.id;
-  };
-  int row = FindRow(d, first, last, 0, mjCNSTR_LIMIT_JOINT, joint.id);
-  if (is_own(row - 1)) --row;  // a margin may bring both ends near
-  for (; is_own(row); ++row) {
-    const std::ptrdiff_t dense = static_cast<std::ptrdiff_t>(row) * m->nv + joint.dof;
-    const mjtNum side = d->efc_J[step.sparse ? d->efc_J_rowadr[row] : dense];
+  ForEachLimit(m, d, step.sparse, joint.id, joint.dof, [&](int row, mjtNum side) {
     const std::optional<double>& damping = side > 0 ? stops.low : stops.high;
     if (damping) SetStop(step, d, row, MakeStopRow(*damping, step.h, 1 / RowMobility(d, row)));
+  });
+}
+
+double JointDynamics::UnknownLoad(const mjModel* m, const mjData* d, const Joint& joint) {
+  double own = 0;
+  for (const int row : {FindFrictionRow(d, joint), FindDampingRow(d, joint)}) {
+    if (row >= 0) own += d->efc_force[row];
   }
+  ForEachLimit(m, d, mj_isSparse(m), joint.id, joint.dof,
+               [&](int row, mjtNum side) { own += side * d->efc_force[row]; });
+  return d->qfrc_constraint[joint.dof] - own - d->qfrc_actuator[joint.dof];
 }
 
 double JointDynamics::PushThroughPlay(const mjData* d, const mjtNum* state, double h,
@@ -166,8 +178,10 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
     const double damping = step.damper ? p.damping(s).value : 0;
     double friction = step.friction ? p.friction(s).value : 0;
     if (friction_row >= 0) friction += m->dof_frictionloss[joint.dof];
-    const bool loaded = effects && (effects->load > 0 || HasLoad(effects));
-    const double load = loaded ? LoadOn(m, d, joint.id, joint.body) : 0;
+    const bool rubs_by_load = effects && effects->load > 0;
+    const bool needs_external = rubs_by_load || HasLoad(effects);
+    const double external = needs_external ? ExternalForce(m, d, joint.id, joint.body) : 0;
+    const double load = rubs_by_load ? external + state[LastState(joint)] : 0;
     const auto resist = [&](double velocity) {
       Resistance out = {damping, {friction, friction}};
       if (effects && step.damper) out.drag += ExtraDamping(*effects, s, velocity);
@@ -179,7 +193,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
     double force = 0;
     if (HasLoad(effects)) {
       const Loose behind = {state[joint.state + 1], state[joint.state + 2]};
-      const double known = load + state[joint.state + 3];
+      const double known = external + state[joint.state + 3];
       joint.load = Meet(effects->backlash, h, m->dof_M0[joint.dof], spring + known, v, own,
                         h * stiffness, resist(v + behind.velocity), behind);
       force = joint.load.force + (joint.load.scale - 1) * known;
@@ -218,6 +232,7 @@ void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
     const int row = FindFrictionRow(d, joint);
     state[joint.state] = row < 0 ? 0 : d->efc_force[row];
     const Effects* effects = joint.profile.effects.get();
+    if (effects && effects->load > 0) state[LastState(joint)] = UnknownLoad(m, d, joint);
     if (!computed || !(HasHandle(effects) || HasLoad(effects))) continue;
     const Loose loose = HasHandle(effects) ? joint.handle
                                            : Settle(effects->backlash, m->opt.timestep, joint.load,

@@ -38,7 +38,8 @@ class JointDynamics {
   // backlash has three numbers more: those of the handle or the load, and the force that was
   // applied after Compute (between mj_step1 and mj_step2, or by mjcb_control). That force reached
   // the part directly: the next step gives it to the handle and takes it back from the part, or
-  // makes up for the load's inertia.
+  // makes up for the load's inertia. Load-dependent friction has one more: what of the load the
+  // next step cannot know before its solver has run.
   void Advance(const mjModel* m, mjData* d, int instance) const;
 
   // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint
@@ -69,6 +70,15 @@ class JointDynamics {
   // Sets the joint's friction row, whose last force is `state`; returns the bristle's damping.
   static double SetFrictionRow(const Step& step, mjData* d, int row, const Joint& joint,
                                double bound, double state, double inertia);
+
+  // Where the last number of the joint's state is.
+  static int LastState(const Joint& joint) {
+    return joint.state + CountStates(joint.profile.effects.get()) - 1;
+  }
+
+  // Of the load, what contacts and all other constraints exert, but for the joint's own friction,
+  // damping and ends of range, minus what its actuators do.
+  static double UnknownLoad(const mjModel* m, const mjData* d, const Joint& joint);
 
   // Sets the rows of those ends of the joint's range that have a restitution of their own.
   static void SetStops(const mjModel* m, const Step& step, mjData* d, const Joint& joint);

@@ -48,7 +48,10 @@ Profile ParseProfile(const std::string& prefix, double lo, double hi,
   return profile;
 }
 
-int CountStates(const Effects* effects) { return effects && effects->backlash.play > 0 ? 4 : 1; }
+int CountStates(const Effects* effects) {
+  if (!effects) return 1;
+  return 1 + (effects->backlash.play > 0 ? 3 : 0) + (effects->load > 0 ? 1 : 0);
+}
 
 int CountStates(const char* effects) {
   try {

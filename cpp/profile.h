@@ -35,7 +35,8 @@ struct Profile {
 Profile ParseProfile(const std::string& prefix, double lo, double hi,
                      const char* const texts[kTexts]);
 
-// How many numbers of the engine's state the effects (null: none) need.
+// How many numbers of the engine's state the effects (null: none) need. With load-dependent
+// friction the last of them is the load's unknown part.
 int CountStates(const Effects* effects);
 
 // The same for effects as a text; what cannot be read counts as none.

@@ -28,6 +28,24 @@ inline int FindRow(const mjData* d, int first, int last, int expected, int type,
   return -1;
 }
 
+// Calls visit(row, side) for the rows of the joint's limit; side is 1 at the low end, -1 at the
+// high one. A margin may bring both ends near.
+template <typename Visit>
+void ForEachLimit(const mjModel* m, const mjData* d, bool sparse, int joint, int dof,
+                  const Visit& visit) {
+  const int first = d->ne + d->nf, last = first + d->nl;
+  const auto is_own = [&](int row) {
+    return row >= first && row < last && d->efc_type[row] == mjCNSTR_LIMIT_JOINT &&
+           d->efc_id[row] == joint;
+  };
+  int row = FindRow(d, first, last, 0, mjCNSTR_LIMIT_JOINT, joint);
+  if (is_own(row - 1)) --row;
+  for (; is_own(row); ++row) {
+    const std::ptrdiff_t dense = static_cast<std::ptrdiff_t>(row) * m->nv + dof;
+    visit(row, d->efc_J[sparse ? d->efc_J_rowadr[row] : dense]);
+  }
+}
+
 // What of the step is the same for all joints.
 struct Step {
   double h, per_h;

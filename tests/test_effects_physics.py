@@ -429,7 +429,7 @@ def test_a_saved_state_restarts_exactly(tmp_path, options, states):
     mujoco.mj_setState(model, fresh, saved, full)
     np.testing.assert_array_equal(run(model, fresh, 0.5, wobble), first)
     np.testing.assert_array_equal(run(model, copied, 0.5, wobble), first)
-    assert model.npluginstate == 4
+    assert model.npluginstate == 5
 
 
 @BOTH

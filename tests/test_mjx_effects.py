@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+import test_load as driven
 from mujoco import mjx
 from slopes import FAST, check_slopes
 from test_solo_effects import BEHIND, STOPS, cases, profile_of, pushes, run
@@ -84,14 +85,14 @@ class Scene:
         d.qpos[:] = LOW + 0.4 * SPANS
         bodies = [self.model.joint(name).bodyid[0] for name in JOINTS]
         instances = self.model.body_plugin[bodies]
-        size = self.model.plugin_statenum[instances[0]]
+        size = 3 if self.model.plugin_statenum[instances[0]] > 3 else 1
         for force in forces:
             d.qfrc_applied[:] = force
             mujoco.mj_step(self.model, d)
             positions.append(d.qpos.copy())
             first = self.model.plugin_stateadr[instances]
-            parts = [d.plugin_state[k : k + min(size, 3)] for k in first]
-            states.append(np.pad(parts, ((0, 0), (0, 3 - min(size, 3)))))
+            parts = [d.plugin_state[k : k + size] for k in first]
+            states.append(np.pad(parts, ((0, 0), (0, 3 - size))))
         return np.array(positions), np.array(states)
 
     def mjx(self, forces):
@@ -224,6 +225,39 @@ def test_end_stops_among_other_rows_are_the_plugins():
         d = step(m, d.replace(qfrc_applied=jnp.asarray(force)), fields)
         found.append(np.asarray(d.qpos))
     np.testing.assert_allclose(found, path, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", JOINTS.values())
+def test_driven_joints_that_touch_others_have_the_load_of_the_plugins(kind):
+    """A servo, contacts, a stop, a coupled joint, a tendon, a weight that is partly compensated."""
+    options = 'tolerance="1e-14" iterations="100" ls_iterations="50"'
+    text = driven.scene(kind, **driven.RICH, body='gravcomp="0.3"', option=options)
+    model = mujoco.MjModel.from_xml_string(text)
+    model.jnt_range[0] = (-0.2, 0.02)
+    d, path, bounds, contacts = mujoco.MjData(model), [], [], []
+    m = mjx.put_model(model).replace(npluginstate=0)
+    inputs = 0.3 * np.sin(0.05 * np.arange(STEPS))
+    push = np.zeros((model.nbody, 6))
+    push[model.body("part").id] = 0.0, 1, -1, 0.1, 0.2, 0.3
+    d.xfrc_applied[:] = push
+    for target in inputs:
+        d.ctrl[0] = target
+        mujoco.mj_step(model, d)
+        path.append(d.qpos.copy())
+        bounds.append(driven.bound(model, d))
+        contacts.append(d.ncon)
+    fields = joda.mjx.put_fields(model, profiles_of(model))
+    d = mjx.make_data(m).replace(xfrc_applied=jnp.array(push))
+    row, step, found = fields["j"].place.friction_row, jax.jit(joda.mjx.step), []
+    for target in inputs:
+        d = step(m, d.replace(ctrl=jnp.array([target])), fields)
+        found.append([*d.qpos, d._impl.efc_frictionloss[row]])
+    found = np.array(found)
+    path = np.array(path)
+    assert {0, 1} == set(contacts) and path[:, 0].max() > 0.02
+    np.testing.assert_allclose(found[:, :-1], path, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found[:, -1], bounds, rtol=0, atol=1e-6)
+    assert np.ptp(bounds) > 1
 
 
 def test_the_example_of_the_docs(folder):

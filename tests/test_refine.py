@@ -179,8 +179,9 @@ class TestThePapersDoor:
         assert now < was / 50
 
     def test_the_error_told_is_that_of_a_replay_from_the_starts_that_suit_best(self, door):
+        """A search from rest may stop short of them, but not much, and it is never much nearer."""
         now, told = door.replayed("better.xml", nudged=True), door.told["checked"][1]
-        assert 0.7 * told < now < 1.05 * told
+        assert 0.7 * now < told < 1.05 * now
 
     def test_the_fitted_runs_come_down_to_the_noise(self, door):
         assert door.told["noise"] == pytest.approx(5e-4 * 1.6, rel=0.1)

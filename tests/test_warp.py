@@ -22,6 +22,7 @@ from warp_parity import CLOSE, CONFIGURATIONS, RANGES, SPANS, by_plugin, by_warp
 
 import joda.warp  # noqa: E402
 from joda.component import Component  # noqa: E402
+from joda.effects import LoadDependentFriction  # noqa: E402
 from joda.profile import Channel, Channels, Joint, Profile, Resistance  # noqa: E402
 from joda.warp.bench import bench  # noqa: E402
 
@@ -81,6 +82,20 @@ def test_each_effect_alone_moves_as_with_the_plugin():
     for name, wrong, large in zip(kinds, error, change, strict=True):
         assert wrong < CLOSE, f"{name}: {wrong}"
         assert large > 10 * CLOSE or name.startswith("added_inertia"), f"{name}: {large}"
+
+
+def test_motors_and_contacts_load_a_joint_as_with_the_plugin():
+    """The arm hits the floor and its stop, the drawer the ball."""
+    variants = [
+        both(effects=(LoadDependentFriction(coefficient=mu),), damping=0.05) for mu in (0.1, 0.3, 0)
+    ]
+    pushes = warp_parity.forces() * [3.0, 1.0]
+    expected = by_plugin(variants, pushes, motors=True) / SPANS
+    m, d, _ = prepared(variants)
+    actual = by_warp(m, d, pushes, motors=True) / SPANS
+    assert (np.abs(actual - expected)[-1] < CLOSE).all()
+    assert (np.abs(expected - expected[:, 2:])[-1, :2] > 100 * CLOSE).all()
+    assert (expected[:, :2, 0].min(0) < RANGES["arm"][0] / SPANS[0]).all()
 
 
 def test_a_held_joint_does_not_creep():

@@ -30,6 +30,8 @@ SIZES = {
 }
 """About the largest value of a component, N·m or N, and of its damping."""
 PUSHES = np.array([0.9, 6.0])
+WIND = np.array([0.1, 0.0, -0.2, 0.0, 0.01, 0.0])
+"""On a body, N and N·m."""
 CONFIGURATIONS = [(i, c) for i in ("Euler", "implicitfast") for c in ("pyramidal", "elliptic")]
 SECONDS, TIMESTEP = 1.0, 0.002
 CLOSE = 1e-4
@@ -72,6 +74,7 @@ def scene(
           <geom type="sphere" size="0.1" mass="0.2" contype="1" conaffinity="1"/></body>
       </worldbody>
       <equality>{"".join(rows)}</equality>
+      <actuator>{"".join(f'<motor joint="{name}"/>' for name in profiles)}</actuator>
     </mujoco>"""
 
 
@@ -153,18 +156,20 @@ def forces(seconds=SECONDS) -> np.ndarray:
     return np.sin(2 * np.pi * t / 0.45)[:, None] * PUSHES
 
 
-def by_plugin(variants, pushes, rounded=False, **options) -> np.ndarray:
+def by_plugin(variants, pushes, rounded=False, motors=False, **options) -> np.ndarray:
     """Positions of both joints in each world, by the plugin; shape (steps, worlds, 2).
 
     `rounded`: what a step leaves behind is rounded to single precision, all else is double.
+    `motors`: they push, while a steady WIND blows on all bodies.
     """
     out = np.empty((len(pushes), len(variants), 2))
     for k, profiles in enumerate(variants):
         model = mujoco.MjModel.from_xml_string(scene(profiles, **options))
         data = mujoco.MjData(model)
         data.qpos[:2] = start()
+        data.xfrc_applied[1:] = WIND * motors
         for i, push in enumerate(pushes):
-            data.qfrc_applied[:2] = push
+            (data.ctrl if motors else data.qfrc_applied)[:2] = push
             mujoco.mj_step(model, data)
             if rounded:
                 for kept in (data.qpos, data.qvel, data.qacc_warmstart, data.plugin_state):
@@ -198,13 +203,15 @@ def place(d) -> None:
     d.qpos.assign(qpos)
 
 
-def by_warp(m, d, pushes) -> np.ndarray:
+def by_warp(m, d, pushes, motors=False) -> np.ndarray:
     """The same as `by_plugin`, by mujoco_warp."""
     out = np.empty((len(pushes), d.nworld, 2))
-    applied = np.zeros((d.nworld, m.nv), np.float32)
+    pushed = d.ctrl if motors else d.qfrc_applied
+    applied = np.zeros(pushed.shape, np.float32)
+    d.xfrc_applied.assign(np.tile(WIND * motors, (d.nworld, m.nbody, 1)))
     for i, push in enumerate(pushes):
         applied[:, :2] = push
-        d.qfrc_applied.assign(applied)
+        pushed.assign(applied)
         mujoco_warp.step(m, d)
         out[i] = d.qpos.numpy()[:, :2]
     return out

@@ -282,7 +282,7 @@ TEST_CASE("two threads that share a model agree") {
   CHECK(q[0] == q[1]);
 }
 
-TEST_CASE("backlash can be replaced, but neither added nor removed") {
+TEST_CASE("what has a state can be replaced, but neither added nor removed") {
   Simulation with({"backlash play=0.1 inertia=0.4"}), without({});
   for (const char* const side : {" side=motor", ""}) {
     with.Push(1, 0.5);
@@ -292,10 +292,11 @@ TEST_CASE("backlash can be replaced, but neither added nor removed") {
         "joint 'part' has armature 0, less than its effect \"added_inertia\" of 1e-09; write "
         "armature=\"1e-09\" on the joint");
   const std::string sentence =
-      "joint 'part' would gain or lose the effect \"backlash\", whose state needs room in the "
-      "model; attach the profile and compile anew";
+      "joint 'part' would gain or lose the effect \"backlash\" or \"load_dependent_friction\", "
+      "whose state needs room in the model; attach the profile and compile anew";
   CHECK(with.Replace("") == sentence);
   CHECK(without.Replace("backlash play=0.05 inertia=0.2") == sentence);
+  CHECK(without.Replace("load_dependent_friction coefficient=0.1") == sentence);
 }
 
 TEST_CASE("effects that the joint cannot have are refused") {

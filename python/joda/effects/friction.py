@@ -52,11 +52,11 @@ class LoadDependentFriction(Effect):
 
     DESCRIPTION = "Dry friction grows with the load that the joint carries."
     LAW = (
-        "f = f_max(s) + coefficient |load|; load: gravity's force on the joint plus the force that "
-        "is applied to it"
+        "f = f_max(s) + coefficient |load|; load: what its gear transmits, the actuator's force "
+        "minus gravity's, contacts' and the applied one"
     )
     SOURCE = "Coulomb 1785; Hamon, Gautier and Garrec, IROS 2010"
-    SHOWS = "Friction that is larger where gravity pulls more, or where the hand pushes more."
+    SHOWS = "Friction that is larger where gravity pulls more, or where hand or motor push more."
 
     effect: Literal["load_dependent_friction"] = "load_dependent_friction"
     coefficient: float = parameter("friction per load", "1", "1", (0.02, 0.5), ge=0)

@@ -12,7 +12,8 @@ theorem, whatever the solver did to get there.
     d = jax.jit(joda.mjx.step)(m, d, fields)
 
 A joint's friction of the last step, which the plugin keeps in `plugin_state`, is read from
-`d._impl.efc_force`. Only backlash needs state beyond `mjx.Data`: `put_state` makes room for it.
+`d._impl.efc_force`, and what loaded it from `d.qfrc_constraint` and `d.qfrc_actuator`. Only
+backlash needs state beyond `mjx.Data`: `put_state` makes room for it.
 """
 
 from importlib import import_module

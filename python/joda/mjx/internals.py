@@ -45,6 +45,26 @@ class Rows:
         )
 
 
+class Last:
+    """The forces of the step before."""
+
+    def __init__(self, d: mjx.Data) -> None:
+        """Takes them from the state that it left behind."""
+        self.force, self._J = d._impl.efc_force, d._impl.efc_J
+        self._constraint, self._actuator = d.qfrc_constraint, d.qfrc_actuator
+
+    def unknown_load(self, dof: Any, own: Any) -> Array:
+        """Of the loads on joints, what is not known before a step, N·m or N.
+
+        Args:
+            dof: of the joints, shape (joints,).
+            own: rows that are not load but the joints' own, -1 for none, shape (rows, joints).
+        """
+        forces = jnp.where(own < 0, 0, self._J[own, dof] * self.force[own]).sum(0)
+        load: Array = self._constraint[dof] - forces - self._actuator[dof]
+        return load
+
+
 Settle = Callable[[mjx.Data], mjx.Data]
 
 
@@ -55,13 +75,13 @@ def pipeline(
 
     What that returns besides the state is done where MuJoCo calls a plugin's advance.
     """
-    psi = d._impl.efc_force
+    last = Last(d)
     d = forward.fwd_position(m, d)
     d = sensor.sensor_pos(m, d)
     d = forward.fwd_velocity(m, d)
     settle: Settle | None = None
     if act is not None:
-        d, settle = act(m, d, psi)
+        d, settle = act(m, d, last)
     d = sensor.sensor_vel(m, d)
     d = forward.fwd_actuation(m, d)
     d = forward.fwd_acceleration(m, d)

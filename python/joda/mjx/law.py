@@ -12,19 +12,19 @@ from joda.field.jaxeffects import Backlash, EndStops
 from joda.joints import laws
 from joda.joints.stiffness import IDLE_ROW, implicit_stiffness, reach, stays_beyond
 from joda.mjx.fields import Prepared
-from joda.mjx.internals import Rows, Settle
+from joda.mjx.internals import Last, Rows, Settle
 from joda.profile import CHANNELS
 
 Array = jax.Array
 
 
-def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> tuple[mjx.Data, Settle]:
+def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.Data, Settle]:
     """The plugin's compute: forces and rows of all joints, from the state before the step.
 
     Args:
         m: model.
         d: the state, with its rows and passive forces made.
-        psi: the forces of all rows in the step before.
+        last: the forces of the step before.
         prepared: the fields.
 
     Returns:
@@ -59,9 +59,12 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> tuple[mjx.
     if not off & bit.FRICTIONLOSS:
         dry, _ = _each(prepared.friction, order["friction"], jaxfield.evaluate, s)
         dry = dry + m.dof_frictionloss[dof]
-    load = jnp.zeros_like(v)
+    external = load = jnp.zeros_like(v)
     if own.load_dependent_friction is not None or own.backlash is not None:
-        load = _gravity(m, d, index["joint"]) + d.qfrc_applied[dof]
+        external = _external(m, d, index["joint"], dof)
+    if own.load_dependent_friction is not None:
+        rows_of_own = [index[f"{kind}_row"] for kind in ("friction", "damping", "limit")]
+        load = external + last.unknown_load(dof, np.array(rows_of_own))
 
     def resistance(v: Array) -> laws.Resistance:
         whole = jax.vmap(laws.resistance)(own, damping, dry, s, v, load)
@@ -75,7 +78,7 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> tuple[mjx.
     whole, other = resistance(v), resistance(v + w)
     meet = jax.vmap(laws.meet, in_axes=(*[0] * 9, None))
     passage = meet(
-        own.backlash, g, w, v, m.dof_M0[dof], force + load, whole, h * stiffness, other, h
+        own.backlash, g, w, v, m.dof_M0[dof], force + external, whole, h * stiffness, other, h
     )
     drag, up, down = jax.vmap(laws.Resistance.part)(whole, passage.resistance)
     force, stiffness = passage.scale * force, passage.scale * stiffness
@@ -84,11 +87,11 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> tuple[mjx.
     rows, at = Rows(d), np.flatnonzero(index["friction_row"] >= 0)
     row = index["friction_row"][at]
     bound = 0.5 * (up + down)[at]
-    last = jnp.clip(psi[row], -bound, bound)
+    psi = jnp.clip(last.force[row], -bound, bound)
     bristles = jax.tree.map(lambda x: x[at], own.presliding_friction)
     stiff = jax.vmap(laws.friction_row, in_axes=(0, 0, 0, 0, 0, None, 0))
-    D, slipping = stiff(bristles, last, bound, v[at], inertia[at], h, passage.resistance[at])
-    rows.set(row, D, bound, last, v[at] / h)
+    D, slipping = stiff(bristles, psi, bound, v[at], inertia[at], h, passage.resistance[at])
+    rows.set(row, D, bound, psi, v[at] / h)
     if damper:
         drag = drag.at[at].add(slipping)
     shift = jnp.zeros_like(v).at[at].set(0.5 * (down - up)[at])  # as the row is symmetric
@@ -110,7 +113,7 @@ def act(m: mjx.Model, d: mjx.Data, psi: Array, prepared: Prepared) -> tuple[mjx.
     stop, dry = inertia * jnp.abs(v) / h, jnp.where(v < 0, down, up)
     limited = jnp.minimum(dry + drag * jnp.abs(v) / (1 + h * drag / inertia), stop)
     force = force + shift - jnp.sign(v) * limited
-    force = force + passage.force + (passage.scale - 1) * load
+    force = force + passage.force + (passage.scale - 1) * external
     applied = d.qfrc_applied[dof]
     push = jax.vmap(laws.backlash, in_axes=(0, 0, 0, 0, 0, None))
     pushed, g, w = push(own.backlash, g, w, v, applied, h)
@@ -146,16 +149,32 @@ def _set_stops(
     rows.limit(row, has & (side != 0), D, reference)
 
 
-def _gravity(m: mjx.Model, d: mjx.Data, joint: Any) -> Array:
-    """Gravity's force on joints, from all that they move, N·m or N."""
-    if m.opt.disableflags & mjx.DisableBit.GRAVITY:
-        return jnp.zeros(len(joint))
+def _external(m: mjx.Model, d: mjx.Data, joint: Any, dof: Any) -> Array:
+    """Force on joints of gravity, less gravcomp, and of what is applied, N·m or N."""
     body, axis = m.jnt_bodyid[joint], d.xaxis[joint]
     hinge = m.jnt_type[joint] == mjx.JointType.HINGE
-    arm = d.subtree_com[body] - d.xanchor[joint]
-    along = jnp.where(hinge[:, None], jnp.cross(axis, arm), axis)
-    weight: Array = m.body_subtreemass[body] * (along @ m.opt.gravity)
-    return weight
+
+    def along(force: Array, point: Array) -> Any:
+        """Of forces at points, each for all joints or one for each; shape (joints, forces)."""
+        arm = point - d.xanchor[joint][:, None]
+        turned = jnp.where(hinge[:, None, None], jnp.cross(axis[:, None], arm), axis[:, None])
+        return (turned * force).sum(-1)
+
+    out: Array = d.qfrc_applied[dof] + d.qfrc_gravcomp[dof] * (1 - m.jnt_actgravcomp[joint])
+    if not m.opt.disableflags & mjx.DisableBit.GRAVITY:
+        out = out + m.body_subtreemass[body] * along(m.opt.gravity, d.subtree_com[body, None])[:, 0]
+    force, torque = d.xfrc_applied[:, :3], d.xfrc_applied[:, 3:]
+    applied = along(force, d.xipos) + hinge[:, None] * (axis @ torque.T)
+    return out + jnp.where(_carries(m, body), applied, 0).sum(1)
+
+
+def _carries(m: mjx.Model, body: Any) -> Any:
+    """Which bodies move with some, shape (some, bodies)."""
+    root = np.arange(m.nbody)
+    out = root == body[:, None]
+    for k in range(1, m.nbody):
+        out[:, k] |= out[:, m.body_parentid[k]]
+    return out
 
 
 def _loose(m: mjx.Model, d: mjx.Data, backlash: Backlash | None, count: int) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from joda.profile import Profile
 from joda.scenes.model import find_joint
 from joda.scenes.scene import damping_equality
 from joda.warp.law import Profiles, forget, launch
-from joda.warp.numbers import Number, Place, State
+from joda.warp.numbers import Number, Place, Row, State
 from joda.warp.table import make_curves, numbers_of
 
 INTEGRATORS = ("EULER", "IMPLICIT", "IMPLICITFAST")
@@ -115,6 +115,7 @@ def put_fields(
         place[Place.DOF] = model.jnt_dofadr[joint]
         place[Place.QPOS] = model.jnt_qposadr[joint]
         place[Place.BODY] = model.jnt_bodyid[joint]
+        place[Place.LAST_BODY] = _last_body(model, place[Place.BODY])
         place[Place.EQUALITY] = damping_equality(model, joint)
         place[Place.HINGE] = model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_HINGE)
     out = Profiles()
@@ -123,7 +124,7 @@ def put_fields(
     state = np.zeros((len(State), *shape), np.float32)
     state[State.TIME] = -1
     out.state = wp.array(state, dtype=float, device=device)
-    out.rows = wp.full(shape, -1, dtype=int, device=device)
+    out.rows = wp.full((len(Row), *shape), -1, dtype=int, device=device)
     out.places = wp.array(places, dtype=int, device=device)
     inertia = [model.dof_M0[model.jnt_dofadr[joint]] for joint in ids]
     out.inertia = wp.array(np.array(inertia, np.float32), dtype=float, device=device)
@@ -168,6 +169,14 @@ class _Acting:
         if d.nworld != self.fields.nworld:
             _check_fit(m, d, self.fields)
         launch(m, d, self.fields._profiles)
+
+
+def _last_body(model: mujoco.MjModel, body: int) -> int:
+    """The last of the bodies that move with a body: they follow it."""
+    last = int(body)
+    while last + 1 < model.nbody and model.body_parentid[last + 1] >= body:
+        last += 1
+    return last
 
 
 def _check_fit(m: Any, d: Any, fields: Fields) -> None:

@@ -13,7 +13,7 @@ import warp as wp
 
 from joda.warp import laws
 from joda.warp.curves import Curves, descent, value
-from joda.warp.numbers import Curve, Number, Place, State
+from joda.warp.numbers import Curve, Number, Place, Row, State
 
 NO_SPRING = wp.constant(int(mujoco.mjtDisableBit.mjDSBL_SPRING))
 NO_DAMPER = wp.constant(int(mujoco.mjtDisableBit.mjDSBL_DAMPER))
@@ -32,7 +32,7 @@ class Profiles:
         curves: of the variants; world w has variant w modulo their number.
         numbers: shape (numbers, worlds, joints), by `Number`.
         state: shape (states, worlds, joints), by `State`.
-        rows: friction's row in the last step, -1: none; shape (worlds, joints).
+        rows: of the last step, -1: none; shape (rows, worlds, joints), by `Row`.
         places: shape (joints, places), by `Place`.
         inertia: as MuJoCo's dof_M0, kg·m² or kg, shape (joints,).
     """
@@ -40,7 +40,7 @@ class Profiles:
     curves: Curves
     numbers: wp.array3d[float]
     state: wp.array3d[float]
-    rows: wp.array2d[int]
+    rows: wp.array3d[int]
     places: wp.array2d[int]
     inertia: wp.array[float]
 
@@ -129,6 +129,14 @@ def resist(profiles: Profiles, joint: Joint, v: float) -> wp.vec3:
 
 
 @wp.func
+def exerted(hinge: int, axis: wp.vec3, anchor: wp.vec3, force: wp.vec3, point: wp.vec3) -> float:
+    """What of a force at a point acts along a joint, N·m or N."""
+    if hinge != 0:
+        return wp.dot(wp.cross(axis, point - anchor), force)
+    return wp.dot(axis, force)
+
+
+@wp.func
 def implicit_stiffness(
     profiles: Profiles, joint: Joint, field: bool, h: float, v: float, force: float, inertia: float
 ) -> float:
@@ -158,22 +166,39 @@ def implicit_stiffness(
 
 
 @wp.func
+def force_of(profiles: Profiles, kind: int, w: int, j: int, forces: wp.array[float]) -> float:
+    """The force of a joint's row in the last step, 0 where there was none."""
+    row = profiles.rows[kind, w, j]
+    return wp.where(row >= 0, forces[wp.max(row, 0)], 0.0)
+
+
+@wp.func
 def remember(
-    profiles: Profiles, w: int, j: int, t: float, h: float, v: float, forces: wp.array[float]
+    profiles: Profiles,
+    w: int,
+    j: int,
+    t: float,
+    h: float,
+    v: float,
+    forces: wp.array[float],
+    constraint: float,
+    actuator: float,
 ):
     """Takes from the last step what the joint remembers, if one was taken; forgets if reset."""
     state = profiles.state
     seen = state[int(State.TIME), w, j]
     if seen < 0.0 or t < seen:
         state[int(State.FRICTION), w, j] = 0.0
+        state[int(State.UNKNOWN_LOAD), w, j] = 0.0
         state[int(State.GAP), w, j] = 0.0
         state[int(State.SPEED), w, j] = 0.0
     elif t > seen:
-        row = profiles.rows[w, j]
-        psi = float(0.0)
-        if row >= 0:
-            psi = forces[row]
+        psi = force_of(profiles, int(Row.FRICTION), w, j, forces)
+        damping = force_of(profiles, int(Row.DAMPING), w, j, forces)
+        limit = force_of(profiles, int(Row.LIMIT), w, j, forces)
+        own = psi + damping + state[int(State.STOP_SIDE), w, j] * limit
         state[int(State.FRICTION), w, j] = psi
+        state[int(State.UNKNOWN_LOAD), w, j] = constraint - own - actuator
         gap = float(state[int(State.NEXT_GAP), w, j])
         speed = float(state[int(State.NEXT_SPEED), w, j])
         if profiles.numbers[int(Number.BACKLASH_LOAD), w, j] > 0.0:
@@ -196,12 +221,18 @@ def act(
     jnt_range: wp.array2d[wp.vec2],
     dof_frictionloss: wp.array2d[float],
     dof_invweight0: wp.array2d[float],
+    jnt_actgravcomp: wp.array[int],
     # of the data
     time: wp.array[float],
     qpos: wp.array2d[float],
     qvel: wp.array2d[float],
     qacc_warmstart: wp.array2d[float],
     qfrc_applied: wp.array2d[float],
+    xfrc_applied: wp.array2d[wp.spatial_vector],
+    qfrc_gravcomp: wp.array2d[float],
+    qfrc_actuator: wp.array2d[float],
+    qfrc_constraint: wp.array2d[float],
+    xipos: wp.array2d[wp.vec3],
     xanchor: wp.array2d[wp.vec3],
     xaxis: wp.array2d[wp.vec3],
     subtree_com: wp.array2d[wp.vec3],
@@ -228,7 +259,8 @@ def act(
     h = timestep[w % timestep.shape[0]]
     q, v = qpos[w, profiles.places[j, int(Place.QPOS)]], qvel[w, dof]
     inertia = 1.0 / dof_invweight0[w % dof_invweight0.shape[0], dof]
-    remember(profiles, w, j, time[w], h, v, efc_force[w])
+    constraint, actuator = qfrc_constraint[w, dof], qfrc_actuator[w, dof]
+    remember(profiles, w, j, time[w], h, v, efc_force[w], constraint, actuator)
     held = profiles.state[int(State.FRICTION), w, j]
     gap, speed = profiles.state[int(State.GAP), w, j], profiles.state[int(State.SPEED), w, j]
 
@@ -243,12 +275,23 @@ def act(
 
     kinds, ids = efc_type[w], efc_id[w]
     ends = ne[w] + nf[w]
-    row = find_row(kinds, ids, ne[w], ends, profiles.rows[w, j], FRICTION, dof)
-    profiles.rows[w, j] = row
+    row = find_row(kinds, ids, ne[w], ends, profiles.rows[int(Row.FRICTION), w, j], FRICTION, dof)
     damping_row = int(-1)
     equality = profiles.places[j, int(Place.EQUALITY)]
     if equality >= 0:
         damping_row = find_row(kinds, ids, 0, ne[w], equality, EQUALITY, equality)
+    coefficient = n[int(Number.LOAD_DEPENDENT_FRICTION_COEFFICIENT), w, j]
+    low = n[int(Number.END_STOP_RESTITUTION_LOW), w, j]
+    high = n[int(Number.END_STOP_RESTITUTION_HIGH), w, j]
+    limits = jnt_range[w % jnt_range.shape[0], id]
+    side = wp.where(q - limits[0] < limits[1] - q, 1.0, -1.0)
+    stop = int(-1)
+    if coefficient > 0.0 or low >= 0.0 or high >= 0.0:
+        stop = find_row(kinds, ids, ends, ends + nl[w], -1, LIMIT, id)
+    profiles.rows[int(Row.FRICTION), w, j] = row
+    profiles.rows[int(Row.DAMPING), w, j] = damping_row
+    profiles.rows[int(Row.LIMIT), w, j] = stop
+    profiles.state[int(State.STOP_SIDE), w, j] = side
 
     sine, cosine = n[int(Number.GRAVITY_OFFSET_SIN), w, j], n[int(Number.GRAVITY_OFFSET_COS), w, j]
     spring = n[int(Number.GRAVITY_OFFSET_FORCE), w, j] + sine * wp.sin(q) + cosine * wp.cos(q)
@@ -270,18 +313,26 @@ def act(
         joint.friction += dof_frictionloss[w % dof_frictionloss.shape[0], dof]
 
     applied = qfrc_applied[w, dof]
-    if (disabled & NO_GRAVITY) == 0:
-        body = profiles.places[j, int(Place.BODY)]
-        direction = xaxis[w, id]
-        if profiles.places[j, int(Place.HINGE)] != 0:
-            direction = wp.cross(direction, subtree_com[w, body] - xanchor[w, id])
-        weight = body_subtreemass[w % body_subtreemass.shape[0], body]
-        joint.load = weight * wp.dot(direction, gravity[w % gravity.shape[0]])
-    joint.load += applied
+    load = n[int(Number.BACKLASH_LOAD), w, j]
+    external = float(applied)
+    if coefficient > 0.0 or load > 0.0:
+        body, hinge = profiles.places[j, int(Place.BODY)], profiles.places[j, int(Place.HINGE)]
+        axis, anchor = xaxis[w, id], xanchor[w, id]
+        if (disabled & NO_GRAVITY) == 0:
+            weight = body_subtreemass[w % body_subtreemass.shape[0], body]
+            pull = weight * gravity[w % gravity.shape[0]]
+            external += exerted(hinge, axis, anchor, pull, subtree_com[w, body])
+        if jnt_actgravcomp[id] == 0:  # else it is the actuator's
+            external += qfrc_gravcomp[w, dof]
+        for b in range(body, profiles.places[j, int(Place.LAST_BODY)] + 1):
+            push = xfrc_applied[w, b]
+            external += exerted(hinge, axis, anchor, wp.spatial_top(push), xipos[w, b])
+            if hinge != 0:
+                external += wp.dot(axis, wp.spatial_bottom(push))
+        joint.load = external + profiles.state[int(State.UNKNOWN_LOAD), w, j]
 
     own = resist(profiles, joint, v)
     play = n[int(Number.BACKLASH_PLAY), w, j]
-    load = n[int(Number.BACKLASH_LOAD), w, j]
     passage = laws.alone()
     force = float(0.0)
     if load > 0.0:
@@ -291,7 +342,7 @@ def act(
             n[int(Number.BACKLASH_SHARE), w, j],
             h,
             profiles.inertia[j],
-            spring + joint.load,
+            spring + external,
             v,
             own,
             h * stiffness,
@@ -299,7 +350,7 @@ def act(
             gap,
             speed,
         )
-        force = passage.force + (passage.scale - 1.0) * joint.load
+        force = passage.force + (passage.scale - 1.0) * external
         spring *= passage.scale
         stiffness *= passage.scale
         profiles.state[int(State.NEXT_SIDE), w, j] = passage.side
@@ -348,20 +399,13 @@ def act(
         profiles.state[int(State.NEXT_SPEED), w, j] = pushed[2]
     qfrc_passive[w, dof] += spring + force
 
-    low = n[int(Number.END_STOP_RESTITUTION_LOW), w, j]
-    high = n[int(Number.END_STOP_RESTITUTION_HIGH), w, j]
-    if low >= 0.0 or high >= 0.0:
-        stop = find_row(kinds, ids, ends, ends + nl[w], -1, LIMIT, id)
-        limits = jnt_range[w % jnt_range.shape[0], id]
-        side = wp.where(q - limits[0] < limits[1] - q, 1.0, -1.0)
-        damping = wp.where(side > 0.0, low, high)
-        if stop >= 0 and damping >= 0.0:
-            depth = efc_pos[w, stop] - efc_margin[w, stop]
-            efc_D[w, stop] = laws.STOP_IMPEDANCE / (1.0 - laws.STOP_IMPEDANCE) * inertia
-            efc_aref[w, stop] = (
-                -damping / (laws.STOP_IMPEDANCE * h) * side * v
-                - laws.STOP_STIFFNESS / (h * h) * depth
-            )
+    damping = wp.where(side > 0.0, low, high)
+    if stop >= 0 and damping >= 0.0:
+        depth = efc_pos[w, stop] - efc_margin[w, stop]
+        efc_D[w, stop] = laws.STOP_IMPEDANCE / (1.0 - laws.STOP_IMPEDANCE) * inertia
+        efc_aref[w, stop] = (
+            -damping / (laws.STOP_IMPEDANCE * h) * side * v - laws.STOP_STIFFNESS / (h * h) * depth
+        )
 
 
 @wp.kernel(enable_backward=False)
@@ -377,16 +421,21 @@ def launch(m: Any, d: Any, profiles: Profiles) -> None:
     efc = d.efc
     wp.launch(
         act,
-        dim=profiles.rows.shape,
+        dim=profiles.rows.shape[1:],
         inputs=[
             *(m.opt.disableflags, m.opt.timestep, m.opt.gravity, m.body_subtreemass),
-            *(m.jnt_range, m.dof_frictionloss, m.dof_invweight0),
+            *(m.jnt_range, m.dof_frictionloss, m.dof_invweight0, m.jnt_actgravcomp),
             *(
                 d.time,
                 d.qpos,
                 d.qvel,
                 d.qacc_warmstart,
                 d.qfrc_applied,
+                d.xfrc_applied,
+                d.qfrc_gravcomp,
+                d.qfrc_actuator,
+                d.qfrc_constraint,
+                d.xipos,
                 d.xanchor,
                 d.xaxis,
                 d.subtree_com,

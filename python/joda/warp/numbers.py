@@ -69,6 +69,19 @@ class State(IntEnum):
     NEXT_GAP = 5
     NEXT_SPEED = 6
     """and the handle's numbers after it, or the load's gap before it and its speed by itself."""
+    UNKNOWN_LOAD = 7
+    """Of the load that friction depends on, what no step knows before its solver has run: that of
+    the last step, N·m or N."""
+    STOP_SIDE = 8
+    """In the step being computed: 1 where the low end of the range is near, -1 the high one."""
+
+
+class Row(IntEnum):
+    """Place of a constraint's row among those of a joint."""
+
+    FRICTION = 0
+    DAMPING = 1
+    LIMIT = 2
 
 
 class Place(IntEnum):
@@ -78,5 +91,7 @@ class Place(IntEnum):
     DOF = 1
     QPOS = 2
     BODY = 3
-    EQUALITY = 4
-    HINGE = 5
+    LAST_BODY = 4
+    """Of those that move with it, which follow one another."""
+    EQUALITY = 5
+    HINGE = 6
