@@ -27,9 +27,12 @@ from joda.propose import anthropic as proposer
 from joda.propose import batch as batches
 from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.prompt import MAX_TOKENS
+from joda.propose.service import Credentials
 
 MODEL = "claude-sonnet-5-5"
 MODELS = Path(__file__).parents[1] / "models"
+
+HERE = Path(__file__).parent
 
 
 @pytest.fixture
@@ -302,6 +305,25 @@ def test_tokens_survive_an_interruption_after_them(server, monkeypatch):
     assert stopped.value.usage.input_tokens == 1000
 
 
+def test_content_that_is_no_block_is_passed_over(server):
+    odd = reply()
+    odd["content"] = ["a text", None, *odd["content"]]
+    assert ask(server, odd).proposal == proposed()
+
+
+@pytest.mark.parametrize("key", ["sk-a/b.c_0123", 'sk-"quoted"-0123', "sk-back\\slash-0123"])
+def test_a_key_is_hidden_however_it_is_escaped(monkeypatch, key):
+    monkeypatch.setenv("ANTHROPIC_API_KEY", key)
+    hide = Credentials("ANTHROPIC", None).hide
+    plain = json.dumps({"said": f"é {key} \\u0041 \n"})
+    every = "".join(f"\\u{ord(letter):04x}" for letter in key)
+    forms = [plain, plain.replace("/", "\\/"), plain.replace(json.dumps(key)[1:-1], every)]
+    for text in forms:
+        assert json.loads(text)["said"].count(key) == 1
+        assert json.loads(hide(text)) == {"said": "é [secret] \\u0041 \n"}
+    assert hide(f"no JSON: {key}") == "no JSON: [secret]"
+
+
 def test_another_service_is_a_sentence(server):
     assert "does not answer as the Messages API does" in str(fails(server, "page"))
 
@@ -489,7 +511,7 @@ def test_a_request_is_the_same_bytes_in_another_process(server, tmp_path):
     """By its bytes a batch's request is known again: the pictures in it are drawn anew."""
     code = """
 import sys
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = sys.argv[1:]
 from test_prompts import answers, task, turn
 from joda.propose.anthropic import Anthropic, _key
 asked = Anthropic("claude-sonnet-5-5").request(task("oven"), [turn("oven")])
@@ -500,7 +522,7 @@ print(_key("oven", asked))
     )
     here = proposer._key("oven", Anthropic(MODEL).request(task("oven"), [turn("oven")]))
     run = subprocess.run(
-        [sys.executable, "-c", code, str(Path(__file__).parent)],
+        [sys.executable, "-c", code, str(HERE), str(HERE / "helpers")],
         capture_output=True,
         text=True,
         cwd=tmp_path,

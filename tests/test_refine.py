@@ -230,6 +230,32 @@ class TestThePapersDoor:
         assert content(door.folder) == before
 
 
+@pytest.mark.parametrize(
+    ("files", "says"),
+    [
+        (("still.csv", "--force"), "still.csv: The runs visit only 0 % of the joint's range."),
+        (
+            ("run0.csv", "--check", "run0.csv", "--force"),
+            "run0.csv: is fitted too; what is held out",
+        ),
+        (("run0.csv", "--check", "better.xml", "--force"), "better.xml: is read here"),
+    ],
+)
+def test_what_cannot_be_fitted_or_held_out_is_a_sentence(files, says, tmp_path):
+    found = context(write(tmp_path, CABINET), "door")
+    profile = cabinet_profile(found, 2.5, 0.4)
+    attach(tmp_path / "in.xml", profile, tmp_path / "scene.xml")
+    recorded(tmp_path, released(found, profile, (0.8,), np.random.default_rng(0)), "run")
+    rows = "".join(f"{0.01 * k:g},0.4\n" for k in range(200))
+    write(tmp_path, "time,position\n" + rows, "still.csv")
+    (tmp_path / "better.xml").write_bytes((tmp_path / "run0.csv").read_bytes())
+    before = content(tmp_path)
+    done = command(tmp_path, *files)
+    assert (done.returncode, done.stdout) == (2, "") and done.stderr.count("\n") == 1
+    assert says in " ".join(done.stderr.split())
+    assert content(tmp_path) == before
+
+
 @pytest.mark.long
 def test_inertia_and_bounce_are_found_and_end_in_the_joints_attributes(tmp_path):
     rng = np.random.default_rng(0)
