@@ -254,7 +254,7 @@ def test_only_some_episodes_and_only_one_joint(arm, tmp_path):
     assert not run.forced and run.velocity is None and run.unread == ()
     assert "only if the actuator was off" in made.notes[-1]
     assert "becomes ctrl:elbow_flex" in made.unused[-1].why
-    sentence("no episode 7", log, arm, tmp_path / "no", episodes=[0, 7], units=units)
+    sentence(": no episode 7", log, arm, tmp_path / "no", episodes=[0, 7], units=units)
     with pytest.raises(JodaError, match=r"exists already; choose another name or add --force"):
         import_log(log, arm, tmp_path / "runs", units=units)
     assert len(list((tmp_path / "runs").iterdir())) == 1
@@ -521,6 +521,21 @@ def test_what_is_no_bag_or_has_no_joints(arm, tmp_path):
     (good / "metadata.yaml").write_text("rosbag2_bagfile_information: [1")
     sentence("cannot be read as a ROS bag", good, arm, tmp_path / "runs")
     sentence("neither a LeRobot dataset", tmp_path, arm, tmp_path / "runs")
+    for name, joints, numbers, match in (
+        (
+            "twice",
+            ["rail", "rail"],
+            [0.1, 0.2],
+            "message 0: has a joint twice among 'rail', 'rail'",
+        ),
+        ("short", ["rail", "Gripper"], [0.1], "position has 1 numbers for 2 joints"),
+        ("nobody", [], [], ": its messages name no joints"),
+    ):
+        message = joint_state(types, 0.0, joints, numbers)
+        rows = [("/joint_states", JOINTS, 0.0, message)]
+        bag = write_bag(tmp_path / name, StoragePlugin.MCAP, types, rows)
+        sentence(match, bag, arm, tmp_path / "runs")
+    sentence(": no topic '/none'; it has", bag, arm, tmp_path / "runs", topics=["/none"])
     sentence("no such file or folder", tmp_path / "none", arm, tmp_path / "runs")
 
 
@@ -675,8 +690,10 @@ WRONG = [
     ("time,position:elbow_flex\n0,1\n", {"zeros": ["c=1e400"]}, "must be a number"),
     ("time,position:rail\n0,1\n", {"units": ["position:rail=deg"]}, "no unit of a slide"),
     ("time,position:elbow_flex\n0,1\n", {"without": ["c"]}, "no column 'c'"),
-    ("time,position:elbow_flex\n0,1\n", {"episodes": [1]}, "--episode is of LeRobot datasets"),
+    ("time,position:elbow_flex\n0,1\n", {"episodes": [1]}, "LeRobot datasets; leave it out"),
     ("time,position:elbow_flex\n0,1\n", {"topics": ["/x"]}, "--topic is of ROS bags"),
+    ("time,position:elbow_flex\n0,0.1\n,0.2\n", {}, "is empty; give each row its time"),
+    ("time,b\n0,1\n", {"columns": ["position:Gripper=b"], "joint": "rail"}, "of joint 'rail'"),
     ("time,a,b\n0,1,2\n", {"columns": ["position:rail=a", "position:elbow_flex=a"]}, "already"),
 ]  # fmt: skip
 
@@ -698,9 +715,9 @@ BROKEN_INFO = [
     ({"features": {"action": {}}}, "features has no 'observation.state'"),
     ({"features": {"observation.state": {"shape": [3], "names": [1, 2, 3]}}}, "a list of names"),
     ({"features": {"observation.state": {"shape": [2], "names": NAMES}}}, "3 names and the shape"),
-    ({"features": {"observation.state": {"shape": [3], "names": ["a", "a", "b"]}}}, "'a' twice"),
+    ({"features": {"observation.state": {"shape": [2], "names": ["a", "a"]}}}, ".names has 'a' twice"),
     ({"features": {"observation.state": {"shape": [10**30], "names": None}}}, "list of names"),
-    ({"features": {"observation.state": {"shape": [3], "names": NAMES, "units": 3}}}, "units must"),
+    ({"features": {"observation.state": {"shape": [3], "names": NAMES, "units": 3}}}, "must be a unit"),
     ({"features": {"observation.state": {"shape": [3], "names": NAMES, "units": "x"}}}, "no unit"),
 ]  # fmt: skip
 
@@ -739,18 +756,32 @@ def test_broken_parquet_files_are_one_sentence(arm, tmp_path):
         "short": (table.slice(0, 2), "a run needs at least 4"),
         "huge": (episode(0, q * 1e30, u), "too large to be meant"),
         "still": (changed(table, "timestamp", pa.array(np.zeros(20))), "frame 1: time does not"),
-        "null": (changed(table, "episode_index", pa.nulls(20, pa.int64())), "row 0: episode_index"),
+        "late": (changed(table, "timestamp", pa.array([np.nan] * 20)), ": its time is no number"),
+        "null": (changed(table, "episode_index", pa.nulls(20, pa.int64())), "no number of one"),
     }  # fmt: skip
     for name, (broken, match) in cases.items():
         log = dataset(tmp_path / name, "v3.0", [broken])
         told = sentence(match, log, arm, tmp_path / "runs", units=units)
         assert str(log) in told
+    log = dataset(tmp_path / "void", "v3.0", [episode(0, np.full_like(q, np.nan), u)])
+    sentence(r"column '.*' has no numbers\.", log, arm, tmp_path / "runs")
+    void = q.copy()
+    void[:, 1] = np.nan
+    log = dataset(tmp_path / "half", "v3.0", [table, episode(1, void, u)])
+    sentence("elbow_flex.pos has no numbers there", log, arm, tmp_path / "runs", units=units)
+    both = {"units": units, "columns": ["velocity:elbow_flex=elbow_flex.pos"]}
+    sentence("may be .*; give the whole name", log, arm, tmp_path / "runs", **both)
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(JodaError, match=": is a file; give a folder for the runs"):
+        import_log(log, arm, tmp_path / "taken", units=units)
     log = dataset(tmp_path / "cut", "v2.1", [table])
     (file,) = (log / "data" / "chunk-000").iterdir()
     file.write_bytes(file.read_bytes()[:-50])
     sentence("cannot be read as Parquet", log, arm, tmp_path / "runs", units=units)
     file.unlink()
-    sentence("no file data/chunk", log, arm, tmp_path / "runs", units=units)
+    sentence(
+        r"no file data/chunk.*; is the dataset whole\?", log, arm, tmp_path / "runs", units=units
+    )
     log = dataset(tmp_path / "twice", "v2.1", [table, table])
     sentence("episode 0 is in .*episode_000000", log, arm, tmp_path / "runs", units=units)
 

@@ -381,7 +381,7 @@ def test_friction_without_a_row_is_refused():
 
 def test_noslip_is_refused():
     model = scene(option='noslip_iterations="3"')
-    with pytest.raises(joda.JodaError, match="noslip"):
+    with pytest.raises(joda.JodaError, match="MJX has no noslip solver"):
         joda.mjx.put_fields(model, {})
 
 

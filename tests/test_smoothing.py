@@ -148,4 +148,4 @@ def test_the_noise_of_a_noisy_and_quantised_position_that_mostly_rests(step, her
     runs = [(t, np.round((moves + rng.normal(0, SIGMA, len(t))) / quantum) * quantum)]
     runs.append((t, np.zeros(len(t))))
     true = np.hypot(SIGMA, quantum / 12**0.5)
-    assert 0.75 * true < pooled_noise(runs) < 1.7 * true
+    assert 0.7 * true < pooled_noise(runs) < 2 * true  # of 50 samples that move

@@ -8,10 +8,12 @@ import shutil
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 from PIL import Image
 
 import joda
 from joda.measured import runs
+from joda.measured.reading import read_measured
 
 MODELS = Path(__file__).parents[2] / "models"
 
@@ -65,6 +67,10 @@ def fill(folder: Path) -> None:
     (folder / "run.csv").write_text(RUN)
     (folder / "run2.csv").write_text(RUN.replace("0.5", "0.51"))
     (folder / "curve.csv").write_text(re.sub("^[^,]*,", "", RUN, flags=re.MULTILINE))
+    (curve,) = read_measured(folder / "scene.xml", "door", [folder / "curve.csv"]).curves
+    pairs = zip(curve.curve.position, 1.2 * np.nan_to_num(curve.force), strict=True)
+    rows = "".join(f"{position:.5f},{force:.4f}\n" for position, force in pairs)
+    (folder / "curve.csv").write_text("position,force\n" + rows)
     (folder / "robot.csv").write_text("time,arm_pan\n0,0\n1,0.5\n")
     effect = {
         "effect": "constant_damping_hinge", "interval": [0, 1], "probability": 0.9,

@@ -4,15 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import usable, windows_for
-from joda.measured.curves import TOO_LOUD, too_loud
+from joda.measured.curves import FEW, TOO_LOUD, too_loud
 from joda.measured.gauge import Gauged
 from joda.measured.reading import Measured
 from joda.measured.slow import one_way, ways
 
 WINDOWS, MOVES = 4, 8.0
 """Fewest windows with motion that tell anything; and what is motion, in noises."""
-SAMPLES = 15
-"""Fewest samples of curves that do."""
 VISITED = 0.02
 """Least part of the range that must be visited."""
 
@@ -47,7 +45,7 @@ def too_little(measured: Measured) -> str:
     windows = windows_for(measured)
     if not measured.runs:
         told = len(windows.position)
-        return f"{told} samples are too few; record {SAMPLES}." if told < SAMPLES else ""
+        return f"{told} samples are too few; record {FEW}." if told < FEW else ""
     own = [windows.position[row[row >= 0]] for row in windows.rows[usable(windows)]]
     moving = sum(bool(np.ptp(position) > MOVES * max(measured.sigma)) for position in own)
     if moving < WINDOWS:

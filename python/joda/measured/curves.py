@@ -24,6 +24,8 @@ LOUD, ALONE = 0.15, 0.05
 place was measured both ways, so that it may be the joint's own."""
 WILD = 6.0
 """Error of a single sample, in units of the noise, that no noise makes."""
+FEW = 15
+"""Fewest samples of a curve that give one."""
 TOO_LOUD = (
     "what the force does from sample to sample is much of all that it does, whether that is noise "
     "or the joint's own; measure each place on the way there and on the way back, or at places "
@@ -129,7 +131,8 @@ def curves_verdict(curves: Sequence[Gauged], failing: Sequence[FailingForce]) ->
     beyond = failing or any(significant(row) or row[:, 2].max() > WILD**2 for row in rows)
     if beyond or any(_pattern(curve) < CHANCE for curve in curves):
         return "beyond_noise"
-    return "not_enough_data" if any(map(too_loud, curves)) else "within_noise"
+    few = any(len(curve.excess) < FEW for curve in curves)
+    return "not_enough_data" if few or any(map(too_loud, curves)) else "within_noise"
 
 
 def too_loud(curve: Gauged) -> bool:
@@ -173,7 +176,8 @@ def told(
             "show no fault of the model that is larger."
         )
     elif verdict == "not_enough_data":
-        out.append(f"Not enough to tell whether the model is right: {TOO_LOUD}")
+        why = f"a curve has fewer than {FEW} samples, or {TOO_LOUD}"
+        out.append(f"Not enough to tell whether the model is right: {why}")
     elif not failing:
         out.append(
             "Small, but not noise: the force's error is larger than noise makes it, or its signs "
