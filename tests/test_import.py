@@ -693,7 +693,8 @@ WRONG = [
     ("time,position:elbow_flex\n0,1\n", {"episodes": [1]}, "LeRobot datasets; leave it out"),
     ("time,position:elbow_flex\n0,1\n", {"topics": ["/x"]}, "--topic is of ROS bags"),
     ("time,position:elbow_flex\n0,0.1\n,0.2\n", {}, "is empty; give each row its time"),
-    ("time,b\n0,1\n", {"columns": ["position:Gripper=b"], "joint": "rail"}, "of joint 'rail'"),
+    ("time,b\n0,1\n", {"columns": ["position:Gripper=b"], "joint": "rail"},
+     "is not of joint 'rail', which --joint names"),
     ("time,a,b\n0,1,2\n", {"columns": ["position:rail=a", "position:elbow_flex=a"]}, "already"),
 ]  # fmt: skip
 
@@ -715,9 +716,11 @@ BROKEN_INFO = [
     ({"features": {"action": {}}}, "features has no 'observation.state'"),
     ({"features": {"observation.state": {"shape": [3], "names": [1, 2, 3]}}}, "a list of names"),
     ({"features": {"observation.state": {"shape": [2], "names": NAMES}}}, "3 names and the shape"),
-    ({"features": {"observation.state": {"shape": [2], "names": ["a", "a"]}}}, ".names has 'a' twice"),
+    ({"features": {"observation.state": {"shape": [2], "names": ["a", "a"]}}},
+     r"\.names has 'a' twice"),
     ({"features": {"observation.state": {"shape": [10**30], "names": None}}}, "list of names"),
-    ({"features": {"observation.state": {"shape": [3], "names": NAMES, "units": 3}}}, "must be a unit"),
+    ({"features": {"observation.state": {"shape": [3], "names": NAMES, "units": 3}}},
+     " must be a unit, or a list"),
     ({"features": {"observation.state": {"shape": [3], "names": NAMES, "units": "x"}}}, "no unit"),
 ]  # fmt: skip
 
