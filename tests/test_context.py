@@ -149,6 +149,7 @@ def test_the_closed_end_may_be_the_high_one(tmp_path):
     assert context(path, "lid").closed_end == "high_end"
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", NAMES)
 def test_every_joint_of_other_peoples_scenes_has_a_context(name):
     path = asset(name)

@@ -69,6 +69,7 @@ def my_door(tmp_path_factory):
 
 
 @pytest.mark.long
+@pytest.mark.long("my_door")
 def test_the_tutorial_finds_the_closer_and_mends_the_model(my_door):
     _, told = my_door
     assert masked("".join(blocks("my_door.md", "text"))) <= masked("\n".join(told))
@@ -78,6 +79,7 @@ def test_the_tutorial_finds_the_closer_and_mends_the_model(my_door):
     assert "All windows of 0.4 s are missed by less than 3 times the noise" in told[-1]
 
 
+@pytest.mark.long("my_door")
 def test_a_log_of_mujoco_becomes_a_run(my_door):
     folder, _ = my_door
     write_files("howto/logs.md", folder)
@@ -122,6 +124,7 @@ def test_a_ros_bag_becomes_a_run(tmp_path):
     assert done.force == pytest.approx(0.1 * at, abs=1e-9)
 
 
+@pytest.mark.long("my_door")
 def test_templates_effects_and_proposers_of_ones_own(my_door):
     folder, _ = my_door
     for page in ("templates", "effect", "proposer"):
@@ -180,6 +183,7 @@ def test_steps_in_mjx(tmp_path):
     assert float(told.strip("[]")) == pytest.approx(data.qpos[0], 1e-3)
 
 
+@pytest.mark.long("my_door")
 def test_a_host_in_cpp(my_door):
     folder, _ = my_door
     (folder / "cpp").symlink_to(ROOT / "cpp")

@@ -145,6 +145,7 @@ COUNTED = {"microwave": 0, "cabinet": 0, "table": 0, "kitchen": 9, "drawer": 0, 
 """Joints of other people's scenes with a doubt: knobs of armature, lamps and burners of air."""
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", NAMES)
 def test_other_people_s_scenes_are_seldom_doubted(name):
     path = asset(name)

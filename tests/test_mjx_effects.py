@@ -227,6 +227,7 @@ def test_end_stops_among_other_rows_are_the_plugins():
     np.testing.assert_allclose(found, path, rtol=0, atol=1e-7)
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize("kind", JOINTS.values())
 def test_driven_joints_that_touch_others_have_the_load_of_the_plugins(kind):
     """A servo, contacts, a stop, a coupled joint, a tendon, a weight that is partly compensated."""
