@@ -1,7 +1,7 @@
 """What the numbers that decide a diagnosis should be, judged on families that they were not set on.
 
     python tests/benchmarks hidden families --family all --cases 2 --out rows.jsonl    (hours)
-    python tests/benchmarks calibrate rows.jsonl                                  (a minute)
+    python tests/benchmarks calibrate rows.jsonl                                     (seconds)
 
 Of each family in turn: `joda.diagnosis.weighing.Settings` are fitted to the other families' cases
 (coordinate descent on the mean log loss of "nothing", "none of these" and every effect) and judged
