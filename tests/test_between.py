@@ -1,7 +1,8 @@
-"""Fits between the jumps of a force: against planted profiles, and the same joint in JAX."""
+"""Fits between the jumps of a force: against planted profiles, and the same joint in MuJoCo."""
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from refine_table import MODELS, NOISE, STEP, cabinet_profile, errors, planted, quiet_rig
@@ -105,25 +106,31 @@ def test_it_does_not_take_more_iterations_than_it_may(iterations):
     assert 0 < len(heard) <= iterations
 
 
-def test_every_kind_of_number_does_what_it_does_in_jax():
-    jax_solo = pytest.importorskip("joda.joints.solo")
-    import jax.numpy as jnp
-
+def test_every_kind_of_number_does_what_it_does_in_mujoco():
     found = context(MODELS + "/cabinet.xml", "door")
     profile = cabinet_profile(found, 2.5, 0.4)
     parameters = Parameters(profile, KINDS)
-    first = jax_solo.from_context(found, profile, quiet_rig(found, profile), 0)
-    joint = Between(single.of_solo(first), parameters, [], 1e-3, STEP)
+    joint = Between(
+        single.single(found, profile, quiet_rig(found, profile), 0), parameters, [], 1e-3, STEP
+    )
     theta = parameters.start + 0.05 * np.random.default_rng(0).uniform(size=len(parameters.start))
     force = 8 * np.sin(6 * STEP * np.arange(600))
     start = np.array([[0.3, 0.5]])
-    begin = np.zeros(1, int), start, np.array([True])
-    path = joint.solo(theta).replay(force, *begin, STEP)[1]
-    other = jax_solo.changed(first, parameters.slots, jnp.array(theta * parameters.scales))
-    state = jax_solo.State(*jnp.array([*start[0], 0.0]))
-    np.testing.assert_allclose(
-        path, jax_solo.rollout(other, state, jnp.array(force), STEP)[1:], atol=1e-5
+    path = joint.solo(theta).replay(force, np.zeros(1, int), start, np.array([True]), STEP)[1]
+    body = joint.body(theta)
+    model = quiet_rig(
+        single.weighing(found.model_copy(update={"equivalent_inertia": body.inertia}), body),
+        parameters.written(theta, exact=True),
     )
+    model.opt.timestep, model.jnt_solref[0] = STEP, body.solref
+    data = mujoco.MjData(model)
+    data.qpos[0], data.qvel[0] = start[0]
+    wanted = []
+    for push in force:
+        data.qfrc_applied[0] = push
+        mujoco.mj_step(model, data)
+        wanted.append(data.qpos[0])
+    np.testing.assert_allclose(path, wanted, atol=1e-5)
     assert np.ptp(path) > 0.5
 
 

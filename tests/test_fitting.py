@@ -4,12 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from refine_table import STEP, cabinet, planted, problem_of, recovery
-
-from joda.refining.stretches import cut
+from refine_table import cabinet, planted, problem_of, recovery
 
 
-@pytest.mark.sweep(0)  # the command does the same in test_refine.py
 @pytest.mark.parametrize("seed", range(3))
 def test_nine_iterations_bring_the_papers_door_down_to_the_noise(seed):
     found, start, train, held_out = cabinet(seed)
@@ -48,11 +45,11 @@ def test_an_interruption_keeps_the_best_so_far():
 
 
 def test_where_the_force_is_not_known_nothing_is_asked():
-    _, _, train, _ = cabinet(0)
+    found, start, train, _ = cabinet(0)
     force = train[0].force.copy()
     force[100:150] = np.nan
     gap = replace(train[0], force=force, forced=True)
-    data = cut([gap], STEP, 1e-3, None)
-    assert data.real.sum() == 401 - 50
-    assert len(data.start) == 2
-    assert np.all(np.isfinite(data.batch.force))
+    problem = problem_of(found, start, [gap])
+    assert [len(time) for time, _ in problem.runs] == [100, 251]
+    assert all(np.isfinite(path).all() for path in problem.paths(problem.parameters.start))
+    assert problem.whole.windows.fresh.sum() == 2

@@ -12,16 +12,16 @@ import mujoco
 import numpy as np
 import pytest
 import test_load as driven
+from effect_cases import cases, profile_of, pushes
 from mujoco import mjx
 from slopes import FAST, check_slopes
-from test_solo_effects import BEHIND, STOPS, cases, profile_of, pushes, run
 
 import joda
 
 jax.config.update("jax_enable_x64", True)
 import joda.mjx  # noqa: E402
-from joda.field.jaxeffects import NAMES, from_effects  # noqa: E402
-from joda.joints import solo  # noqa: E402
+from joda.field.jaxeffects import NAMES  # noqa: E402
+from joda.joints.single import single  # noqa: E402
 from joda.profile import Channels  # noqa: E402
 from joda.scenes.scene import profiles_of  # noqa: E402
 
@@ -154,11 +154,12 @@ def check_alone(scene, forces, found):
     """The joints by themselves move as they do in the scene."""
     for k, name in enumerate(JOINTS):
         place, profile = scene.fields[name].place, scene.profiles[name]
-        joint = solo.from_context(scene.found[name], profile, scene.model, place.joint)
-        joint = replace(joint, effects=from_effects(profile.effects, NAMES))
-        start = (jnp.array(x) for x in (LOW[k] + 0.4 * SPANS[k], 0.0, 0.0))
-        path = run(joint, solo.State(*start), jnp.array(forces[:, k]), H)
-        assert np.abs(path.q - found[:, k]).max() < 2e-8 * SPANS[k]
+        bare = scene.found[name]
+        own = single(bare, profile, scene.model, place.joint)
+        solo = replace(own, inertia=bare.equivalent_inertia).solo(profile, H)
+        start = np.array([[LOW[k] + 0.4 * SPANS[k], 0.0]])
+        path = solo.replay(forces[:, k], np.zeros(1, int), start, np.array([True]), H)[1]
+        assert np.abs(path - found[:, k]).max() < 2e-8 * SPANS[k]
 
 
 @pytest.mark.long
@@ -277,21 +278,44 @@ def test_the_example_of_the_docs(folder):
 # --- derivatives
 
 
+STOPS = ("end_stop_restitution.low[]", "end_stop_restitution.high[]")
+"""Numbers of joints that do not come to their ends."""
+HANDLE, LOAD = ("backlash.handle[]",), ("backlash.load[]", "backlash.share[]")
+"""Numbers of a handle and of a load behind a play, which do not go together."""
+T = H * np.arange(250)
+SWING = np.stack([3.6 * np.sin(2 * np.pi * T) + 0.18, 4.5 * np.sin(2 * np.pi * T / 0.6)], 1)
+PUSH = np.repeat(np.array([-4.0, 4.0, 4.0, -4.0]), 60)[:, None] * list(FORCES.values())
+STEADY = np.full((60, 2), 0.6) * list(FORCES.values())
+
+
 @pytest.mark.sweep(1, "derivatives of mjx")
-def test_derivatives_by_all_numbers_are_those_of_central_differences(folder):
-    """Of the hinge; `test_solo_effects.py` has those of a slide."""
-    scene = Scene(folder, "all")
+@pytest.mark.parametrize(
+    ("case", "number", "forces", "place", "skip"),
+    [
+        ("all", 0, SWING, 0.02, (*STOPS, *LOAD)),
+        ("backlash behind", 1, STEADY, 0.1, (*HANDLE, "backlash.play[]")),
+        ("end_stop_restitution each", 0, PUSH, 0.3, ()),
+        ("end_stop_restitution each", 1, PUSH, 0.3, ()),
+    ],
+)
+def test_derivatives_by_all_numbers_are_those_of_central_differences(
+    folder, case, number, forces, place, skip
+):
+    scene, name = Scene(folder, case), list(JOINTS)[number]
     scene.model.opt.tolerance = 1e-30
-    m, d, t = mjx.put_model(scene.model), scene.start(0.02), H * np.arange(250)
-    swing = np.stack([3.6 * np.sin(2 * np.pi * t) + 0.18, 4.5 * np.sin(2 * np.pi * t / 0.6)], 1)
+    m, d = mjx.put_model(scene.model), scene.start(place)
+    fields = joda.mjx.put_fields(scene.model, scene.profiles)
 
     def positions(effects):
-        fields = scene.fields | {"arm": scene.fields["arm"].replace(effects=effects)}
-        return joda.mjx.rollout(m, d, fields, jnp.array(swing), read=lambda d: d.qpos[0])[1]
+        own = fields | {name: fields[name].replace(effects=effects)}
+        return joda.mjx.rollout(m, d, own, jnp.array(forces), read=lambda d: d.qpos[number])[1]
 
-    path = check_slopes(positions, scene.fields["arm"].effects, skip=(*STOPS, *BEHIND))
-    path = (path - LOW[0]) / SPANS[0]
-    assert path.min() > 0 and path.max() < 1 and np.ptp(path) > 0.8
+    path = check_slopes(positions, fields[name].effects, skip=skip)
+    path = (path - LOW[number]) / SPANS[number]
+    if case == "all":
+        assert path.min() > 0 and path.max() < 1
+    if case != "backlash behind":
+        assert np.ptp(path) > 0.8
 
 
 # --- state

@@ -3,14 +3,13 @@
 import mujoco
 import numpy as np
 import pytest
-from test_solo import MODELS, profile_for, quiet
-from test_solo_effects import KINDS, cases, found_of, profile_of, pushes
+from effect_cases import KINDS, MODELS, cases, found_of, profile_for, profile_of, pushes, quiet
 
 from joda import context, templates
 from joda._core import Solo
 from joda.effects import Backlash, PreslidingFriction
 from joda.joints.rig import gravity_factors
-from joda.joints.solo import ONLY_SLIDES
+from joda.joints.single import ONLY_SLIDES
 from joda.profile import ATTRIBUTES
 
 PLAIN = ("", "sum", "0 1 | 0 1 | 1 1", "sum", "0 1 | 0 1 | 0.1 0.1", "sum", "")

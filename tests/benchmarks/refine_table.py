@@ -10,16 +10,18 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import jax
 import mujoco
 import numpy as np
 
 from joda import context, templates
 from joda.component import Component
 from joda.field import evaluate
+from joda.joints.parameters import Parameters, gravity_scale
 from joda.joints.rig import rig
+from joda.joints.single import single
 from joda.measured.runs import Run
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
+from joda.refining.fitting import Problem
 from joda.scenes.context import Context
 from joda.scenes.motion import Motion, release
 
@@ -91,13 +93,9 @@ def cabinet(seed: int):
 
 def problem_of(found: Context, start: Profile, runs, kinds=("values", "intervals")):
     """The fit of a profile to runs."""
-    from joda.joints import solo
-    from joda.joints.parameters import Parameters, gravity_scale
-    from joda.refining.fitting import Problem
-
-    first = solo.from_context(found, start, quiet_rig(found, start), 0)
+    joint = single(found, start, quiet_rig(found, start), 0)
     parameters = Parameters(start, kinds, gravity=gravity_scale(found, start))
-    return Problem(first, parameters, runs, STEP)
+    return Problem(joint, parameters, runs, STEP)
 
 
 # --- planted profiles
@@ -261,7 +259,6 @@ def planted_table(seeds: int = 20, *names: str) -> None:
     print("RMS and largest error over the visited range, % of the channel's peak; seconds")
     rms = []
     for name in names or sorted(templates()):
-        jax.clear_caches()  # what is compiled for one template is of no use to the next
         for seed in range(int(seeds)):
             begun = time.time()
             off = recovery(planted(name, seed))

@@ -16,7 +16,7 @@ Finite differences and mujoco.sysid also fit from the true starts. Ours fits the
 does for any runs. The others know only boxes: that a rising part of a curve keeps rising is not
 asked of them.
 mujoco.sysid with native parameters begins with a bare joint, not with the profile: its loss before
-is another one. Seconds of the first row include JAX's compilation, which the next rows reuse.
+is another one.
 """
 
 import logging
@@ -113,10 +113,10 @@ def boxes(parameters: Parameters) -> tuple[Array, Array]:
 
 
 # --- ours, and finite differences
-def ours(case: Case, method: str, iterations: int) -> Fitted:
-    """Gradients through the joint in JAX."""
+def ours(case: Case, iterations: int) -> Fitted:
+    """Windows, their starts fitted too, with the joint in C++."""
     problem = problem_of(case.found, case.start, case.train)
-    fit = problem.fit(iterations, method)
+    fit = problem.fit(iterations)
     return len(fit.history), case.model(fit.theta)
 
 
@@ -220,11 +220,8 @@ def row(case: Case, way: str, fit: Callable[[Case], Fitted], first: mujoco.MjMod
 
 
 WAYS = {
-    "ours, LM": partial(ours, method="lm", iterations=9),
-    "ours, LM, once more (compiled)": partial(ours, method="lm", iterations=9),
-    "ours, LM, to its end": partial(ours, method="lm", iterations=MANY),
-    "ours, Adam": partial(ours, method="adam", iterations=9),
-    "ours, Adam, longer": partial(ours, method="adam", iterations=MANY),
+    "ours": partial(ours, iterations=9),
+    "ours, to its end": partial(ours, iterations=MANY),
     "finite differences": partial(differences, iterations=9),
     "finite differences, to their end": partial(differences, iterations=MANY),
     "mujoco.sysid, our profile": partial(plugged, optimiser="mujoco"),

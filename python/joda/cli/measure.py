@@ -1,11 +1,9 @@
 """Commands that measure: profiles against measured motions, and what they cost."""
 
-import os
-import warnings
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -21,7 +19,6 @@ from joda.cli.tell import (
     with_text_paths,
 )
 from joda.errors import JodaError
-from joda.files import cache_folder
 
 
 def refine(
@@ -35,9 +32,6 @@ def refine(
         list[Path] | None, typer.Option(help="A run that is only compared, not fitted.")
     ] = None,
     iterations: Annotated[int, typer.Option(min=1, help="At most so many.")] = 60,
-    method: Annotated[
-        Literal["lm", "adam"], typer.Option(help="Levenberg-Marquardt or Adam.")
-    ] = "lm",
     fit: Annotated[
         str,
         typer.Option(
@@ -64,12 +58,9 @@ def refine(
     from joda import Profile
     from joda import refine as run
 
-    # what JAX compiles takes longer than the fit itself, so it is kept for the next call
-    warnings.filterwarnings("ignore", "Error .* persistent compilation cache")  # a full disk
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache_folder() / "jax"))
     with loss_bar() as bar:
         result = run(
-            model, joint, runs, output, check=check or (), iterations=iterations, method=method,
+            model, joint, runs, output, check=check or (), iterations=iterations,
             fit=[name.strip() for name in fit.split(",") if name.strip()],  # type: ignore[misc]
             keep_shape=not free_shape, finer=finer, passive=passive, force=force,
             progress=bar,

@@ -24,7 +24,7 @@ from joda.plugin import PLUGIN, plugin_path
 
 State = Literal["ok", "missing", "broken"]
 
-EXTRAS = {"mjx": ("jax", "mujoco.mjx", "optax"), "vlm": ("anthropic", "openai")}
+EXTRAS = {"mjx": ("jax", "mujoco.mjx"), "vlm": ("anthropic", "openai")}
 """What each extra lets one import."""
 LIBRARIES = "numpy", "scipy", "pydantic", "matplotlib", "PIL", "rich", "typer"
 RENDERERS = {

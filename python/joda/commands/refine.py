@@ -1,9 +1,8 @@
-"""Gradient refinement: bends a joint's profile until simulation matches measured motions."""
+"""Refinement: bends a joint's profile until simulation matches measured motions."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
 
 import mujoco
 import numpy as np
@@ -19,22 +18,22 @@ from joda.files import check_targets, write_together
 from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
 from joda.measured.driven import read_logs
 from joda.measured.excerpts import excerpts
+from joda.measured.gauge import compared
 from joda.measured.obstructed import clear_of_contacts
-from joda.measured.reading import checked, taken
+from joda.measured.reading import Measured, checked, taken
 from joda.measured.runs import QuasiStatic, Run
 from joda.pictures.changes import changes
 from joda.pictures.style import png
+from joda.profile import Profile
 from joda.refining.acceptance import refused
 from joda.refining.curvefit import CurveProblem
+from joda.refining.fitting import Problem
 from joda.refining.refinement import history, picture, unseen
 from joda.scenes.attaching import attached
 from joda.scenes.context import Context, context
 from joda.scenes.model import find_joint, joint_name, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
-
-if TYPE_CHECKING:
-    from joda.refining.fitting import Problem
 
 Array = NDArray[np.float64]
 
@@ -83,7 +82,6 @@ def refine(
     *,
     check: Sequence[str | Path] = (),
     iterations: int = ITERATIONS,
-    method: Literal["lm", "adam"] = "lm",
     fit: Collection[Kind] = ("values", "intervals"),
     keep_shape: bool = True,
     finer: int = 0,
@@ -94,9 +92,9 @@ def refine(
     """Fits a joint's profile to measured motions.
 
     The joint is simulated by itself, all others held, at the scene's timestep, exactly as MuJoCo
-    with the plugin does, and differentiated. Control points keep their sign, and rising and falling
-    parts of a curve keep rising and falling, so that a magnet stays a magnet. What the data do not
-    see stays near its value before.
+    with the plugin does; its sensitivities are differences. Control points keep their sign, and
+    rising and falling parts of a curve keep rising and falling, so that a magnet stays a magnet.
+    What the data do not see stays near its value before.
 
     Args:
         model: a scene (MJCF) whose joint carries a profile.
@@ -107,7 +105,6 @@ def refine(
         check: such files that are held out of the fit: where they are missed by more after it,
             nothing is written.
         iterations: at most so many.
-        method: Levenberg-Marquardt, or Adam as in the paper.
         fit: what may change: the control points' values, the intervals' ends, the channels'
             strengths, the damping_ratio of the ends of the range, inertia, a gravity offset.
         keep_shape: see above.
@@ -121,14 +118,15 @@ def refine(
         what was written, and how much better it is.
 
     Raises:
-        JodaError: a file cannot be read or written, the joint carries no profile, JAX is missing;
-            or what was fitted is no better, or exerts forces that nothing in the runs needs.
+        JodaError: a file cannot be read or written, the joint carries no profile, a curve may be
+            in another unit; or what was fitted is no better, or exerts forces that nothing in the
+            runs needs.
     """
     source, target = Path(model), Path(output)
-    beside = {
+    others = {
         kind: target.with_suffix(f".{kind}") for kind in ("composed.json", "png", "history.json")
     }
-    check_targets([target, *beside.values()], force, [*runs, *check])
+    check_targets([target, *others.values()], force, [*runs, *check])
     if twice := _both(runs, check):
         raise JodaError(f"{twice}: is fitted too; what is held out (--check) must not be.")
     if unknown := set(fit) - set(KINDS):
@@ -167,39 +165,44 @@ def refine(
     if not len(parameters.start):
         raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
     at_first = taken(compiled, number, found, whole, replace(clear, measured=[*parts, *still]))
-    problem = _problem(found, compiled, number, parameters, parts if timed else clear.measured)
     if why := hardly_moved(at_first):
         raise JodaError(f"{', '.join(one.name for one in clear.measured)}: {why}")
-    result = problem.fit(
-        iterations, method, lambda stage, k, rms: progress(stage, k, iterations, rms)
+    if times := at_first.doubtful_unit:
+        raise JodaError(f"{target}: not written, as {compared(times)}: see to its unit first.")
+
+    def all_of(profile: Profile) -> Profile:
+        return whole_profile(compiled, number, profile)
+
+    problem: Problem | CurveProblem = (
+        Problem(at_first.single, parameters, parts, at_first.timestep, all_of)
+        if timed
+        else CurveProblem(found, all_of, parameters, still)
     )
+    result = problem.fit(iterations, lambda stage, k, rms: progress(stage, k, iterations, rms))
     after = parameters.written(result.theta)
-    mended = whole_profile(compiled, number, after)
-    held = taken(compiled, number, found, whole, other) if other else None
-    if set(fit) <= set(STILL):
-        errors = error(at_first), error(at_first, mended)
-        apart = (error(held), error(held, mended)) if held else None
-    else:  # what MuJoCo replays is not only the profile that has changed
-        unseen_runs = (
-            _problem(found, compiled, number, parameters, other.measured) if other else None
-        )
-        errors, apart = _errors(problem, result.theta), None
-        apart = _errors(unseen_runs, result.theta) if unseen_runs else None
+    mended = all_of(after)
+    body = problem.body(result.theta) if set(fit) - set(STILL) else None
+
+    def beside(one: Measured) -> tuple[Error, Error]:
+        return error(one), error(one.changed(mended, single=body))
+
+    errors = beside(at_first)
+    apart = beside(taken(compiled, number, found, whole, other)) if other else None
     if reason := refused(errors, apart, problem.sigma, (whole, mended), Needs(at_first)):
         noted = "".join(f" {note}" for note in clear.notes)
         raise JodaError(f"{target}: not written, as {reason}.{noted}")
     hidden = unseen(begin, parameters, result.covariance)
     also, besides = _beyond(parameters, result.theta, compiled, number, found)
-    scene, said = attached(source, after, target, joint=name, also=also)
+    scene, said = attached(source, after, target, joint=name, native="keep", also=also)
     notes += [*said, *besides, *problem.notes]
     balance = np.array(found.positions), -np.array(found.gravity_force)
     figure = picture(before, after, balance, problem, result, hidden)
     write_together(
         {
             target: scene,
-            beside["composed.json"]: after.to_json(),
-            beside["png"]: png(figure),
-            beside["history.json"]: history(
+            others["composed.json"]: after.to_json(),
+            others["png"]: png(figure),
+            others["history.json"]: history(
                 result, _told(errors), problem.sigma, _told(apart) if apart else None, hidden
             ),
         }
@@ -214,9 +217,9 @@ def refine(
         notes.append(f"Interrupted; the best of {len(result.history)} iterations was kept.")
     return Refined(
         scene=target,
-        composed=beside["composed.json"],
-        picture=beside["png"],
-        history=beside["history.json"],
+        composed=others["composed.json"],
+        picture=others["png"],
+        history=others["history.json"],
         changes=tuple(changes(before, after)),
         before=_told(errors)[0],
         after=_told(errors)[1],
@@ -235,14 +238,6 @@ def _both(runs: Sequence[str | Path], check: Sequence[str | Path]) -> str | None
     return next((str(run) for run in check if Path(run).resolve() in fitted), None)
 
 
-def _errors(problem: "Problem | CurveProblem", theta: Array) -> tuple[Error, Error]:
-    """Errors of the problem's own replays, before and after."""
-    first, windows = problem.parameters.start, problem.windows(theta)
-    if windows is None:
-        return Error(None, problem.rms(first)), Error(None, problem.rms(theta))
-    return Error(problem.rms(first), windows[0]), Error(problem.rms(theta), windows[1])
-
-
 def _told(errors: tuple[Error, Error]) -> tuple[float, float]:
     """Of whole runs before and after; of curves, of the force."""
     before, after = (one.window if one.whole is None else one.whole for one in errors)
@@ -258,29 +253,6 @@ def _of_one_kind(measured: Sequence[Run | QuasiStatic]) -> bool:
             "other."
         )
     return bool(curves)
-
-
-def _problem(
-    found: Context,
-    model: mujoco.MjModel,
-    joint: int,
-    parameters: Parameters,
-    measured: Sequence[Run | QuasiStatic],
-) -> "Problem | CurveProblem":
-    """What is to be fitted; raises JodaError if that takes JAX and it is missing."""
-    curves = [one for one in measured if isinstance(one, QuasiStatic)]
-    if curves:
-        return CurveProblem(found, model, joint, parameters, curves)
-    try:
-        from joda.joints import solo
-        from joda.refining.fitting import Problem
-    except ImportError as error:
-        raise JodaError(
-            f'refine needs JAX (no module {error.name}); run: pip install ".[mjx]"'
-        ) from None
-    first = solo.from_context(found, parameters.profile, model, joint, attached=True)
-    runs = [one for one in measured if isinstance(one, Run)]
-    return Problem(first, parameters, runs, float(model.opt.timestep))
 
 
 def _beyond(

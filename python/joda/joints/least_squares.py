@@ -1,4 +1,4 @@
-"""Least squares under linear inequalities: Levenberg-Marquardt, and Adam for comparison."""
+"""Least squares under linear inequalities: Levenberg-Marquardt."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,8 +13,6 @@ DAMPING = 1e-3
 """First damping, in units of the diagonal of the normal equations."""
 TRIALS = 8
 """Shorter and shorter steps that an iteration tries."""
-RATE = 0.05
-"""Adam's learning rate."""
 SETTLED = 1e-6
 """Relative decrease of the cost below which there is no more to gain."""
 
@@ -122,34 +120,3 @@ def levenberg_marquardt(
         if before - cost <= SETTLED * before:
             break
     return theta
-
-
-def adam(
-    residuals: Residuals,
-    jacobian: Residuals,
-    start: Array,
-    constraints: Inequalities,
-    iterations: int,
-    told: Callable[[int, Array, float], None] = lambda number, theta, cost: None,
-) -> Array:
-    """As `levenberg_marquardt`, by optax's Adam on the mean of the squares.
-
-    Each iterate is put back to the nearest point that satisfies the constraints.
-    """
-    import optax
-
-    optimiser = optax.adam(RATE)
-    state = optimiser.init(start)
-    theta, best, least = start, start, np.inf
-    for number in range(1, iterations + 1):
-        r, J = residuals(theta), jacobian(theta)
-        cost = 0.5 * float(r @ r)
-        if cost < least:
-            best, least = theta, cost
-        update, state = optimiser.update(J.T @ r / len(r), state)
-        moved = np.asarray(update, float)
-        G, h = constraints.G, constraints.h
-        theta = theta + bounded_step(np.eye(len(theta)), moved, G, h - G @ theta)
-        told(number, theta, cost)
-    r = residuals(theta)
-    return theta if 0.5 * float(r @ r) < least else best

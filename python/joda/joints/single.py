@@ -1,9 +1,9 @@
 """One joint of a model by itself in C++: its profile is given each time, all else is fixed."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import mujoco
+import numpy as np
 
 from joda._core import Solo
 from joda.effects import EndStopRestitution
@@ -11,9 +11,6 @@ from joda.joints.rig import gravity_factors
 from joda.profile import CHANNELS, Profile
 from joda.scenes.context import Context
 from joda.scenes.limits import limit_parameters
-
-if TYPE_CHECKING:
-    from joda.joints import solo
 
 ONLY_SLIDES = 2
 """In `mjModel.body_simple`."""
@@ -89,14 +86,9 @@ def single(context: Context, profile: Profile, model: mujoco.MjModel, joint: int
     )
 
 
-def of_solo(joint: "solo.Solo") -> Single:
-    """The same joint as one in JAX, without its profile."""
-    first, second = map(float, joint.gravity)
-    return Single(
-        inertia=float(joint.inertia),
-        row_inertia=0.0 if joint.seen is None else float(joint.seen),
-        weight=(first, second),
-        hinge=joint.hinge,
-        solref=tuple(map(float, joint.solref)),
-        solimp=tuple(map(float, joint.solimp)),
-    )
+def weighing(context: Context, own: Single) -> Context:
+    """The context where gravity pulls as on this joint."""
+    a, b = own.weight
+    q = np.array(context.positions)
+    force = a * np.cos(q) + b * np.sin(q) if own.hinge else np.full(len(q), a)
+    return context.model_copy(update={"gravity_force": tuple(map(float, force))})

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
-from joda.joints.single import Single, single
+from joda.joints.single import Single, single, weighing
 from joda.measured import smoothing
 from joda.measured.driven import read_logs
 from joda.measured.gauge import Gauged, gauged
@@ -70,22 +70,29 @@ class Measured:
     barred: str
 
     def changed(
-        self, profile: Profile | None = None, runs: Sequence[int] | None = None
+        self,
+        profile: Profile | None = None,
+        runs: Sequence[int] | None = None,
+        single: Single | None = None,
     ) -> "Measured":
-        """The same joint with another profile, or with some of its runs only."""
+        """The same joint with another profile, another body, or with some of its runs only."""
         numbers = range(len(self.runs)) if runs is None else runs
         new = self.profile if profile is None else profile
+        own = single or self.single
+        found = self.context if single is None else weighing(self.context, single)
         return replace(
             self,
+            context=found,
             profile=new,
+            single=own,
             replayer=self.replayer
-            if profile is None
-            else Replayer(self.context, new, self.single, self.timestep),
+            if profile is None and single is None
+            else Replayer(found, new, own, self.timestep),
             runs=tuple(self.runs[k] for k in numbers),
             sigma=tuple(self.sigma[k] for k in numbers),
             curves=self.curves
             if profile is None
-            else tuple(curve.against(new, self.context) for curve in self.curves),
+            else tuple(curve.against(new, found) for curve in self.curves),
         )
 
     @property

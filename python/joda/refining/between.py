@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from joda._core import Solo
 from joda.diagnosis.cutting import windows_of
-from joda.diagnosis.judge import Fit, Judge, Unknowns
+from joda.diagnosis.judge import Fit as Found
+from joda.diagnosis.judge import Judge, Unknowns
 from joda.diagnosis.windows import Windows
 from joda.field import evaluate
 from joda.joints.parameters import Parameters
 from joda.joints.single import Single
 from joda.measured.runs import Run
-from joda.profile import CHANNELS
+from joda.profile import CHANNELS, Profile
 
 Array = NDArray[np.float64]
 Told = Callable[[Array, float], None]
@@ -54,11 +55,18 @@ class Between:
     """A joint, what of its profile may change, and its measured runs."""
 
     def __init__(
-        self, single: Single, parameters: Parameters, runs: Sequence[Run], sigma: float, h: float
+        self,
+        single: Single,
+        parameters: Parameters,
+        runs: Sequence[Run],
+        sigma: float,
+        h: float,
+        whole: Callable[[Profile], Profile] = lambda profile: profile,
     ) -> None:
-        """Args: the joint; what may change; runs; their noise, rad or m; timestep, s."""
+        """Args: the joint; what may change; runs; their noise, rad or m; timestep, s; what makes
+        all that acts on the joint of its profile."""
         self.single, self.parameters, self.runs = single, parameters, runs
-        self.sigma, self.h = sigma, h
+        self.sigma, self.h, self.whole = sigma, h, whole
         self._cut: dict[float, Windows] = {}
 
     def fit(self, theta: Array, iterations: int, told: Told) -> Array:
@@ -83,8 +91,8 @@ class Between:
         usual = least / max(int(judge.windows.count[judge.counts].sum()), 1)
         return loss > least + CHANCE * len(theta) * max(usual, 1.0)
 
-    def solo(self, theta: Array) -> Solo:
-        """The joint with its numbers."""
+    def body(self, theta: Array) -> Single:
+        """All of the joint but its profile, with its numbers."""
         slots, scales = self.parameters.slots, self.parameters.scales
         by_slot: dict[tuple[str, int], float] = {
             (s.kind, s.index): x for s, x in zip(slots, theta * scales, strict=True)
@@ -94,38 +102,85 @@ class Between:
             return float(by_slot.get((kind, index), 0.0))
 
         old = self.single
-        changed = replace(
+        return replace(
             old,
             inertia=old.inertia * float(np.exp(of("inertia"))),
             weight=(old.weight[0] + of("gravity"), old.weight[1] + of("gravity", 1)),
             solref=(old.solref[0], old.solref[1] * float(np.exp(of("damping_ratio")))),
         )
-        profile = self.parameters.written(theta, exact=True)
+
+    def solo(self, theta: Array) -> Solo:
+        """The joint with its numbers."""
+        profile = self.whole(self.parameters.written(theta, exact=True))
         # a restitution of both ends is in the solver parameters already
         kept = tuple(e for e in profile.effects if e.key != "end_stop_restitution both")
-        return changed.solo(profile.model_copy(update={"effects": kept}), self.h)
+        return self.body(theta).solo(profile.model_copy(update={"effects": kept}), self.h)
+
+    def judge(self, length: float) -> Judge:
+        """Of windows of some length, s."""
+        windows = self._windows(length)
+        return Judge(windows, windows.count >= LEAST, apart=True)
+
+    def fit_windows(
+        self,
+        judge: Judge,
+        theta: Array,
+        doubt: Array,
+        iterations: int,
+        told: Told,
+        held: Array | None = None,
+    ) -> Array:
+        """Gauss-Newton over windows and their starts, shape (n,).
+
+        Args:
+            judge: of the windows.
+            theta: where to begin, shape (n,).
+            doubt: standard deviations before any data, shape (n,).
+            iterations: at most so many.
+            told: see `Told`.
+            held: about which values; None: those at first.
+        """
+        mean = self.parameters.start if held is None else held
+        unknowns = self._unknowns(mean, doubt)
+        start = judge.started(self.solo(theta)).start
+
+        def heard(fit: Found) -> None:
+            told(fit.x, self._rms(judge, fit))
+
+        return judge.fit(self.solo, unknowns, theta, start, iterations, told=heard).x
+
+    def covariance(self, judge: Judge, theta: Array) -> Array:
+        """Of the numbers' errors, from windows and the prior, shape (n, n)."""
+        doubt = self.parameters.doubt
+        unknowns = self._unknowns(self.parameters.start, doubt)
+        start = judge.started(self.solo(theta)).start
+        H = judge.linear(self.solo, unknowns, theta, start, bend=np.inf).normal()[0]
+        return np.asarray(np.linalg.inv(H + np.diag(doubt**-2.0)))
+
+    def rms(self, judge: Judge, theta: Array) -> float:
+        """RMS misfit of windows, from starts that are fitted, rad or m."""
+        rows = judge.windows.rows[judge.counts]
+        return float(np.sqrt(np.mean(self.misfit(judge, theta)[rows[rows >= 0]] ** 2)))
+
+    def misfit(self, judge: Judge, theta: Array) -> Array:
+        """Predicted minus measured positions, from starts that are fitted, rad or m, shape (n,)."""
+        solo = self.solo(theta)
+        return judge.windows.misfit(solo, judge.started(solo).start)
+
+    def _unknowns(self, mean: Array, doubt: Array) -> Unknowns:
+        n = len(mean)
+        bounds = np.full(n, -np.inf), np.full(n, np.inf)
+        return Unknowns(*bounds, np.full(n, NUDGE), mean, doubt, self.parameters.constraints)
 
     def _smooth(self, theta: Array, iterations: int, told: Told) -> Array:
         """Gauss-Newton over windows between the jumps, which are held."""
         judge = self._clear(theta)
         if not judge.counts.any():
             return theta
-        parameters, n = self.parameters, len(theta)
-        held = np.isin(np.arange(n), self._ends(theta))
-        unknowns = Unknowns(
-            np.full(n, -np.inf),
-            np.full(n, np.inf),
-            np.full(n, NUDGE),
-            np.where(held, theta, parameters.start),
-            np.where(held, HELD, 1.0) * parameters.doubt,
-            parameters.constraints,
-        )
-
-        def heard(fit: Fit) -> None:
-            told(fit.x, self._rms(judge, fit))
-
-        start = judge.started(self.solo(theta)).start
-        return judge.fit(self.solo, unknowns, theta, start, iterations, told=heard).x
+        held = np.isin(np.arange(len(theta)), self._ends(theta))
+        mean = np.where(held, theta, self.parameters.start)
+        doubt = np.where(held, HELD, 1.0) * self.parameters.doubt
+        return self.fit_windows(judge, theta, doubt, iterations, told, mean)
 
     def _moved(self, theta: Array, move: float, told: Told) -> Array:
         """Each jump in turn where short windows over it are missed least, in steps of one size."""
@@ -196,7 +251,7 @@ class Between:
         off = (theta - self.parameters.start) / self.parameters.doubt
         return judge.started(self.solo(theta)).loss + float(off @ off)
 
-    def _rms(self, judge: Judge, fit: Fit) -> float:
+    def _rms(self, judge: Judge, fit: Found) -> float:
         """RMS misfit of windows that count, rad or m."""
         count = int(judge.windows.count[judge.counts].sum())
         return self.sigma * float(np.sqrt(fit.squares[judge.counts].sum() / max(count, 1)))

@@ -5,19 +5,16 @@ Nothing is simulated: Levenberg-Marquardt on the model's force, with the prior o
 """
 
 from collections.abc import Callable, Sequence
-from typing import Literal
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.joints.least_squares import Fit, adam, levenberg_marquardt
+from joda.joints.least_squares import Fit, levenberg_marquardt
 from joda.joints.parameters import Parameters
 from joda.measured.gauge import gauged, static_force
 from joda.measured.runs import QuasiStatic
 from joda.profile import Profile
 from joda.scenes.context import Context
-from joda.scenes.native import whole_profile
 
 Array = NDArray[np.float64]
 
@@ -44,13 +41,13 @@ class CurveProblem:
     def __init__(
         self,
         found: Context,
-        model: mujoco.MjModel,
-        number: int,
+        whole: Callable[[Profile], Profile],
         parameters: Parameters,
         curves: Sequence[QuasiStatic],
     ) -> None:
-        """Args: the joint, compiled too, and its id; what may change; measured curves."""
-        self._found, self._model, self._number = found, model, number
+        """Args: the joint; what makes all that acts on it of its profile; what may change; curves
+        that were measured."""
+        self._found, self._all_of = found, whole
         self.parameters = parameters
         joint = found.joint
         force = "force (N·m)" if joint.type == "hinge" else "force (N)"
@@ -65,8 +62,7 @@ class CurveProblem:
         self._weight /= np.sqrt(np.mean(self._weight**2))
 
     def _whole(self, theta: Array) -> Profile:
-        written = self.parameters.written(theta, exact=True)
-        return whole_profile(self._model, self._number, written)
+        return self._all_of(self.parameters.written(theta, exact=True))
 
     def paths(self, theta: Array) -> list[Array]:
         """The model's forces at the positions of `runs`, N·m or N."""
@@ -83,26 +79,22 @@ class CurveProblem:
         """RMS misfit over the way, N·m or N."""
         return float(np.sqrt(np.mean(self._misfit(theta) ** 2)))
 
-    def windows(self, theta: Array) -> tuple[float, float] | None:
-        """None: nothing moves."""
-        return None
+    def body(self, theta: Array) -> None:
+        """None: what moves is not in curves."""
 
     def fit(
         self,
         iterations: int,
-        method: Literal["lm", "adam"] = "lm",
         told: Callable[[str, int, float], None] = lambda stage, number, rms: None,
     ) -> Fit:
         """Fits all curves together.
 
         Args:
             iterations: at most so many.
-            method: Levenberg-Marquardt or Adam.
             told: after each, "curves", its number and the RMS misfit.
         """
         best = self.parameters.start
         history: list[tuple[str, float]] = []
-        minimise = levenberg_marquardt if method == "lm" else adam
         sigma = max(self.sigma, BELIEVED * self.rms(best))
         interrupted = False
 
@@ -113,7 +105,7 @@ class CurveProblem:
             told("curves", number, history[-1][1])
 
         try:
-            minimise(
+            levenberg_marquardt(
                 lambda theta: self._residuals(theta, sigma),
                 lambda theta: self._slopes(theta, sigma),
                 best,
