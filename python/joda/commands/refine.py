@@ -178,7 +178,9 @@ def refine(
         if timed
         else CurveProblem(found, all_of, parameters, still)
     )
+    was = problem.paths(parameters.start)
     result = problem.fit(iterations, lambda stage, k, rms: progress(stage, k, iterations, rms))
+    parameters = problem.parameters
     after = parameters.written(result.theta)
     mended = all_of(after)
     body = problem.body(result.theta) if set(fit) - set(STILL) else None
@@ -196,7 +198,8 @@ def refine(
     scene, said = attached(source, after, target, joint=name, native="keep", also=also)
     notes += [*said, *besides, *problem.notes]
     balance = np.array(found.positions), -np.array(found.gravity_force)
-    figure = picture(before, after, balance, problem, result, hidden)
+    paths = was, problem.paths(result.theta)
+    figure = picture(before, after, balance, problem, paths, hidden)
     write_together(
         {
             target: scene,

@@ -23,6 +23,8 @@ SOFT = (0.02, 1.0)
 """MuJoCo's own `solreflimit`: time constant (s) and damping ratio of the ends of a range."""
 BEYOND, STRAYS = 4.0, 3
 """So many noises outside its range a joint is beyond it; at most so many samples are by chance."""
+SLOWEST = 0.02
+"""Least speed that counts as a usual one, in ranges in the time of the longest run."""
 LEAST = 4
 """Fewest samples of a window that counts."""
 AT_END = 0.02
@@ -104,7 +106,9 @@ def units_of(windows: Windows, measured: Measured) -> Units:
     same = ~windows.fresh[1:]
     pace = np.diff(windows.at)[same] * windows.h
     acceleration = np.diff(velocity)[same] / pace
-    speed = float(np.sqrt(np.mean(velocity**2)))
+    longest = max((float(np.ptp(run.time)) for run in measured.runs), default=np.inf)
+    slowest = SLOWEST * float(np.ptp(profile.joint.range)) / longest
+    speed = max(float(np.sqrt(np.mean(velocity**2))), slowest)
     pushed = float(np.sqrt(np.mean(windows.force**2)))
     force = max(pushed, inertia * float(np.sqrt(np.mean(acceleration**2))) if len(pace) else 0.0)
     friction = max((max(c.y) for c in profile.channels.friction.components), default=0.0)

@@ -1,11 +1,12 @@
 """What of a joint a fit may change, as a vector, and what must stay true of it.
 
 Numbers are made comparable: a control point in units of its component's largest magnitude, an
-interval's end in normalised position, inertia and the damping ratio as logarithms.
+interval's end in normalised position, inertia, the damping ratio and sizes as logarithms.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -19,9 +20,12 @@ from joda.profile import CHANNELS, Profile, rounded
 from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
-Kind = Literal["values", "intervals", "strengths", "damping_ratio", "inertia", "gravity", "effects"]
-KINDS: tuple[Kind, ...] = tuple(kind for kind in get_args(Kind) if kind != "effects")
-"""What gradients fit; effects' numbers are fitted by differences (`joda.diagnosis.mending`)."""
+Kind = Literal[
+    "values", "intervals", "strengths", "damping_ratio", "inertia", "gravity", "effects", "sizes"
+]
+KINDS: tuple[Kind, ...] = get_args(Kind)[:-2]
+"""What `joda refine` fits; effects' numbers are fitted by `joda.diagnosis.mending`, components'
+sizes before all else."""
 
 NARROWEST = 0.005
 """Least width of an interval, in normalised position."""
@@ -40,6 +44,7 @@ DOUBT: dict[Kind, float] = {
     "inertia": 0.2,
     "gravity": 0.2,
     "effects": 0.5,
+    "sizes": 1.2,
 }
 """How far (one standard deviation) a number may be from its first value before any data."""
 
@@ -67,6 +72,8 @@ class Parameters:
     """The numbers of a profile that a fit may change.
 
     Attributes:
+        profile: to be changed.
+        kinds: of numbers that may change.
         slots: what each number is.
         start: the numbers as they are, shape (n,).
         scales: what one unit of each is in the profile, shape (n,).
@@ -97,6 +104,10 @@ class Parameters:
             inertia: of the joint, kg·m² or kg; what is beyond a play is part of it.
         """
         self.profile = profile
+        self.kinds = tuple(kinds)
+        self._made: Callable[[Profile, Collection[Kind]], Parameters] = partial(
+            Parameters, keep_shape=keep_shape, free=free, gravity=gravity, inertia=inertia
+        )
         slots: list[Slot] = []
         start: list[float] = []
         rows: list[tuple[dict[int, float], float]] = []
@@ -107,6 +118,9 @@ class Parameters:
                 slots.append(Slot("strengths", name))
                 start.append(1.0)
             for number, component in enumerate(components):
+                if "sizes" in kinds and any(component.y):
+                    slots.append(Slot("sizes", name, number))
+                    start.append(0.0)
                 if "values" in kinds:
                     kept = keep_shape and component.label != free
                     _values(name, number, component, kept, slots, start, rows)
@@ -136,6 +150,10 @@ class Parameters:
                 G[row, column] = factor
         self.constraints = Inequalities(G, np.array([least for _, least in rows]))
 
+    def about(self, profile: Profile, kinds: Collection[Kind] | None = None) -> "Parameters":
+        """The same numbers, or those of other kinds, of another profile of the same form."""
+        return self._made(profile, kinds or self.kinds)
+
     def written(self, theta: Array, *, exact: bool = False) -> Profile:
         """The profile with these numbers, to six digits unless `exact`."""
         content = self.profile.model_dump()
@@ -149,10 +167,13 @@ class Parameters:
                     effect["y"] = y
                 else:
                     effect[slot.key] = number
-            if slot.kind not in ("values", "intervals", "strengths"):
+            if slot.kind not in ("values", "intervals", "sizes"):
                 continue
             components = content["channels"][slot.channel]["components"]
-            if slot.kind == "values":
+            if slot.kind == "sizes":
+                own = components[slot.component]
+                own["y"] = [float(np.exp(value)) * y for y in own["y"]]
+            elif slot.kind == "values":
                 y = list(components[slot.component]["y"])
                 y[slot.index] = value
                 components[slot.component]["y"] = y

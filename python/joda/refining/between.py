@@ -116,6 +116,12 @@ class Between:
         kept = tuple(e for e in profile.effects if e.key != "end_stop_restitution both")
         return self.body(theta).solo(profile.model_copy(update={"effects": kept}), self.h)
 
+    def about(self, parameters: Parameters) -> "Between":
+        """The same joint and runs with other numbers."""
+        other = Between(self.single, parameters, self.runs, self.sigma, self.h, self.whole)
+        other._cut = self._cut
+        return other
+
     def judge(self, length: float) -> Judge:
         """Of windows of some length, s."""
         windows = self._windows(length)

@@ -1,20 +1,20 @@
 """Fits the numbers of a joint's profile to measured motions.
 
 First over short windows, each from its own measured start, so that errors do not pile up and the
-misfit stays smooth in the numbers; then over longer ones; then between the jumps of the force
-(`joda.refining.between`); then over windows that must join into whole runs (multiple shooting:
-Bock 1983). The starts are fitted too, within their measurement's error. What the motion does not
-show is held by a prior at its first value.
+misfit stays smooth in the numbers: the components' sizes, then all; then over longer ones; then
+between the jumps of the force (`joda.refining.between`); then over windows that must join into
+whole runs (multiple shooting: Bock 1983). The starts are fitted too, within their measurement's
+error. What the motion does not show is held by a prior at its first value, of the size found.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.judge import Judge
 from joda.joints.least_squares import Fit
-from joda.joints.parameters import Parameters
+from joda.joints.parameters import Kind, Parameters
 from joda.joints.single import Single
 from joda.measured import smoothing
 from joda.measured.runs import Run, known
@@ -34,6 +34,8 @@ FIRST = 6
 TURNS, SETTLED = 2, 0.98
 """How often at most short and long windows take turns, and the share of their misfit that must be
 left for the last turn."""
+SIZES: tuple[tuple[Kind, ...], ...] = (("sizes",), ("sizes", "intervals"))
+"""What is fitted before all else, one after the other."""
 FOLLOWS = 0.01
 """Whole runs that are missed by less than this, in ranges, need no windows any more."""
 BETWEEN = 12
@@ -48,7 +50,7 @@ class Problem:
     """A joint, its parameters and its measured runs.
 
     Attributes:
-        parameters: what may change.
+        parameters: what may change; after a fit, about the sizes that it found.
         sigma: noise of the position, rad or m.
         runs: measured times (s) and positions (rad or m), where the force is known.
         axes: what these are.
@@ -111,6 +113,7 @@ class Problem:
         history: list[tuple[str, float]] = []
         self._best = self.parameters.start
         interrupted = False
+        kinds = self.parameters.kinds
         free = self.parameters.doubt
         ends = np.array([slot.kind == "intervals" for slot in self.parameters.slots])
         held = np.where(ends, HELD * free, free)
@@ -139,7 +142,23 @@ class Problem:
                 self._best = before  # a run snapped to another side than it did
             return missed
 
+        def size(kinds: Collection[Kind]) -> None:
+            """Fits the components' sizes, about which all else is fitted then."""
+            other = self.between.about(self.parameters.about(self.parameters.profile, kinds))
+
+            def told_of(theta: Array, misfit: float) -> None:
+                profile = other.parameters.written(theta, exact=True)
+                self.parameters = self.parameters.about(profile)
+                self.between = self.between.about(self.parameters)
+                heard("sizes", self.parameters.start, misfit)
+
+            if count := min(FIRST, iterations // 4):
+                start, doubt = other.parameters.start, other.parameters.doubt
+                other.fit_windows(self.short, start, doubt, count, told_of)
+
         try:
+            for some in SIZES if "values" in kinds else ():
+                size([kind for kind in some if kind in kinds or kind == "sizes"])
             run("short windows, intervals held", self.short, min(FIRST, iterations // 3), held)
             follows = self.rms(self._best) < FOLLOWS * self.span
             if not follows:

@@ -28,30 +28,17 @@ GRID = np.linspace(0, 1, 201)
 
 
 class Fitted(Protocol):
-    """A joint's parameters and what they are fitted to.
+    """What a joint's parameters were fitted to.
 
     Attributes:
-        parameters: what may change.
-        sigma: noise of what was measured.
-        runs: of each, over what it was measured, and what was.
-        axes: what these two are, with their units.
+        axes: over what it was measured, and what was, with their units.
     """
 
-    parameters: Parameters
-    sigma: float
     axes: tuple[str, str]
 
     @property
     def runs(self) -> Sequence[tuple[Array, Array]]:
-        """See above."""
-        ...
-
-    def rms(self, theta: Array) -> float:
-        """RMS misfit."""
-        ...
-
-    def paths(self, theta: Array) -> list[Array]:
-        """What the model has instead of what was measured."""
+        """Of each, over what it was measured, and what was."""
         ...
 
 
@@ -123,10 +110,18 @@ def picture(
     after: Profile,
     gravity: tuple[Array, Array],
     problem: Fitted,
-    result: Fit,
+    paths: tuple[Sequence[Array], Sequence[Array]],
     hidden: dict[str, tuple[tuple[float, float], ...]],
 ) -> "Figure":
-    """Channels before and after, grey where the data told little; runs before and after."""
+    """Channels before and after, grey where the data told little; runs before and after.
+
+    Args:
+        before, after: the profile.
+        gravity: positions (rad or m) and the force that balances gravity there.
+        problem: what was fitted.
+        paths: what the model had, before and after, instead of what was measured.
+        hidden: see `unseen`.
+    """
     from matplotlib.figure import Figure
 
     runs = problem.runs[:RUNS]
@@ -144,9 +139,8 @@ def picture(
         panels[0].legend(frameon=False, fontsize=8, ncols=2)
         panels[-1].set_xlabel(f"joint position ({after.joint.unit})")
         plots = np.atleast_1d(right.subplots(len(runs), 1, sharex=True))
-        was, now = (problem.paths(theta) for theta in (problem.parameters.start, result.theta))
         over, what = problem.axes
-        for axes, (at, measured), old, new in zip(plots, runs, was, now, strict=False):
+        for axes, (at, measured), old, new in zip(plots, runs, *paths, strict=False):
             axes.plot(at, measured, ".", color="#444444", ms=2.5, label="measured")
             axes.plot(at, old, "--", color="#888888", lw=1.6, label="before")
             axes.plot(at, new, color=COLOURS["conservative"], lw=1.6, label="after")
