@@ -133,7 +133,7 @@ class Between:
         theta: Array,
         doubt: Array,
         iterations: int,
-        told: Told,
+        told: Told = lambda theta, misfit: None,
         held: Array | None = None,
     ) -> Array:
         """Gauss-Newton over windows and their starts, shape (n,).

@@ -7,19 +7,20 @@ whole runs (multiple shooting: Bock 1983). The starts are fitted too, within the
 error. What the motion does not show is held by a prior at its first value, of the size found.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.judge import Judge
 from joda.joints.least_squares import Fit
-from joda.joints.parameters import Kind, Parameters
+from joda.joints.parameters import Parameters
 from joda.joints.single import Single
 from joda.measured import smoothing
 from joda.measured.runs import Run, known
 from joda.profile import Profile
 from joda.refining.between import Between
+from joda.refining.sizes import sized
 
 Array = NDArray[np.float64]
 
@@ -34,8 +35,8 @@ FIRST = 6
 TURNS, SETTLED = 2, 0.98
 """How often at most short and long windows take turns, and the share of their misfit that must be
 left for the last turn."""
-SIZES: tuple[tuple[Kind, ...], ...] = (("sizes",), ("sizes", "intervals"))
-"""What is fitted before all else, one after the other."""
+MANY = 20
+"""Fewest iterations that are to be had for sizes to be fitted first."""
 FOLLOWS = 0.01
 """Whole runs that are missed by less than this, in ranges, need no windows any more."""
 BETWEEN = 12
@@ -107,13 +108,12 @@ class Problem:
         their misfit is left then, they are fitted between the jumps too.
 
         Args:
-            iterations: at most so many in all.
+            iterations: at most so many in all; of a fit of sizes each start counts as one.
             told: after each, the stage, its number and the stage's RMS misfit.
         """
         history: list[tuple[str, float]] = []
         self._best = self.parameters.start
         interrupted = False
-        kinds = self.parameters.kinds
         free = self.parameters.doubt
         ends = np.array([slot.kind == "intervals" for slot in self.parameters.slots])
         held = np.where(ends, HELD * free, free)
@@ -142,23 +142,17 @@ class Problem:
                 self._best = before  # a run snapped to another side than it did
             return missed
 
-        def size(kinds: Collection[Kind]) -> None:
-            """Fits the components' sizes, about which all else is fitted then."""
-            other = self.between.about(self.parameters.about(self.parameters.profile, kinds))
+        def size() -> None:
+            def better(parameters: Parameters, misfit: float) -> None:
+                self.parameters, self.between = parameters, self.between.about(parameters)
+                heard("sizes", parameters.start, misfit)
 
-            def told_of(theta: Array, misfit: float) -> None:
-                profile = other.parameters.written(theta, exact=True)
-                self.parameters = self.parameters.about(profile)
-                self.between = self.between.about(self.parameters)
-                heard("sizes", self.parameters.start, misfit)
-
-            if count := min(FIRST, iterations // 4):
-                start, doubt = other.parameters.start, other.parameters.doubt
-                other.fit_windows(self.short, start, doubt, count, told_of)
+            if iterations >= MANY:
+                sized(self.between, self.short, FIRST, better)
 
         try:
-            for some in SIZES if "values" in kinds else ():
-                size([kind for kind in some if kind in kinds or kind == "sizes"])
+            if "values" in self.parameters.kinds:
+                size()
             run("short windows, intervals held", self.short, min(FIRST, iterations // 3), held)
             follows = self.rms(self._best) < FOLLOWS * self.span
             if not follows:

@@ -1,0 +1,84 @@
+"""Fits how large each component of a profile is, and where, before its shape is fitted.
+
+A component that is five times too large, or off by a tenth of the range, leads a fit of its control
+points astray: they are held near where they were, in units of what the component was. Sizes are few
+and show in short windows; from several starts the fit finds them where one start would get stuck.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.diagnosis.judge import Judge
+from joda.joints.parameters import Kind, Parameters
+from joda.profile import Profile
+from joda.refining.between import Between
+
+Array = NDArray[np.float64]
+
+FREER = float(np.log(4))
+"""How much smaller, as a logarithm, friction and damping are at the second start."""
+BY = 0.06
+SHIFTS = ((0, 0), (BY, BY), (-BY, -BY), (-BY, BY), (BY, -BY))
+"""How far the lower and the upper ends of all intervals are moved at the starts, in normalised
+position."""
+EDGE = 0.001
+"""How near the ends of the range an end of an interval comes: one that is there stays there."""
+NOISE = 1.1
+"""Windows that are missed by less than so many times the noise leave nothing to look for."""
+
+
+def sized(
+    between: Between,
+    judge: Judge,
+    iterations: int,
+    told: Callable[[Parameters, float], None],
+) -> None:
+    """Fits sizes, then sizes and intervals together, each from several starts.
+
+    Args:
+        between: the joint and its runs; intervals are fitted if they are among its numbers.
+        judge: of short windows.
+        iterations: at most so many from each start.
+        told: after each start, the parameters about the best profile so far, and its RMS misfit in
+            those windows, rad or m.
+    """
+    parameters, found = between.parameters, between.parameters.profile
+    both: list[tuple[Kind, ...]] = [("sizes",)]
+    if any(slot.kind == "intervals" for slot in parameters.slots):
+        both.append(("sizes", "intervals"))
+    for kinds in both:
+        other = between.about(parameters.about(found, kinds))
+        least = np.inf
+        for start in _starts(other.parameters):
+            x = other.fit_windows(judge, start, other.parameters.doubt, iterations)
+            x = _inside(other.parameters, x)
+            loss = judge.started(other.solo(x)).loss
+            if loss < least:
+                least, found, misfit = loss, _written(other, x), other.rms(judge, x)
+            told(parameters.about(found), misfit)
+            if misfit < NOISE * between.sigma:
+                return
+
+
+def _starts(parameters: Parameters) -> Sequence[Array]:
+    """Where to begin: as it is, and with less resistance or with the intervals elsewhere."""
+    slots, must = parameters.slots, parameters.constraints
+    places = np.array([slot.kind == "intervals" for slot in slots])
+    upper = np.array([slot.index == 1 for slot in slots])
+    resists = np.array([slot.channel != "conservative" for slot in slots])
+    if not places.any():
+        return [parameters.start, parameters.start - FREER * resists]
+    moved = [parameters.start + places * np.where(upper, high, low) for low, high in SHIFTS]
+    inside = [_inside(parameters, start) for start in moved]
+    return [start for start in inside if np.all(must.G @ start >= must.h - 1e-9)]
+
+
+def _inside(parameters: Parameters, x: Array) -> Array:
+    places = np.array([slot.kind == "intervals" for slot in parameters.slots])
+    return np.where(places, np.clip(x, EDGE, 1 - EDGE), x)
+
+
+def _written(between: Between, x: Array) -> Profile:
+    return between.parameters.written(x, exact=True)
