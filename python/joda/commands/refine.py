@@ -184,6 +184,9 @@ def refine(
     after = parameters.written(result.theta)
     mended = all_of(after)
     body = problem.body(result.theta) if set(fit) - set(STILL) else None
+    if body:  # armature is all of the inertia that is written
+        bodies = found.equivalent_inertia - compiled.dof_armature[compiled.jnt_dofadr[number]]
+        body = replace(body, inertia=max(body.inertia, float(bodies)))
 
     def beside(one: Measured) -> tuple[Error, Error]:
         return error(one), error(one.changed(mended, single=body))
@@ -263,9 +266,8 @@ def _beyond(
 ) -> tuple[dict[str, str], list[str]]:
     """What was fitted besides the profile: attributes for the joint, and sentences."""
     also, said = {}, []
-    values = {
-        (slot.kind, slot.index): value for slot, value in zip(parameters.slots, theta, strict=True)
-    }
+    pairs = zip(parameters.slots, theta * parameters.scales, strict=True)
+    values = {(slot.kind, slot.index): value for slot, value in pairs}
     if ("damping_ratio", 0) in values:
         constant, ratio = model.jnt_solref[joint]
         also["solreflimit"] = f"{constant:.6g} {ratio * np.exp(values['damping_ratio', 0]):.6g}"
@@ -277,12 +279,16 @@ def _beyond(
         if armature >= 0:
             also["armature"] = f"{armature:.6g}"
         else:
-            said[-1] = said[-1][:-1] + ", which is less than the bodies have; make them lighter."
+            said[-1] = (
+                f"{said[-1][:-1]}, which is less than the bodies have; make them lighter. The "
+                "errors are those with the bodies as they are."
+            )
+            also["armature"] = "0"
     if ("gravity", 0) in values:
-        unit_force = gravity_scale(found, parameters.profile)
-        a, b = (unit_force * values.get(("gravity", k), 0.0) for k in (0, 1))
+        a, b = (values.get(("gravity", k), 0.0) for k in (0, 1))
         what = f"{a:.4g} cos q + {b:.4g} sin q N·m" if found.joint.type == "hinge" else f"{a:.4g} N"
         said.append(
-            f"Gravity's force on the joint lacks {what}; mend the bodies' centre of mass or tilt."
+            f"Gravity's force on the joint lacks {what}: it is in the profile as a gravity_offset; "
+            "the bodies' centre of mass or tilt may be off."
         )
     return also, said

@@ -80,7 +80,8 @@ def parting(after: Error, noise: float, blocks: bool) -> list[str]:
         return []
     return [
         f"{wholes(blocks).capitalize()} still part from the measured ones although windows of "
-        "0.4 s hardly do: near a barrier or at rest a small difference decides where a joint goes."
+        "0.4 s hardly do: a small error adds up over a run, or decides near a barrier or at rest "
+        "where the joint goes."
     ]
 
 

@@ -31,6 +31,7 @@ from joda.diagnosis.weighing import LITTLE, MUCH, Evidence, Verdict, Weighed, we
 from joda.diagnosis.whole import BEYOND, worst
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
+from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
@@ -56,8 +57,9 @@ AGAIN = (
     "does neither is a force over position."
 )
 UNEVEN = (
-    "Something is missing that no known effect explains: the force's error is small, but more than "
-    "noise, or with a pattern that noise has not; a hand that trembles makes one too."
+    "Something is missing that no known effect explains: the force's error, {:.2g} {} RMS beside a "
+    "noise of {:.2g}, is more than noise, or has a pattern that noise has not; a hand that "
+    "trembles makes one too."
 )
 DRIFTING = (
     "Something is missing that no known effect explains: windows show nothing beyond the noise, "
@@ -170,7 +172,7 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
 def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     """No effect shows in windows: the model is adequate, unless whole runs or curves deny it."""
     if not measured.runs and _uneven(measured, ranking.asked):
-        return _said(measured, "unexplained", UNEVEN, (), GAUGE_AGAIN)
+        return _said(measured, "unexplained", _said_uneven(measured), (), GAUGE_AGAIN)
     if (left := worst(measured, ranking.asked)) > BEYOND:
         return _said(measured, "unexplained", DRIFTING.format(left), (), AGAIN)
     off, worst_run = strengths_off(ranking), worst_missed(measured)
@@ -188,6 +190,14 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     if doubt := other_unit(measured):
         summary += f" But {doubt}."
     return _said(measured, "adequate", summary, (), None)
+
+
+def _said_uneven(measured: Measured) -> str:
+    """How far off the curves are; where their unit is in doubt, that is asked first."""
+    if doubt := other_unit(measured):
+        return f"{doubt[0].upper()}{doubt[1:]}."
+    missed = rms(np.concatenate([curve.excess for curve in measured.curves]))
+    return UNEVEN.format(missed, measured.unit, measured.floor)
 
 
 def _uneven(measured: Measured, begun: Asked) -> bool:

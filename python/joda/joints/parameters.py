@@ -4,10 +4,10 @@ Numbers are made comparable: a control point in units of its component's largest
 interval's end in normalised position, inertia, the damping ratio and sizes as logarithms.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,6 +182,11 @@ class Parameters:
                 end = min(max(float(value), 0.0), 1.0)
                 ends[slot.index] = end if exact else round(end, 6)
                 components[slot.component]["interval"] = ends
+        gravity = [
+            x for s, x in zip(self.slots, theta * self.scales, strict=True) if s.kind == "gravity"
+        ]
+        if gravity:
+            content["effects"] = _tilted(content["effects"], gravity, exact)
         for slot, value in zip(self.slots, theta, strict=True):
             if slot.kind == "strengths":
                 for component in content["channels"][slot.channel]["components"]:
@@ -192,6 +197,17 @@ class Parameters:
                 kept = [max(y, floor) for y in component["y"]]
                 component["y"] = kept if exact else [rounded(y) for y in kept]
         return Profile.model_validate(content)
+
+
+def _tilted(effects: Sequence[dict[str, Any]], more: Sequence[float], exact: bool) -> list[Any]:
+    """The effects with a gravity offset more: of cos q and sin q, or a slide's force."""
+    offset: dict[str, Any] = {"effect": "gravity_offset"}
+    others = [effect for effect in effects if effect["effect"] != offset["effect"]]
+    was = next((effect for effect in effects if effect not in others), {})
+    for key, by in zip(("cos", "sin") if len(more) == 2 else ("force",), more, strict=True):
+        whole = was.get(key, 0.0) + float(by)
+        offset[key] = whole if exact else rounded(whole)
+    return [*others, offset] if any(offset[key] for key in offset if key != "effect") else others
 
 
 Rows = list[tuple[dict[int, float], float]]

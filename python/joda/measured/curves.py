@@ -19,17 +19,16 @@ MOST = 6
 AGREE = 0.5
 """Least mean error of a direction, in units of its RMS, that is the direction's: what changes its
 sign is the place's."""
-LOUD, ALONE = 0.15, 0.05
-"""Noise, in units of the measured force's RMS, from which a curve gives no all-clear; and where no
-place was measured both ways, so that it may be the joint's own."""
+LOUD = 0.05
+"""Noise, in units of the measured force's RMS, from which a curve gives no all-clear: it may be the
+joint's own."""
 WILD = 6.0
 """Error of a single sample, in units of the noise, that no noise makes."""
 FEW = 15
 """Fewest samples of a curve that give one."""
 TOO_LOUD = (
     "what the force does from sample to sample is much of all that it does, whether that is noise "
-    "or the joint's own; measure each place on the way there and on the way back, or at places "
-    "nearer together."
+    "or the joint's own; measure at places nearer together."
 )
 
 Array = NDArray[np.float64]
@@ -137,8 +136,7 @@ def curves_verdict(curves: Sequence[Gauged], failing: Sequence[FailingForce]) ->
 
 def too_loud(curve: Gauged) -> bool:
     """Whether a curve's noise, or what changes from sample to sample, is much of its force."""
-    loud = LOUD if curve.repeated else ALONE
-    return curve.sigma > loud * float(np.sqrt(np.mean(curve.curve.force**2)))
+    return curve.sigma > LOUD * float(np.sqrt(np.mean(curve.curve.force**2)))
 
 
 def _z(curve: Gauged) -> Array:

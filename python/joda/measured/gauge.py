@@ -33,6 +33,9 @@ LEAST = 5
 """Fewest samples in one direction that tell the noise."""
 SAME = 0.1
 """Distance of two samples that are at the same place, in usual distances of one way's samples."""
+SCALED, ALIKE = 4.0, 0.2
+"""By which factor a measured force may be the model's, and what part of it may be left over then,
+before its unit is in doubt."""
 OTHER_UNIT = 20.0
 """How many times the model's largest force the measured one is that may be in another unit."""
 CAUTION = 2.0
@@ -98,16 +101,17 @@ class Gauged:
 
     @property
     def doubtful(self) -> float:
-        """The same where it is so much or so little that the unit is in doubt, else 0."""
+        """The same where it is so much or so little that the unit is in doubt, else 0: also where
+        the measured force is the model's times one factor, but for little."""
         times = self.times_the_model
-        return 0.0 if 1 / OTHER_UNIT < times < OTHER_UNIT else times
-
-    @property
-    def repeated(self) -> bool:
-        """Whether both ways were measured at the same places, which tells the gauge's noise from
-        what the joint's force does from sample to sample."""
-        curve = self.curve
-        return bool(np.isfinite(_between_ways(curve.position, curve.force, self.direction)))
+        if not 1 / OTHER_UNIT < times < OTHER_UNIT:
+            return times
+        known = self.direction != 0
+        own, force = self.force[known], self.curve.force[known]
+        factor = float(own @ force) / max(float(own @ own), 1e-300)
+        left = float(np.sum((force - factor * own) ** 2))
+        alike = left < ALIKE**2 * float(np.sum(force**2))
+        return factor if alike and (0 < factor < 1 / SCALED or factor > SCALED) else 0.0
 
     @property
     def cautious(self) -> Array:

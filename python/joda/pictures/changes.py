@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from joda.component import Component
 from joda.field import evaluate
 from joda.pictures.style import COLOURS, GRAVITY, clean, house_style
-from joda.profile import CHANNELS, Profile
+from joda.profile import CHANNELS, Channel, Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -122,8 +122,10 @@ def _line(old: Component | None, new: Component | None, noun: str, unit: str) ->
     if old.interval != new.interval:
         a, b = old.interval
         where += f", before {a:g} to {b:g}"
-    if _peak(old) != _peak(new):
-        return f"{where}: {noun} {_peak(old)} → {_peak(new)} {unit}"
+    here = old.x[int(np.argmax(np.abs(old.y)))]
+    was, now = (f"{_value(one, here):.3g}" for one in (old, new))
+    if was != now:
+        return f"{where}: {noun} {was} → {now} {unit}"
     shape = "as strong" if (old.x, old.y) == (new.x, new.y) else "another curve, as strong"
     return f"{where}: {noun} {shape}"
 
@@ -131,6 +133,12 @@ def _line(old: Component | None, new: Component | None, noun: str, unit: str) ->
 def _where(component: Component) -> str:
     a, b = component.interval
     return f"{component.label or 'component'} at s = {a:g} to {b:g}"
+
+
+def _value(component: Component, x: float) -> float:
+    """The curve's value at a place within its interval, 0 to 1."""
+    alone = Channel(components=(component.model_copy(update={"interval": (0.0, 1.0)}),))
+    return float(evaluate(alone, np.array([x]))[0][0])
 
 
 def _peak(component: Component) -> str:

@@ -14,6 +14,9 @@ LESS = 0.999
 """What is left of an error, as a factor, that has fallen."""
 FAR = 3.0
 """By which factor a channel must have changed to be another joint's."""
+SOME, PART = 0.3, 0.25
+"""Where a channel was at least so large, in units of its largest, and over what part of that it has
+become so much smaller."""
 HOPELESS, HARDLY = 10.0, 0.2
 """Error in units of the noise, and of that before, from which such a change explains too little."""
 GRID = np.linspace(0, 1, 201)
@@ -72,13 +75,12 @@ def _hopeless(before: Error, after: Error, noise: float, old: Profile, new: Prof
     if left <= max(HOPELESS * noise, HARDLY * before.window):
         return None
     for name in CHANNELS:
-        was, now = (_size(profile, name) for profile in (old, new))
-        if was > 0 and not 1 / FAR < now / was < FAR:
+        if (times := _changed(old, new, name)) and not 1 / FAR < times < FAR:
             return (
-                f"its {name} would be {now / was:.2g} times what it was, and what was fitted would "
-                f"still be missed by {left / noise:.0f} times the noise{_in(after, 'window')}: the "
-                "unit, sign or joint of the measurement may be another, or an effect be missing "
-                "(joda diagnose)"
+                f"its {name} would be {times:.2g} times what it was at some places, and what was "
+                f"fitted would still be missed by {left / noise:.0f} times the noise"
+                f"{_in(after, 'window')}: the unit, sign or joint of the measurement may be "
+                "another, or an effect be missing (joda diagnose)"
             )
     return None
 
@@ -92,6 +94,13 @@ def _in(error: Error, part: str) -> str:
     return "" if error.whole is None else f" in {PARTS[part]}"
 
 
-def _size(profile: Profile, name: str) -> float:
-    curve = evaluate(getattr(profile.channels, name), GRID)[0]
-    return float(np.sqrt(np.mean(curve**2)))
+def _changed(old: Profile, new: Profile, name: str) -> float:
+    """How many times as large a channel has become: at its largest, else over a quarter of where it
+    was of some size; 0 where there was none."""
+    was, now = (np.abs(evaluate(getattr(one.channels, name), GRID)[0]) for one in (old, new))
+    if not was.max() > 0:
+        return 0.0
+    if (times := float(now.max() / was.max())) >= FAR:
+        return times
+    large = was > SOME * was.max()
+    return float(np.quantile(now[large] / was[large], PART))

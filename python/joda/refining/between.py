@@ -94,18 +94,15 @@ class Between:
     def body(self, theta: Array) -> Single:
         """All of the joint but its profile, with its numbers."""
         slots, scales = self.parameters.slots, self.parameters.scales
-        by_slot: dict[tuple[str, int], float] = {
-            (s.kind, s.index): x for s, x in zip(slots, theta * scales, strict=True)
-        }
+        by_slot: dict[str, float] = {s.kind: x for s, x in zip(slots, theta * scales, strict=True)}
 
-        def of(kind: str, index: int = 0) -> float:
-            return float(by_slot.get((kind, index), 0.0))
+        def of(kind: str) -> float:
+            return float(by_slot.get(kind, 0.0))
 
         old = self.single
         return replace(
             old,
             inertia=old.inertia * float(np.exp(of("inertia"))),
-            weight=(old.weight[0] + of("gravity"), old.weight[1] + of("gravity", 1)),
             solref=(old.solref[0], old.solref[1] * float(np.exp(of("damping_ratio")))),
         )
 

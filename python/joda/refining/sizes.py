@@ -17,8 +17,8 @@ from joda.refining.between import Between
 
 Array = NDArray[np.float64]
 
-FREER = float(np.log(4))
-"""How much smaller, as a logarithm, friction and damping are at the second start."""
+WEAKER = float(np.log(4))
+"""How much smaller, as a logarithm, what resists or what drives is at the other starts."""
 BY = 0.06
 SHIFTS = ((0, 0), (BY, BY), (-BY, -BY), (-BY, BY), (BY, -BY))
 """How far the lower and the upper ends of all intervals are moved at the starts, in normalised
@@ -63,13 +63,17 @@ def sized(
 
 
 def _starts(parameters: Parameters) -> Sequence[Array]:
-    """Where to begin: as it is, and with less resistance or with the intervals elsewhere."""
+    """Where to begin: as it is, and with some of it weaker or with the intervals elsewhere."""
     slots, must = parameters.slots, parameters.constraints
     places = np.array([slot.kind == "intervals" for slot in slots])
     upper = np.array([slot.index == 1 for slot in slots])
     resists = np.array([slot.channel != "conservative" for slot in slots])
     if not places.any():
-        return [parameters.start, parameters.start - FREER * resists]
+        every = np.ones(len(slots), bool)
+        weaker = [~every, resists, ~resists, every]
+        if not 0 < resists.sum() < len(slots):
+            weaker = [~every, every]
+        return [parameters.start - WEAKER * some for some in weaker]
     moved = [parameters.start + places * np.where(upper, high, low) for low, high in SHIFTS]
     inside = [_inside(parameters, start) for start in moved]
     return [start for start in inside if np.all(must.G @ start >= must.h - 1e-9)]
