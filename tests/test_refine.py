@@ -3,18 +3,20 @@
 import json
 import subprocess
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
-from refine_table import MODELS, STEP, cabinet, cabinet_profile, released
+from refine_table import MODELS, STEP, cabinet, cabinet_profile, planted, released
 from scenes import attached, model_of, write
 from scipy.optimize import least_squares
 
-from joda import JodaError, Profile, attach, context, refine
+from joda import JodaError, Profile, attach, compare, context, refine
 from joda.commands.refine import Refined
+from joda.effects import GravityOffset
+from joda.measured.gauge import static_force
 from joda.measured.runs import Run, write_run
 from joda.scenes.scene import read_profiles
 
@@ -241,6 +243,78 @@ def test_what_cannot_be_fitted_or_held_out_is_a_sentence(files, says, tmp_path):
     assert (done.returncode, done.stdout) == (2, "") and done.stderr.count("\n") == 1
     assert says in " ".join(done.stderr.split())
     assert content(tmp_path) == before
+
+
+def planted_runs(folder, turned=1.0):
+    """A profile from which strengths are off, and runs with the force recorded, perhaps turned."""
+    case = planted("detent_internal", int(np.random.default_rng().integers(1000)))
+    lo, hi = case.found.joint.range
+    text = BARE.format(
+        kind=case.found.joint.type, lo=lo, hi=hi, inertia=case.found.equivalent_inertia, step=STEP
+    )
+    attach(write(folder, text, "bare.xml"), case.start, folder / "scene.xml")
+    runs = [replace(run, force=turned * run.force) for run in case.runs]
+    return recorded(folder, runs, "run")
+
+
+BARE = """<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="{step}" gravity="0 0 0"/>
+  <worldbody><body><joint name="joint" type="{kind}" axis="0 1 0" range="{lo} {hi}"/>
+    <inertial pos="0 0 0" mass="{inertia}" diaginertia="{inertia} {inertia} {inertia}"/>
+  </body></worldbody>
+</mujoco>"""
+
+
+def refined(folder, *words):
+    words = ["joda", "refine", "scene.xml", "-o", "better.xml", *words]
+    return python(f"import sys\nsys.argv = {words!r}\nfrom joda.cli import main\nmain()", folder)
+
+
+def test_a_force_of_the_other_sign_bends_nothing(tmp_path):
+    done = refined(tmp_path, *planted_runs(tmp_path, -1.0), "--joint", "joint")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "not written, as" in done.stderr
+    assert not (tmp_path / "better.xml").exists()
+
+
+def test_gravity_that_is_fitted_is_written(tmp_path):
+    rng = np.random.default_rng()
+    text = CABINET.replace('timestep="0.002"', f'timestep="{STEP}"')
+    found = context(write(tmp_path, text, "bare.xml"), "door")
+    start = cabinet_profile(found, 2.5, 0.4)
+    tilt = GravityOffset(cos=float(rng.uniform(0.3, 0.6)), sin=float(rng.uniform(-0.5, -0.3)))
+    attach(tmp_path / "bare.xml", start, tmp_path / "scene.xml")
+    train, held = (
+        released(found, start.with_effect(tilt), places, rng)
+        for places in ((0.35, 0.55, 0.8), (0.45, 0.7))
+    )
+    runs, checks = recorded(tmp_path, train, "run"), recorded(tmp_path, held, "held")
+    checks = [word for name in checks for word in ("--check", name)]
+    fit = ["--joint", "door", "--fit", "gravity", "--json"]
+    done = refined(tmp_path, *runs, *checks, *fit)
+    assert (done.returncode, done.stderr) == (0, "")
+    (offset,) = read_profiles(tmp_path / "better.xml")["door"].effects
+    at = np.linspace(*found.joint.range)
+    wrong = (offset.cos - tilt.cos) * np.cos(at) + (offset.sin - tilt.sin) * np.sin(at)
+    assert np.abs(wrong).max() < 0.1
+    told = json.loads(done.stdout)
+    again = compare(tmp_path / "better.xml", "door", [tmp_path / name for name in checks[1::2]])
+    assert again.rmse == pytest.approx(told["checked"][1], rel=1e-3)
+    assert told["checked"][1] < 3 * told["noise"]
+
+
+def test_a_curve_of_a_tenth_of_the_force_is_asked_about(tmp_path):
+    found = context(write(tmp_path, CABINET), "door")
+    profile = cabinet_profile(found, 2.5, 0.4)
+    attach(tmp_path / "in.xml", profile, tmp_path / "scene.xml")
+    q = np.linspace(0.02, 1.58, 80)
+    there, back = (static_force(profile, found, at, way) for at, way in ((q, 1.0), (q[::-1], -1.0)))
+    rows = zip([*q, *q[::-1]], 0.1 * np.concatenate([there, back]), strict=True)
+    write(tmp_path, "position,force\n" + "".join(f"{a},{b}\n" for a, b in rows), "curve.csv")
+    done = refined(tmp_path, "curve.csv", "--joint", "door")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "10 times the measured one: see to its unit first" in done.stderr
 
 
 @pytest.mark.long

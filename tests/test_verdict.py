@@ -10,7 +10,7 @@ from gauging import FRICTION, SCENE
 from scenes import write as write_scene
 from test_compare import door, runs_of, scene_of
 
-from joda import add, diagnose
+from joda import add, compare, diagnose
 from joda.commands.hidden_effect import _judged
 from joda.diagnosis import verdict
 from joda.diagnosis.asking import asked
@@ -217,9 +217,35 @@ def test_one_way_friction_and_a_force_are_both_named_if_neither_is_sure(extra, t
     assert told.next_experiment == "Measure the way back too, as slowly."
 
 
-@pytest.mark.parametrize(("times", "asked_for"), [(0.1, False), (0.001, True)])
+@pytest.mark.parametrize(("times", "asked_for"), [(0.3, False), (0.1, True), (0.001, True)])
 def test_one_factor_on_a_curve_is_told(times, asked_for, tmp_path):
     """Newtons without their lever arm, or kN·m: all that is measured is off by one factor."""
     told = springy(tmp_path, (1, -1), times=times)
     assert ("is it in another unit" in " ".join(told.notes)) == asked_for
-    assert asked_for or "All by one factor, about 0.1:" in told.summary, told
+    assert asked_for or "All by one factor, about 0.3:" in told.summary, told
+
+
+@pytest.mark.parametrize("way", [(1,), (1, -1)])
+@pytest.mark.parametrize("times", [0.1, 0.05])
+def test_an_error_of_all_the_force_is_not_called_small(times, way, tmp_path):
+    told = springy(tmp_path, way, times=times)
+    assert "small" not in told.summary
+    assert re.search(r"up to \d+ times the measured one: see to its unit first", told.summary), told
+
+
+@pytest.mark.parametrize("period", [0.025, 0.033, 0.05])
+def test_a_ripple_that_is_another_on_the_way_back_clears_no_curve(period, tmp_path):
+    """Between there and back it looks like noise of the gauge."""
+    rng = np.random.default_rng()
+    s = np.linspace(0.02, 0.98, 60)
+    s = np.concatenate([s, s[::-1]])
+    way = np.repeat([1, -1], 60)
+    ripple = 0.5 * np.sin(2 * np.pi * (s / period + 0.25 * (way < 0)) + rng.uniform(0, 6.3))
+    force = 1.2 * 1.5 * s + 0.6 * way + ripple + rng.normal(0, 0.02, len(s))
+    rows = "".join(f"{1.5 * a},{b:.9g}\n" for a, b in zip(s, force, strict=True))
+    (tmp_path / "curve.csv").write_text("position,force\n" + rows)
+    text = SCENE.replace(f'frictionloss="{FRICTION}"', 'frictionloss="0.6" stiffness="1.2"')
+    model = write_scene(tmp_path, text, "m.xml")
+    assert diagnose(model, "door", [tmp_path / "curve.csv"]).verdict != "adequate"
+    found = compare(model, "door", [tmp_path / "curve.csv"])
+    assert found.curves_adequacy != "within_noise"

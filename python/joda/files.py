@@ -89,6 +89,13 @@ def check_target(path: Path, force: bool) -> None:
         raise _unwritable(path, error) from None
 
 
+def named_like(path: Path, suffix: str) -> Path:
+    """The file beside one, with its name and another suffix; raises JodaError for a folder."""
+    if not path.name or path.is_dir():
+        raise JodaError(f"{path}: cannot be written (a folder or a device, no file).")
+    return path.with_suffix(suffix)
+
+
 def check_targets(paths: Iterable[Path], force: bool, inputs: Iterable[str | Path] = ()) -> None:
     """Raises JodaError if one of several files cannot be made, two have one name, or one is read.
 

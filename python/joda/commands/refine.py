@@ -14,7 +14,7 @@ from joda.diagnosis.outcome import parting
 from joda.diagnosis.plausible import Needs
 from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
-from joda.files import check_targets, write_together
+from joda.files import check_targets, named_like, write_together
 from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
 from joda.measured.driven import read_logs
 from joda.measured.excerpts import excerpts
@@ -124,7 +124,7 @@ def refine(
     """
     source, target = Path(model), Path(output)
     others = {
-        kind: target.with_suffix(f".{kind}") for kind in ("composed.json", "png", "history.json")
+        kind: named_like(target, f".{kind}") for kind in ("composed.json", "png", "history.json")
     }
     check_targets([target, *others.values()], force, [*runs, *check])
     if twice := _both(runs, check):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
-from joda.files import check_target, write_together
+from joda.files import check_target, named_like, write_together
 from joda.interaction.script import Describe, interaction, perform
 from joda.interaction.traces import FORCE, draw_force, draw_position, shade
 from joda.measured.runs import Run, run_text
@@ -129,7 +129,7 @@ def simulate(
         strength=strength, stiffness=stiffness, pause=pause, duration=duration,
     )  # fmt: skip
     csv = Path(output) if output is not None else source.with_suffix(f".{done.kind}.csv")
-    picture, film = csv.with_suffix(".png"), Path(gif) if gif is not None else None
+    picture, film = named_like(csv, ".png"), Path(gif) if gif is not None else None
     if csv.suffix == ".png" or film in (csv, picture):
         raise JodaError(f"{film or csv}: is the name of its picture; give the run one in .csv.")
     for path in (csv, picture, *([film] if film else [])):

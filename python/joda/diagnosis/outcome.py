@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from joda.diagnosis.mending import Error
-from joda.files import check_targets
+from joda.files import check_targets, named_like
 from joda.measured.errors import MULTIPLE
 from joda.measured.excerpts import excerpts
 from joda.measured.maps import draw_models, draw_runs, shade
@@ -54,7 +54,7 @@ def beside(
     Raises:
         JodaError: one of them, or of the report, exists, is read (`inputs`) or cannot be made.
     """
-    composed, picture = scene.with_suffix(".composed.json"), scene.with_suffix(".png")
+    composed, picture = (named_like(scene, suffix) for suffix in (".composed.json", ".png"))
     more = [Path(report)] if report else []
     check_targets([scene, composed, picture, *more], force, inputs)
     return composed, picture

@@ -178,7 +178,9 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     off, worst_run = strengths_off(ranking), worst_missed(measured)
     if off and moved_one_way(measured):
         experiment = _next(measured, ranking, weigh(ranking), one_way=True)
-        return _said(measured, "unexplained", EITHER.format(off) + SAME + ".", (), experiment)
+        summary = EITHER.format(off) + SAME + "."
+        summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
+        return _said(measured, "unexplained", summary, (), experiment)
     off = f" Its own numbers are off: {off}.{by_one_factor(ranking)}" if off else ""
     missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"

@@ -124,6 +124,8 @@ def _line(old: Component | None, new: Component | None, noun: str, unit: str) ->
         where += f", before {a:g} to {b:g}"
     here = old.x[int(np.argmax(np.abs(old.y)))]
     was, now = (f"{_value(one, here):.3g}" for one in (old, new))
+    if was == now:
+        was, now = _peak(old), _peak(new)
     if was != now:
         return f"{where}: {noun} {was} → {now} {unit}"
     shape = "as strong" if (old.x, old.y) == (new.x, new.y) else "another curve, as strong"

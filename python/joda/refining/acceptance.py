@@ -75,9 +75,10 @@ def _hopeless(before: Error, after: Error, noise: float, old: Profile, new: Prof
     if left <= max(HOPELESS * noise, HARDLY * before.window):
         return None
     for name in CHANNELS:
-        if (times := _changed(old, new, name)) and not 1 / FAR < times < FAR:
+        changed, where = (_grown, "") if after.whole is None else (_changed, " at some places")
+        if (times := changed(old, new, name)) and not 1 / FAR < times < FAR:
             return (
-                f"its {name} would be {times:.2g} times what it was at some places, and what was "
+                f"its {name} would be {times:.2g} times what it was{where}, and what was "
                 f"fitted would still be missed by {left / noise:.0f} times the noise"
                 f"{_in(after, 'window')}: the unit, sign or joint of the measurement may be "
                 "another, or an effect be missing (joda diagnose)"
@@ -92,6 +93,13 @@ def _parts(before: Error, after: Error) -> list[tuple[str, float, float]]:
 
 def _in(error: Error, part: str) -> str:
     return "" if error.whole is None else f" in {PARTS[part]}"
+
+
+def _grown(old: Profile, new: Profile, name: str) -> float:
+    """How many times as large a channel has become all in all; 0 where there was none."""
+    curves = (evaluate(getattr(one.channels, name), GRID)[0] for one in (old, new))
+    was, now = (float(np.sqrt(np.mean(curve**2))) for curve in curves)
+    return now / was if was > 0 else 0.0
 
 
 def _changed(old: Profile, new: Profile, name: str) -> float:
