@@ -73,3 +73,33 @@ def test_ends_of_the_range_stay_where_they_are():
 @pytest.mark.parametrize(("kind", "count"), [("hinge", 2), ("slide", 1)])
 def test_a_slides_weight_is_one_number_and_a_hinges_two(kind, count):
     assert len(Parameters(planted("detent_internal", kind), ("gravity",)).start) == count
+
+
+def test_a_step_for_differences_may_not_turn_an_interval_round():
+    p = Parameters(planted("detent_internal"), ("intervals",))
+    for ends in ([0.4, 0.398], [1.0, 1.002], [-0.002, 0.0]):
+        theta = np.tile(ends, len(p.start) // 2)
+        (a, b), *_ = (c.interval for c in p.written(theta, exact=True).channels.friction.components)
+        assert 0 <= a < b <= 1
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slide"])
+def test_gravity_that_lacks_is_an_effect_of_the_profile(kind):
+    p = Parameters(planted("detent_internal", kind), ("gravity",), gravity=2.0)
+    assert not p.written(p.start).effects
+    (offset,) = p.written(np.full(len(p.start), 0.25)).effects
+    wanted = (0.5, 0.5, 0.0) if kind == "hinge" else (0.0, 0.0, 0.5)
+    assert (offset.cos, offset.sin, offset.force) == wanted
+    again = Parameters(p.written(np.full(len(p.start), 0.25)), ("gravity",), gravity=2.0)
+    (more,) = again.written(np.full(len(p.start), 0.25)).effects
+    assert (more.cos, more.sin, more.force) == tuple(2 * np.array(wanted))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_sizes_make_components_larger_and_keep_their_shapes(name):
+    p = Parameters(planted(name), ("sizes",))
+    larger = p.written(np.full(len(p.start), np.log(3)), exact=True)
+    s = np.linspace(0, 1, 101)
+    for channel in CHANNELS:
+        was, now = (evaluate(getattr(one.channels, channel), s)[0] for one in (p.profile, larger))
+        np.testing.assert_allclose(now, 3 * was, atol=1e-12)

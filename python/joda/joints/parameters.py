@@ -27,8 +27,8 @@ KINDS: tuple[Kind, ...] = get_args(Kind)[:-2]
 """What `joda refine` fits; effects' numbers are fitted by `joda.diagnosis.mending`, components'
 sizes before all else."""
 
-NARROWEST = 0.005
-"""Least width of an interval, in normalised position."""
+NARROWEST, LEAST_WIDTH = 0.005, 1e-4
+"""Least width of an interval, in normalised position, of a fit and of all that it tries."""
 
 SIGNED = ("sin", "cos", "force")
 """Numbers of effects that may have either sign."""
@@ -193,6 +193,10 @@ class Parameters:
                     component["y"] = [value * y for y in component["y"]]
         for name in CHANNELS:
             for component in content["channels"][name]["components"]:
+                a, b = component["interval"]
+                if b < a + LEAST_WIDTH:  # a step for differences may lead there
+                    a = min(a, 1 - LEAST_WIDTH)
+                    component["interval"] = [a, a + LEAST_WIDTH]
                 floor = -np.inf if name == "conservative" else 0.0
                 kept = [max(y, floor) for y in component["y"]]
                 component["y"] = kept if exact else [rounded(y) for y in kept]
