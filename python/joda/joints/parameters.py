@@ -27,6 +27,8 @@ KINDS: tuple[Kind, ...] = get_args(Kind)[:-2]
 """What `joda refine` fits; effects' numbers are fitted by `joda.diagnosis.mending`, components'
 sizes before all else."""
 
+FARTHEST, LOGARITHM = 1e4, 8.0
+"""Largest number, and largest logarithm of a size, that counts: a step may lead further."""
 NARROWEST, LEAST_WIDTH = 0.005, 1e-4
 """Least width of an interval, in normalised position, of a fit and of all that it tries."""
 
@@ -157,6 +159,8 @@ class Parameters:
     def written(self, theta: Array, *, exact: bool = False) -> Profile:
         """The profile with these numbers, to six digits unless `exact`."""
         content = self.profile.model_dump()
+        farthest = np.array([LOGARITHM if s.kind == "sizes" else FARTHEST for s in self.slots])
+        theta = np.clip(theta, -farthest, farthest)
         for slot, value in zip(self.slots, theta * self.scales, strict=True):
             if slot.kind == "effects":
                 effect, number = content["effects"][slot.component], float(value)
