@@ -38,6 +38,8 @@ from joda.scenes.scene import profiles_of
 Array = NDArray[np.float64]
 
 ITERATIONS = 60
+ELSEWHERE = 5.0
+"""How many times as much as what was fitted is what was held out missed at most."""
 STILL: tuple[Kind, ...] = ("values", "intervals", "strengths")
 """What quasi-static curves can tell."""
 
@@ -214,6 +216,11 @@ def refine(
         }
     )
     notes += parting(errors[1], problem.sigma, blocks=False)
+    if apart and (times := _told(apart)[1] / max(_told(errors)[1], problem.sigma)) > ELSEWHERE:
+        notes.append(
+            f"What was held out is missed {times:.0f} times as much as what was fitted: the fitted "
+            "runs may not have been where those were, or a small difference decides there."
+        )
     if not check:
         notes.append(
             "Nothing was held out: these are errors of what was fitted. Give other runs with "

@@ -125,7 +125,8 @@ def _line(old: Component | None, new: Component | None, noun: str, unit: str) ->
     here = old.x[int(np.argmax(np.abs(old.y)))]
     was, now = (f"{_value(one, here):.3g}" for one in (old, new))
     if was == now:
-        was, now = _peak(old), _peak(new)
+        most = max(map(abs, new.y))
+        was, now = (f"{np.copysign(x, _largest(old)):.3g}" for x in (_largest(old), most))
     if was != now:
         return f"{where}: {noun} {was} → {now} {unit}"
     shape = "as strong" if (old.x, old.y) == (new.x, new.y) else "another curve, as strong"
@@ -145,7 +146,11 @@ def _value(component: Component, x: float) -> float:
 
 def _peak(component: Component) -> str:
     """The value of the largest magnitude, with its sign."""
-    return f"{max(component.y, key=abs):.3g}"
+    return f"{_largest(component):.3g}"
+
+
+def _largest(component: Component) -> float:
+    return max(component.y, key=abs)
 
 
 def _unit(channel: str, profile: Profile) -> str:

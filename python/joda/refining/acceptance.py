@@ -19,6 +19,13 @@ SOME, PART = 0.3, 0.25
 become so much smaller."""
 HOPELESS, HARDLY = 10.0, 0.2
 """Error in units of the noise, and of that before, from which such a change explains too little."""
+MOST_LEFT = 0.3
+"""Part of windows' error before that a fit may leave beyond that."""
+CAUSES = (
+    "the unit, clock, sign or joint of the measurement may be another, a mass or an effect of the "
+    "model be wrong or missing (joda diagnose), or the fit have stuck on its way from a start that "
+    "is far off"
+)
 GRID = np.linspace(0, 1, 201)
 PARTS = {"whole": "whole runs", "window": "windows of 0.4 s"}
 
@@ -42,6 +49,7 @@ def refused(
     return (
         (held and _held_out(*held, noise))
         or _no_better(*fitted, noise)
+        or _hardly_better(*fitted, noise)
         or _hopeless(*fitted, noise, *profiles)
         or implausible(needs, profiles[1])
     )
@@ -70,6 +78,22 @@ def _no_better(before: Error, after: Error, noise: float) -> str | None:
     return f"what was fitted is missed by {what}"
 
 
+def _hardly_better(before: Error, after: Error, noise: float) -> str | None:
+    """Runs that are still missed by far: only another model than this one follows them."""
+    for part, was, now in _parts(before, after):
+        rose = part == "whole" and now > WORSE * was
+        if (
+            after.whole is not None
+            and now > HOPELESS * noise
+            and (rose or (part == "window" and now > MOST_LEFT * was))
+        ):
+            return (
+                f"what was fitted would still be missed by {now:.3g} instead of {was:.3g}"
+                f"{_in(after, part)}, {now / noise:.0f} times the noise: {CAUSES}"
+            )
+    return None
+
+
 def _hopeless(before: Error, after: Error, noise: float, old: Profile, new: Profile) -> str | None:
     left = after.window
     if left <= max(HOPELESS * noise, HARDLY * before.window):
@@ -80,8 +104,7 @@ def _hopeless(before: Error, after: Error, noise: float, old: Profile, new: Prof
             return (
                 f"its {name} would be {times:.2g} times what it was{where}, and what was "
                 f"fitted would still be missed by {left / noise:.0f} times the noise"
-                f"{_in(after, 'window')}: the unit, sign or joint of the measurement may be "
-                "another, or an effect be missing (joda diagnose)"
+                f"{_in(after, 'window')}: {CAUSES}"
             )
     return None
 

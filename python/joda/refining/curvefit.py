@@ -5,6 +5,7 @@ Nothing is simulated: Levenberg-Marquardt on the model's force, with the prior o
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 NUDGE = 0.002
 """Step of a number for differences; ends of intervals move over several samples."""
+LESS = 0.98
+"""Part of the misfit that may be left for a fit to go on, believing less of it."""
 BELIEVED = 0.3
 """Share of the misfit before it is fitted that may be the model's, and counts as noise."""
 
@@ -95,24 +98,28 @@ class CurveProblem:
         """
         best = self.parameters.start
         history: list[tuple[str, float]] = []
-        sigma = max(self.sigma, BELIEVED * self.rms(best))
         interrupted = False
 
-        def heard(number: int, theta: Array, _: float) -> None:
+        def heard(_: int, theta: Array, __: float) -> None:
             nonlocal best
             best = theta
             history.append(("curves", self.rms(theta)))
-            told("curves", number, history[-1][1])
+            told("curves", len(history), history[-1][1])
 
         try:
-            levenberg_marquardt(
-                lambda theta: self._residuals(theta, sigma),
-                lambda theta: self._slopes(theta, sigma),
-                best,
-                self.parameters.constraints,
-                iterations,
-                heard,
-            )
+            while len(history) < iterations:
+                missed = self.rms(best)
+                sigma = max(self.sigma, BELIEVED * missed)
+                levenberg_marquardt(
+                    partial(self._residuals, sigma=sigma),
+                    partial(self._slopes, sigma=sigma),
+                    best,
+                    self.parameters.constraints,
+                    iterations - len(history),
+                    heard,
+                )
+                if self.rms(best) > LESS * missed:
+                    break
         except KeyboardInterrupt:
             interrupted = True
         J = self._slopes(best, max(self.sigma, self.rms(best)))
