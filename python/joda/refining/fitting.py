@@ -8,6 +8,7 @@ error. What the motion does not show is held by a prior at its first value, of t
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,8 @@ TURNS, SETTLED = 2, 0.98
 left for the last turn."""
 MANY = 20
 """Fewest iterations that are to be had for sizes to be fitted first."""
+STUCK = 1.5
+"""Short windows that are missed by more than so many times the noise: the fit may have stuck."""
 FOLLOWS = 0.01
 """Whole runs that are missed by less than this, in ranges, need no windows any more."""
 BETWEEN = 12
@@ -102,14 +105,45 @@ class Problem:
         iterations: int,
         told: Callable[[str, int, float], None] = lambda stage, number, rms: None,
     ) -> Fit:
+        """Fits sizes and then all; where that gets stuck, all without the sizes before, too.
+
+        Args:
+            iterations: at most so many, of each; of a fit of sizes each start counts as one.
+            told: after each, the stage, its number and the stage's RMS misfit.
+        """
+        begun = self.parameters, self.between
+        sizes = iterations >= MANY and "values" in self.parameters.kinds
+        first = self._fit(iterations, told, sizes)
+        if not sizes or first.interrupted or self._missed(first) < STUCK * self.sigma:
+            return first
+        found = self.parameters, self.between, self._missed(first)
+        self.parameters, self.between = begun
+        more = len(first.history)
+        again = self._fit(iterations, lambda name, k, rms: told(name, more + k, rms), sizes=False)
+        history = first.history + again.history
+        if found[2] <= self._missed(again):
+            self.parameters, self.between = found[:2]
+            again = first
+        return replace(again, history=history)
+
+    def _missed(self, found: Fit) -> float:
+        """By how much short windows are missed, RMS, rad or m."""
+        return self.between.rms(self.short, found.theta)
+
+    def _fit(
+        self,
+        iterations: int,
+        told: Callable[[str, int, float], None],
+        sizes: bool,
+    ) -> Fit:
         """Fits short windows, longer ones, between the jumps, whole runs.
 
         Whole runs that nearly follow after the first windows need no more of them; only if some of
         their misfit is left then, they are fitted between the jumps too.
 
         Args:
-            iterations: at most so many in all; of a fit of sizes each start counts as one.
-            told: after each, the stage, its number and the stage's RMS misfit.
+            iterations, told: see `fit`.
+            sizes: whether to fit them first.
         """
         history: list[tuple[str, float]] = []
         self._best = self.parameters.start
@@ -142,17 +176,13 @@ class Problem:
                 self._best = before  # a run snapped to another side than it did
             return missed
 
-        def size() -> None:
-            def better(parameters: Parameters, misfit: float) -> None:
-                self.parameters, self.between = parameters, self.between.about(parameters)
-                heard("sizes", parameters.start, misfit)
-
-            if iterations >= MANY:
-                sized(self.between, self.short, FIRST, better)
+        def size(parameters: Parameters, misfit: float) -> None:
+            self.parameters, self.between = parameters, self.between.about(parameters)
+            heard("sizes", parameters.start, misfit)
 
         try:
-            if "values" in self.parameters.kinds:
-                size()
+            if sizes:
+                sized(self.between, self.short, FIRST, size)
             run("short windows, intervals held", self.short, min(FIRST, iterations // 3), held)
             follows = self.rms(self._best) < FOLLOWS * self.span
             if not follows:
