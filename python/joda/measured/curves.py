@@ -19,9 +19,11 @@ MOST = 6
 AGREE = 0.5
 """Least mean error of a direction, in units of its RMS, that is the direction's: what changes its
 sign is the place's."""
-LOUD = 0.05
-"""Noise, in units of the measured force's RMS, from which a curve gives no all-clear: it may be the
-joint's own."""
+LOUD, ALONE = 0.15, 0.05
+"""Noise, in units of the measured force's RMS, from which a curve gives no all-clear; and where no
+place was measured both ways, or one period stands out of it, so that it may be the joint's own."""
+LINE = 0.01
+"""Chance that one period stands out of noise as it does, below which it is none."""
 WILD = 6.0
 """Error of a single sample, in units of the noise, that no noise makes."""
 FEW = 15
@@ -136,7 +138,25 @@ def curves_verdict(curves: Sequence[Gauged], failing: Sequence[FailingForce]) ->
 
 def too_loud(curve: Gauged) -> bool:
     """Whether a curve's noise, or what changes from sample to sample, is much of its force."""
-    return curve.sigma > LOUD * float(np.sqrt(np.mean(curve.curve.force**2)))
+    loud = LOUD if curve.repeated and not _periodic(curve) else ALONE
+    return curve.sigma > loud * float(np.sqrt(np.mean(curve.curve.force**2)))
+
+
+def _periodic(curve: Gauged) -> bool:
+    """Whether one period stands out of the error along either way: Fisher's test of the largest
+    ordinate of the periodogram (1929), by its bound."""
+    known = curve.direction != 0
+    position, way = curve.curve.position[known], curve.direction[known]
+    for one in (1, -1):
+        there = np.flatnonzero(way == one)
+        error = curve.excess[there[np.argsort(position[there], kind="stable")]]
+        if len(error) < FEW or not np.ptp(error) > 0:
+            continue
+        power = np.abs(np.fft.rfft(error - error.mean())[1:]) ** 2
+        count = len(power)
+        if count * (1 - power.max() / power.sum()) ** (count - 1) < LINE:
+            return True
+    return False
 
 
 def _z(curve: Gauged) -> Array:

@@ -114,6 +114,13 @@ class Gauged:
         return factor if alike and (0 < factor < 1 / SCALED or factor > SCALED) else 0.0
 
     @property
+    def repeated(self) -> bool:
+        """Whether both ways were measured at the same places, which tells the gauge's noise from
+        what the joint's force does from sample to sample."""
+        curve = self.curve
+        return bool(np.isfinite(_between_ways(curve.position, curve.force, self.direction)))
+
+    @property
     def cautious(self) -> Array:
         """The doubt of each excess, where the noise is more than it was estimated."""
         doubt = self.doubt[self.direction != 0]

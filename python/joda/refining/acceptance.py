@@ -80,13 +80,10 @@ def _no_better(before: Error, after: Error, noise: float) -> str | None:
 
 def _hardly_better(before: Error, after: Error, noise: float) -> str | None:
     """Runs that are still missed by far: only another model than this one follows them."""
+    if after.whole is None or after.window <= HOPELESS * noise:
+        return None
     for part, was, now in _parts(before, after):
-        rose = part == "whole" and now > WORSE * was
-        if (
-            after.whole is not None
-            and now > HOPELESS * noise
-            and (rose or (part == "window" and now > MOST_LEFT * was))
-        ):
+        if now > (WORSE if part == "whole" else MOST_LEFT) * was:
             return (
                 f"what was fitted would still be missed by {now:.3g} instead of {was:.3g}"
                 f"{_in(after, part)}, {now / noise:.0f} times the noise: {CAUSES}"
