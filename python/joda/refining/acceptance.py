@@ -18,7 +18,8 @@ SOME, PART = 0.3, 0.25
 """Where a channel was at least so large, in units of its largest, and over what part of that it has
 become so much smaller."""
 HOPELESS, HARDLY = 10.0, 0.2
-"""Error in units of the noise, and of that before, from which such a change explains too little."""
+"""Error in units of the noise, and of curves of that before, from which such a change explains too
+little."""
 MOST_LEFT = 0.3
 """Part of windows' error before that a fit may leave beyond that."""
 CAUSES = (
@@ -92,8 +93,10 @@ def _hardly_better(before: Error, after: Error, noise: float) -> str | None:
 
 
 def _hopeless(before: Error, after: Error, noise: float, old: Profile, new: Profile) -> str | None:
-    left = after.window
-    if left <= max(HOPELESS * noise, HARDLY * before.window):
+    left, enough = after.window, HOPELESS * noise
+    if after.whole is None:  # what a hand does to a curve is more than its gauge's noise
+        enough = max(enough, HARDLY * before.window)
+    if left <= enough:
         return None
     for name in CHANNELS:
         changed, where = (_grown, "") if after.whole is None else (_changed, " at some places")
