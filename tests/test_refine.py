@@ -60,9 +60,9 @@ def test_a_mistake_is_answered_before_any_file_is_written(change, said, tmp_path
     assert sorted(tmp_path.iterdir()) == before
 
 
-def command(folder, *arguments):
-    """Runs `joda refine` on the door of scene.xml, in a process of its own without a terminal."""
-    words = ["joda", "refine", "scene.xml", "--joint", "door", "-o", "better.xml", *arguments]
+def command(folder, *arguments, joint="door"):
+    """Runs `joda refine` on a joint of scene.xml, in a process of its own without a terminal."""
+    words = ["joda", "refine", "scene.xml", "--joint", joint, "-o", "better.xml", *arguments]
     return python(f"import sys\nsys.argv = {words!r}\nfrom joda.cli import main\nmain()", folder)
 
 
@@ -266,13 +266,8 @@ BARE = """<mujoco>
 </mujoco>"""
 
 
-def refined(folder, *words):
-    words = ["joda", "refine", "scene.xml", "-o", "better.xml", *words]
-    return python(f"import sys\nsys.argv = {words!r}\nfrom joda.cli import main\nmain()", folder)
-
-
 def test_a_force_of_the_other_sign_bends_nothing(tmp_path):
-    done = refined(tmp_path, *planted_runs(tmp_path, -1.0), "--joint", "joint")
+    done = command(tmp_path, *planted_runs(tmp_path, -1.0), joint="joint")
     assert (done.returncode, done.stdout) == (2, "")
     assert "not written, as" in done.stderr
     assert not (tmp_path / "better.xml").exists()
@@ -291,8 +286,7 @@ def test_gravity_that_is_fitted_is_written(tmp_path):
     )
     runs, checks = recorded(tmp_path, train, "run"), recorded(tmp_path, held, "held")
     checks = [word for name in checks for word in ("--check", name)]
-    fit = ["--joint", "door", "--fit", "gravity", "--json"]
-    done = refined(tmp_path, *runs, *checks, *fit)
+    done = command(tmp_path, *runs, *checks, "--fit", "gravity", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     (offset,) = read_profiles(tmp_path / "better.xml")["door"].effects
     at = np.linspace(*found.joint.range)
@@ -312,7 +306,7 @@ def test_a_curve_of_a_tenth_of_the_force_is_asked_about(tmp_path):
     there, back = (static_force(profile, found, at, way) for at, way in ((q, 1.0), (q[::-1], -1.0)))
     rows = zip([*q, *q[::-1]], 0.1 * np.concatenate([there, back]), strict=True)
     write(tmp_path, "position,force\n" + "".join(f"{a},{b}\n" for a, b in rows), "curve.csv")
-    done = refined(tmp_path, "curve.csv", "--joint", "door")
+    done = command(tmp_path, "curve.csv")
     assert (done.returncode, done.stdout) == (2, "")
     assert "10 times the measured one: see to its unit first" in done.stderr
 

@@ -166,7 +166,9 @@ def bare(kind: str, span: float, inertia: float, weight: float = 0.0) -> Context
     )
 
 
-def planted(name: str, seed: int, off: float = 2.0, shift: float = 0.03, pull: float = 0.0):
+def planted(
+    name: str, seed: int, off: float = 2.0, shift: float = 0.03, pull: float = 0.0
+) -> Planted:
     """A template at a random place and strength, besides constant friction and damping.
 
     Args:

@@ -146,6 +146,8 @@ class Parameters:
         self.start = np.array(start)
         self.scales = np.array([_scale(profile, slot, gravity) for slot in slots])
         self.doubt = np.array([DOUBT[slot.kind] for slot in slots])
+        farthest = [LOGARITHM if slot.kind == "sizes" else FARTHEST for slot in slots]
+        self._farthest = np.array(farthest)
         G = np.zeros((len(rows), len(slots)))
         for row, (terms, _) in enumerate(rows):
             for column, factor in terms.items():
@@ -159,8 +161,7 @@ class Parameters:
     def written(self, theta: Array, *, exact: bool = False) -> Profile:
         """The profile with these numbers, to six digits unless `exact`."""
         content = self.profile.model_dump()
-        farthest = np.array([LOGARITHM if s.kind == "sizes" else FARTHEST for s in self.slots])
-        theta = np.clip(theta, -farthest, farthest)
+        theta = np.clip(theta, -self._farthest, self._farthest)
         for slot, value in zip(self.slots, theta * self.scales, strict=True):
             if slot.kind == "effects":
                 effect, number = content["effects"][slot.component], float(value)

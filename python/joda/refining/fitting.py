@@ -114,16 +114,16 @@ class Problem:
         begun = self.parameters, self.between
         sizes = iterations >= MANY and "values" in self.parameters.kinds
         first = self._fit(iterations, told, sizes)
-        if not sizes or first.interrupted or self._missed(first) < STUCK * self.sigma:
+        missed = self._missed(first)
+        if not sizes or first.interrupted or missed < STUCK * self.sigma:
             return first
-        found = self.parameters, self.between, self._missed(first)
+        found = self.parameters, self.between
         self.parameters, self.between = begun
         more = len(first.history)
         again = self._fit(iterations, lambda name, k, rms: told(name, more + k, rms), sizes=False)
         history = first.history + again.history
-        if found[2] <= self._missed(again):
-            self.parameters, self.between = found[:2]
-            again = first
+        if missed <= self._missed(again):
+            (self.parameters, self.between), again = found, first
         return replace(again, history=history)
 
     def _missed(self, found: Fit) -> float:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.judge import Judge
 from joda.joints.parameters import Kind, Parameters
-from joda.profile import Profile
 from joda.refining.between import Between
 
 Array = NDArray[np.float64]
@@ -56,7 +55,8 @@ def sized(
             x = _inside(other.parameters, x)
             loss = judge.started(other.solo(x)).loss
             if loss < least:
-                least, found, misfit = loss, _written(other, x), other.rms(judge, x)
+                least, misfit = loss, other.rms(judge, x)
+                found = other.parameters.written(x, exact=True)
             told(parameters.about(found), misfit)
             if misfit < NOISE * between.sigma:
                 return
@@ -82,7 +82,3 @@ def _starts(parameters: Parameters) -> Sequence[Array]:
 def _inside(parameters: Parameters, x: Array) -> Array:
     places = np.array([slot.kind == "intervals" for slot in parameters.slots])
     return np.where(places, np.clip(x, EDGE, 1 - EDGE), x)
-
-
-def _written(between: Between, x: Array) -> Profile:
-    return between.parameters.written(x, exact=True)
