@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from joda.diagnosis.asking import RESTITUTION, asked
-from joda.diagnosis.knocks import mean_of, rebounds
+from joda.diagnosis.knocks import mean_of, speed_ratios
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.reading import read_measured
 from joda.measured.runs import Run, write_run
 
+SOLREF = 'damping="0.05" solreflimit="{}"/>'
 SIGMA, HERTZ = 2e-4, 250
 SLIDE = """<mujoco>
   <option gravity="0 0 0"/>
@@ -38,9 +39,9 @@ def bouncing(start: float, speed: float, low: float, high: float, seconds: float
     return np.array(out)
 
 
-def slide(folder, low, high, rng):
+def slide(folder, low, high, rng, solref="0.02 1"):
     """A joint with runs that meet each end at several speeds."""
-    (folder / "slide.xml").write_text(SLIDE)
+    (folder / "slide.xml").write_text(SLIDE.replace('damping="0.05"/>', SOLREF.format(solref)))
     runs = []
     for k, speed in enumerate((0.5, -0.6, 0.9, -0.8, 0.7, -1.0)):
         position = bouncing(0.5 * rng.uniform(0.3, 0.7), speed, low, high, 1.2)
@@ -56,7 +57,7 @@ def slide(folder, low, high, rng):
 def test_the_restitution_of_each_end_is_measured(tmp_path, low, high):
     begun = asked(slide(tmp_path, low, high, np.random.default_rng()))
     for side, true in ((-1, low), (1, high)):
-        measured = rebounds(begun.judge.windows, begun.base, [side])
+        measured = speed_ratios(begun.judge.windows, begun.base, [side])
         mean, error = mean_of(measured)
         assert len(measured) >= 2
         assert abs(mean - true) < max(4 * error, 0.02)
@@ -80,3 +81,25 @@ def test_the_end_that_is_bouncy_is_named(tmp_path, low, high, place):
     assert found.effects[0].interval == place
     true = low if place == (0.0, 0.02) else high
     assert abs(found.effects[0].magnitude - true) < 3 * found.effects[0].magnitude_error
+
+
+@pytest.mark.parametrize(("high", "bouncy"), [(0.6, True), (0.13, False)])
+def test_a_stop_of_another_stiffness_is_not_taken_for_a_bouncy_one(tmp_path, high, bouncy):
+    """The joint's stops are rigid; the model's yield for a third of a window."""
+    measured = slide(tmp_path, 0.13, high, np.random.default_rng(), "0.06 1")
+    found = diagnosed(measured).diagnosis
+    assert ends_named(found)[:1] == ([(0.98, 1.0)] if bouncy else [])
+    if not bouncy:
+        assert found.verdict == "adequate"
+        assert "From where the joint comes to an end" in found.summary
+
+
+def test_windows_by_themselves_are_missed_as_among_all(tmp_path):
+    begun = asked(slide(tmp_path, 0.1, 0.6, np.random.default_rng()))
+    windows, solo = begun.judge.windows, begun.base.solo(begun.fit.x)
+    kept = windows.knocks
+    assert 2 < kept.sum() < len(kept)
+    every = windows.residuals(windows.misfit(solo, windows.start))[kept]
+    some = windows.only(kept)
+    alone = some.residuals(some.misfit(solo, some.start))
+    assert np.allclose(alone, every, rtol=1e-9, atol=1e-9)

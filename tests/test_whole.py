@@ -27,7 +27,7 @@ def test_errors_explain_the_runs_of_a_right_model_and_not_those_of_a_wrong_one(f
     print(seed)
     train, _ = read(draw(seed, None, forced))
     begun = asked(train)
-    assert worst(train, begun) < BEYOND
+    assert worst(train, begun).free < BEYOND
     assert len(begun.fit.x)
     wrong = replace(begun, fit=replace(begun.fit, x=3.0 * begun.fit.x))
-    assert worst(train, wrong) > worst(train, begun)
+    assert worst(train, wrong).free > worst(train, begun).free

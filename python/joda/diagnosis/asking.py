@@ -1,5 +1,6 @@
 """A model fitted to measured runs, and what it may lack, fitted together with it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,9 +28,10 @@ from joda.diagnosis.guessing import (
 )
 from joda.diagnosis.hypotheses import Hypothesis, hypotheses
 from joda.diagnosis.judge import Fit, Judge
-from joda.diagnosis.knocks import knock_guess
+from joda.diagnosis.knocks import knock_guesses
 from joda.joints.single import Single
 from joda.measured.reading import Measured
+from joda.profile import Profile
 from joda.template import read_templates
 
 Array = NDArray[np.float64]
@@ -69,12 +71,15 @@ class Asked:
     def tell(self, hypothesis: Hypothesis) -> Guess | None:
         """The hypothesis fitted; None if the data cannot tell of it."""
         if hypothesis.effect == RESTITUTION:
-            return self.restitution(hypothesis, surely=False)
+            return next(iter(self.bouncy([hypothesis], surely=False)), None)
         return self.finished(self.rough(hypothesis))
 
-    def restitution(self, hypothesis: Hypothesis, surely: bool = True) -> Guess | None:
-        """How bouncy the ends are; None if the data cannot tell, or if they surely are not."""
-        return knock_guess(self.judge, self.base, self.given, self.fit, hypothesis, surely)
+    def bouncy(
+        self, ends: Sequence[Hypothesis], others: Sequence[Profile] = (), surely: bool = True
+    ) -> list[Guess]:
+        """How bouncy the ends are, see `knock_guesses`."""
+        fixed = self.judge, self.base, self.given, self.fit
+        return knock_guesses(*fixed, ends, others, surely)
 
     def rough(self, hypothesis: Hypothesis) -> "Rough":
         """The hypothesis fitted roughly, in longer steps, to windows without knocks."""

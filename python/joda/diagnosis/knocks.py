@@ -1,25 +1,35 @@
 """How bouncy the ends of the range are: by the windows with knocks, which tell of nothing else."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from joda._core import stop_damping
 from joda.diagnosis.baseline import LEAST, Base
 from joda.diagnosis.guessing import Guess, guessed
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import Fit, Judge
 from joda.diagnosis.windows import Windows
 from joda.joints.single import Single
-from joda.profile import Channels
+from joda.profile import Channels, Profile
+from joda.scenes.limits import IMPEDANCE, STIFFNESS
 
 Array = NDArray[np.float64]
 
 KNOCKS = 2
-"""Fewest knocks at an end that tell of it."""
-CLEARLY, SURELY = 0.07, 3.0
-"""How much more of its speed an end must throw back than the model's: at the least, and in standard
-errors."""
+"""Fewest knocks at an end whose speeds tell of it."""
+CLEARLY = 0.07
+"""How much more of its speed an end must throw back than the model's."""
+CHANCE, PART = 60.0, 0.1
+"""Least gain in loss of a bouncier end that is more than chance, and least part of the loss."""
+MOST = 24
+"""Windows with knocks at an end from which on only some are looked at."""
+RATIOS = np.linspace(0.2, 0.95, 11)
+"""Restitutions that are tried."""
+SHORTEST, TIMES = 6, 8
+"""Steps that a knock lasts at the least without damping, and how many durations are tried."""
 CLEAR = 3.0
 """How far off an end a joint must be, in noises, not to be at it."""
 AROUND = 5
@@ -28,51 +38,179 @@ KNOCK_TIME = 0.6
 """In which a joint goes through its range towards a knock, s."""
 
 
-def knock_guess(
+def knock_guesses(
     judge: Judge,
     base: Base,
     given: Single,
     fit: Fit,
-    hypothesis: Hypothesis,
+    hypotheses: Sequence[Hypothesis],
+    others: Sequence[Profile] = (),
     surely: bool = True,
-) -> Guess | None:
-    """How bouncy an end is, or both, by the speeds before and after the knocks there.
+) -> list[Guess]:
+    """How bouncy the ends are, by the windows with knocks there.
 
-    How long and how deep a knock is tells of the stop's stiffness, which is another matter.
+    How long and how deep a knock is tells of the stop's stiffness, which is another matter: every
+    restitution is tried with the stiffness that suits it best.
 
     Args:
         judge, base, fit: the model and how it was fitted.
         given: the joint with its own ends.
-        hypothesis: bouncy ends.
-        surely: whether it is asked if they are.
-
-    Returns:
-        None if there are no knocks, or if it is asked and the joint does not come back from each of
-        the ends clearly faster than the model does.
+        hypotheses: an end that is bouncy, or both.
+        others: what else the joint's profile may be: with all of them an end must be bouncier too.
+        surely: whether it is asked if they are; else all that have knocks are told.
     """
-    windows, ends = judge.windows, ends_of(hypothesis)
-    each = [rebounds(windows, base, [side]) for side in ends]
-    if surely:
-        own = rebound(base, given)
-        if not all(_bouncier(one, own) for one in each):
-            return None
-    measured = np.concatenate(each)
-    if not len(measured):
-        return None
-    low, high = hypothesis.unknowns.low, hypothesis.unknowns.high
-    x = np.clip([mean_of(measured)[0]], low, high)
-    profile = base.written(fit.x)
-    there = Judge(windows, np.isin(knocked(windows, base), ends))
-    bouncy = base.single.solo(hypothesis.write(profile, x), base.h)
-    solos = given.solo(profile, base.h), bouncy
-    soft, best = (there.started(solo) for solo in solos)
-    whole = Fit(
-        np.concatenate([fit.x, x]),
-        np.where(there.counts[:, None], best.start, fit.start),
-        np.where(there.counts, best.squares, fit.squares),
-        fit.loss - soft.loss + best.loss,
-    )
-    return guessed(judge, hypothesis, whole)
+    found: dict[int, Rebound] = {}
+    for side, knocks in knocks_at(judge.windows, base, given).items():
+        told = knocks.rebound(base.written(fit.x))
+        if not surely or (told.bouncier and all(knocks.rebound(o).bouncier for o in others)):
+            found[side] = told
+    out = []
+    for hypothesis in hypotheses:
+        ends = ends_of(hypothesis)
+        there = [found[side] for side in ends if side in found]
+        if not there or (surely and len(there) < len(ends)):
+            continue
+        whole = Rebound.together(there)
+        ratio = best_ratio(whole, judge.windows, base, ends)[0]
+        x = np.append(fit.x, np.clip(ratio, hypothesis.unknowns.low, hypothesis.unknowns.high))
+        out.append(guessed(judge, hypothesis, replace(fit, x=x, loss=fit.loss - whole.gain)))
+    return out
+
+
+def best_ratio(
+    whole: "Rebound", windows: Windows, base: Base, ends: Sequence[int]
+) -> tuple[float, float]:
+    """The restitution of one end or of both, and its standard error.
+
+    What suits the knocks best is jagged where stops are hard, and the speeds before and after them
+    are changed by a force: where none acted, the mean of both is nearer.
+    """
+    seen = speed_ratios(windows, base, ends)
+    if len(seen) < KNOCKS:
+        return whole.ratio, whole.error
+    speeds = mean_of(seen)[0]
+    ratio = whole.ratio if windows.force.any() else (whole.ratio + speeds) / 2
+    return ratio, float(np.hypot(whole.error, (whole.ratio - speeds) / 2))
+
+
+@dataclass(frozen=True)
+class Rebound:
+    """How well stops of some restitutions suit the knocks at an end.
+
+    Attributes:
+        ratios: of the speed after a knock to that before it, rising, shape (n,).
+        losses: of the windows with each of them, shape (n,).
+        own: loss with the model's own restitution.
+        samples: how many there are.
+    """
+
+    ratios: Array
+    losses: Array
+    own: float
+    samples: float
+
+    @classmethod
+    def together(cls, ends: Sequence["Rebound"]) -> "Rebound":
+        """Of ends that have the same restitution."""
+        ratios = np.unique(np.concatenate([end.ratios for end in ends]))
+        losses = sum(np.interp(ratios, end.ratios, end.losses) for end in ends)
+        own, samples = sum(end.own for end in ends), sum(end.samples for end in ends)
+        return cls(ratios, np.asarray(losses), own, samples)
+
+    @property
+    def gain(self) -> float:
+        """In loss, by the best restitution."""
+        return self.own - float(self.losses.min())
+
+    @property
+    def bouncier(self) -> bool:
+        """Whether a restitution that is larger than the model's is clearly better."""
+        return self.gain > max(CHANCE, PART * self.own)
+
+    def may_be(self, ratio: float) -> bool:
+        """Whether a restitution is not clearly worse than the best one, or the model's."""
+        loss = float(np.interp(ratio, self.ratios, self.losses))
+        return loss - min(self.own, float(self.losses.min())) < CHANCE
+
+    @property
+    def ratio(self) -> float:
+        """The best restitution, between those that were tried."""
+        return self._parabola[0]
+
+    @property
+    def error(self) -> float:
+        """Its standard error, with what the best one leaves as noise."""
+        return self._parabola[1]
+
+    @property
+    def _parabola(self) -> tuple[float, float]:
+        """Where the least one through the three losses about the best is, and its error."""
+        k = int(np.clip(np.argmin(self.losses), 1, len(self.ratios) - 2))
+        e, loss = self.ratios[k - 1 : k + 2], self.losses[k - 1 : k + 2]
+        bend, slope, _ = np.polyfit(e - e[1], loss, 2)
+        noise = max(float(self.losses.min()) / max(self.samples, 1.0), 1.0)
+        if bend <= 0:
+            return float(self.ratios[np.argmin(self.losses)]), float(e[2] - e[0])
+        best = e[1] - slope / bend / 2
+        return float(np.clip(best, e[0], e[2])), float(np.sqrt(noise / bend))
+
+
+@dataclass(frozen=True)
+class Knocks:
+    """The windows with knocks at an end.
+
+    Attributes:
+        judge: of these windows alone.
+        given: the joint with the model's own ends.
+        own: the model's restitution there.
+        times: that knocks may last without damping, s.
+        ratios: restitutions that are tried.
+    """
+
+    judge: Judge
+    given: Single
+    own: float
+    times: Array
+    ratios: Array
+
+    def rebound(self, profile: Profile) -> Rebound:
+        """How well restitutions suit the knocks of a joint with a profile."""
+        own = min(self._loss(self.given, profile), self._best(self.own, profile))
+        losses = np.array([self._best(ratio, profile) for ratio in self.ratios])
+        return Rebound(self.ratios, losses, own, self.judge.samples)
+
+    def _best(self, ratio: float, profile: Profile) -> float:
+        """Loss with a restitution, and the stiffness that suits it best."""
+        return min(self._loss(stopped(self.given, ratio, t), profile) for t in self.times)
+
+    def _loss(self, single: Single, profile: Profile) -> float:
+        return self.judge.started(single.solo(profile, self.judge.windows.h)).loss
+
+
+def knocks_at(windows: Windows, base: Base, given: Single) -> dict[int, Knocks]:
+    """Of each end that has knocks, -1 low and 1 high, some of them, evenly spread."""
+    sides, own, shortest = knocked(windows, base), rebound(base, given), SHORTEST * base.h
+    times = np.geomspace(shortest, max(2 * windows.length, 2 * shortest), TIMES)
+    out = {}
+    for side in (-1, 1):
+        numbers = np.flatnonzero(sides == side)
+        if not len(numbers):
+            continue
+        kept = np.isin(np.arange(len(sides)), numbers[:: len(numbers) // MOST + 1])
+        seen = speed_ratios(windows, base, [side])
+        ratios = np.append(RATIOS, mean_of(seen)[0] if len(seen) else [])
+        tried = np.unique(ratios[(ratios > own + CLEARLY) & (ratios <= RATIOS[-1])])
+        judge = Judge(windows.only(kept), np.ones(int(kept.sum()), bool))
+        out[side] = Knocks(judge, given, own, times, tried)
+    return out
+
+
+def stopped(single: Single, ratio: float, time: float) -> Single:
+    """The joint with ends of a restitution, at which a knock without damping lasts a time (s)."""
+    frequency = np.pi / time
+    damping = stop_damping(ratio) / np.sqrt(STIFFNESS) * frequency
+    solref = float(-IMPEDANCE * frequency**2), float(-damping)
+    return replace(single, solref=solref, solimp=(IMPEDANCE, IMPEDANCE, *single.solimp[2:]))
 
 
 def ends_of(hypothesis: Hypothesis) -> list[int]:
@@ -93,14 +231,6 @@ def knocked(windows: Windows, base: Base) -> NDArray[np.intp]:
     return out
 
 
-def _bouncier(measured: Array, own: float) -> bool:
-    """Whether an end throws the joint back clearly faster than the model's does."""
-    if len(measured) < KNOCKS:
-        return False
-    mean, error = mean_of(measured)
-    return mean - own > max(CLEARLY, SURELY * error)
-
-
 def mean_of(measured: Array) -> tuple[float, float]:
     """Mean restitution of knocks and its standard error, by their errors or their scatter."""
     ratio, error = measured.T
@@ -111,7 +241,7 @@ def mean_of(measured: Array) -> tuple[float, float]:
     return mean, max(scatter, float(weight.sum() ** -0.5))
 
 
-def rebounds(windows: Windows, base: Base, ends: Sequence[int]) -> Array:
+def speed_ratios(windows: Windows, base: Base, ends: Sequence[int]) -> Array:
     """Of the first knock in each window: speed after per speed before, and its standard error.
 
     The speeds are those of lines through the samples before the joint is at the end, and after it

@@ -80,7 +80,8 @@ def rank(
             guesses += _polished(begun, guesses, work)
             guesses += _searched(begun, guesses, work)
         begun = _unstuck(begun, guesses)
-        ends = [guess for h in bouncy if (guess := begun.restitution(h))]
+        others = [one.written(begun.base) for one in _best(guesses)[:1]]
+        ends = begun.bouncy(bouncy, others)
         guesses += [guess for guess in ends if not silent]
     there = [one for one in guesses if not one.vanished]
     return Ranking(begun, *_scored(begun.judge, there), bouncy=silent and bool(ends))

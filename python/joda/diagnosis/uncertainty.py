@@ -29,7 +29,7 @@ from joda.diagnosis.hypotheses.base import (
 )
 from joda.diagnosis.hypotheses.intervals import GRID
 from joda.diagnosis.judge import Judge, Make, Unknowns
-from joda.diagnosis.knocks import KNOCKS, ends_of, mean_of, rebounds
+from joda.diagnosis.knocks import Rebound, best_ratio, ends_of, knocks_at
 from joda.field import merge
 from joda.profile import CHANNELS, Profile
 
@@ -77,8 +77,6 @@ PLAUSIBLE = 2.0
 deviation)."""
 AT_END = 0.02
 """Doubt of the place of an end that throws back, in normalised position."""
-CLEARLY = 2.0
-"""How many standard errors less an end of the range throws back that is another matter."""
 EDGE = 0.03
 """How far within what was visited an end must be to be clearly there, in normalised position."""
 UNKNOWN_END = 3**-0.5
@@ -246,22 +244,24 @@ def _fitted(asked: Asked, found: Guess) -> _Fitted:
 
 
 def _restitution(asked: Asked, found: Guess) -> Uncertainty:
-    """By the scatter of the knocks; an end is where it is, but the other one may throw back too
-    where no knocks tell that it clearly does less."""
+    """By the knocks' likelihood, and by how far their speeds tell of another one.
+
+    An end is where it is, but the other one may throw back too where no knocks deny it.
+    """
     windows, base, sides = asked.judge.windows, asked.base, ends_of(found.hypothesis)
     size = found.hypothesis.magnitude(found.x)
-    error = mean_of(rebounds(windows, base, sides))[1]
-    own = OWN_SHAPE[RESTITUTION] * size
-
-    def less(side: int) -> bool:
-        knocks = rebounds(windows, base, [side])
-        if len(knocks) < KNOCKS:
-            return False
-        other, doubt = mean_of(knocks)
-        return other + CLEARLY * doubt < size - CLEARLY * error
-
-    low, high = (AT_END if side in sides or less(side) else UNKNOWN_END for side in (-1, 1))
-    return Uncertainty(float(np.hypot(error, own)), (low, high))
+    profile = base.written(asked.fit.x)
+    told = {
+        side: knocks.rebound(profile)
+        for side, knocks in knocks_at(windows, base, asked.given).items()
+    }
+    whole = Rebound.together([told[side] for side in sides if side in told])
+    error = float(
+        np.hypot(best_ratio(whole, windows, base, sides)[1], OWN_SHAPE[RESTITUTION] * size)
+    )
+    known = (side in sides or (side in told and not told[side].may_be(size)) for side in (-1, 1))
+    low, high = (AT_END if there else UNKNOWN_END for there in known)
+    return Uncertainty(error, (low, high))
 
 
 def _bootstrap(

@@ -70,8 +70,13 @@ WITH_THESE = (
     "noise.{} With these there is {} that an effect would explain."
 )
 WITHOUT = (
-    " Whole runs are missed by up to {:.0f} times the noise all the same, but by no more than "
-    "noise, start and force explain; joda compare says where."
+    " Whole runs are missed by up to {:.0f} times the noise all the same, which is up to {:.1f} "
+    "times what noise, start and force explain; joda compare says where."
+)
+AT_ENDS = (
+    " That holds within the range. From where the joint comes to an end of it, whole runs are "
+    "missed by up to {:.0f} times what noise, start and force explain: there the model's stop "
+    "(solreflimit), or a force close to the end, is not the joint's."
 )
 EITHER = "Either the model's own numbers are off ({}), or a force is missing"
 NAMED, WORTH_NAMING = 5, 0.01
@@ -173,8 +178,9 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     """No effect shows in windows: the model is adequate, unless whole runs or curves deny it."""
     if not measured.runs and _uneven(measured, ranking.asked):
         return _said(measured, "unexplained", _said_uneven(measured), (), GAUGE_AGAIN)
-    if (left := worst(measured, ranking.asked)) > BEYOND:
-        return _said(measured, "unexplained", DRIFTING.format(left), (), AGAIN)
+    left = worst(measured, ranking.asked)
+    if left.free > BEYOND:
+        return _said(measured, "unexplained", DRIFTING.format(left.free), (), AGAIN)
     off, worst_run = strengths_off(ranking), worst_missed(measured)
     if off and moved_one_way(measured):
         experiment = _next(measured, ranking, weigh(ranking), one_way=True)
@@ -188,7 +194,9 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
         summary = WITH_THESE.format(missed, off, noise)
     else:
         summary = f"The model is adequate: {noise} that an effect would explain.{off}"
-        summary += WITHOUT.format(missed) if missed > MULTIPLE else ""
+        if missed > MULTIPLE and left.whole <= BEYOND:
+            summary += WITHOUT.format(missed, left.whole)
+    summary += AT_ENDS.format(left.whole) if left.whole > BEYOND else ""
     if doubt := other_unit(measured):
         summary += f" But {doubt}."
     return _said(measured, "adequate", summary, (), None)

@@ -1,5 +1,6 @@
 """Whole runs of a model with its own strengths fitted: how much they are missed by, and why."""
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -20,12 +21,25 @@ DRAWS = 8
 """Strengths that are drawn, to tell how far their errors move a run."""
 
 
-def worst(measured: Measured, asked: Asked) -> float:
+@dataclass(frozen=True)
+class Worst:
     """By how many times what errors explain of it the worst whole run is missed.
 
-    Errors of positions, of the start, of the recorded force and of the fitted strengths. A run
-    counts up to where the joint meets an end of its range: after that the stop decides, not a law
-    of the joint. A run that is missed by no more than `BEYOND` noises is told in those.
+    Errors of positions, of the start, of the recorded force and of the fitted strengths. A run that
+    is missed by no more than `BEYOND` noises is told in those.
+
+    Attributes:
+        free: of runs up to where the joint meets an end of its range: after that the stop decides
+            too, not only a law of the joint.
+        whole: of all of the runs.
+    """
+
+    free: float
+    whole: float
+
+
+def worst(measured: Measured, asked: Asked) -> Worst:
+    """How far a model is off the whole runs.
 
     Args:
         measured: the joint and its runs.
@@ -39,20 +53,28 @@ def worst(measured: Measured, asked: Asked) -> float:
     def others() -> list[Replayer]:
         return list(map(with_, _drawn(asked)))
 
-    replayer, out = with_(asked.fit.x), 0.0
-    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        part = _free(run, sigma, measured.profile.joint.range)
+    replayer = with_(asked.fit.x)
+
+    def times(part: Run, sigma: float) -> float:
         if not (start := replayer.start(part, sigma)):
-            continue
+            return 0.0
         path = replayer.whole(part, start)
         there = ~np.isnan(path)
         missed = rms(path[there] - part.position[there]) / sigma
-        if missed > BEYOND:
-            moved = [other.whole(part, start)[there] - path[there] for other in others()]
-            apart = rms(np.concatenate(moved)) if moved else 0.0
-            missed *= sigma / float(np.linalg.norm([sigma, replayer.scatter(part, start), apart]))
-        out = max(out, missed)
-    return out
+        if missed <= BEYOND:
+            return missed
+        moved = [other.whole(part, start)[there] - path[there] for other in others()]
+        apart = rms(np.concatenate(moved)) if moved else 0.0
+        spread = [sigma, replayer.scatter(part, start), apart]
+        return missed * sigma / float(np.linalg.norm(spread))
+
+    free, whole = 0.0, 0.0
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        part = _free(run, sigma, measured.profile.joint.range)
+        found = times(part, sigma)
+        free = max(free, found)
+        whole = max(whole, found if len(part.time) == len(run.time) else times(run, sigma))
+    return Worst(free, whole)
 
 
 def _drawn(asked: Asked) -> Array:

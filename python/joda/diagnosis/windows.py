@@ -86,6 +86,35 @@ class Windows:
             share=(self.step % GRID + self.share) / GRID,
         )
 
+    def only(self, kept: NDArray[np.bool_]) -> "Windows":
+        """Some of them, each with the steps up to the next one; shape of `kept`: (m,)."""
+        ends = np.append(self.at[1:], len(self.force))
+        steps = [np.arange(a, b) for a, b in zip(self.at[kept], ends[kept], strict=True)]
+        at = np.cumsum([0, *map(len, steps)])[:-1]
+        old = self.rows[kept]
+        there = old >= 0
+        samples, of = old[there], np.nonzero(there)[0]
+        rows = np.full(old.shape, -1)
+        rows[there] = np.arange(len(samples))
+        return replace(
+            self,
+            force=self.force[np.concatenate(steps)],
+            at=at,
+            fresh=np.ones(len(at), bool),
+            start=self.start[kept],
+            doubt=self.doubt[kept],
+            step=self.step[samples] - self.at[kept][of] + at[of],
+            share=self.share[samples],
+            position=self.position[samples],
+            time=self.time[samples],
+            run=self.run[kept],
+            rows=rows,
+            sharpness=self.sharpness[kept],
+            shared=self.shared[kept],
+            knocks=self.knocks[kept],
+            rests=self.rests[kept],
+        )
+
     def misfit(self, solo: Solo, start: Array) -> Array:
         """Predicted minus measured positions, rad or m, shape (n,)."""
         before, after = solo.replay(self.force, self.at, start, self.fresh, self.h)
