@@ -103,3 +103,12 @@ def test_windows_by_themselves_are_missed_as_among_all(tmp_path):
     some = windows.only(kept)
     alone = some.residuals(some.misfit(solo, some.start))
     assert np.allclose(alone, every, rtol=1e-9, atol=1e-9)
+
+
+def test_no_end_is_bouncier_than_one_that_gives_nearly_all_back(tmp_path):
+    """Only a restitution above the model's is tried, and there is none."""
+    begun = asked(slide(tmp_path, 0.1, 0.6, np.random.default_rng(), "-40000 -2"))
+    assert (begun.judge.windows.knocks).any()
+    ends = [one for one in begun.hypotheses if one.effect == RESTITUTION]
+    assert len(ends) == 3
+    assert begun.bouncy(ends) == []

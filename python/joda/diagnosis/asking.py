@@ -28,7 +28,7 @@ from joda.diagnosis.guessing import (
 )
 from joda.diagnosis.hypotheses import Hypothesis, hypotheses
 from joda.diagnosis.judge import Fit, Judge
-from joda.diagnosis.knocks import knock_guesses
+from joda.diagnosis.knocks import Knocks, Rebound, ends_of, knock_guess, knocks_at
 from joda.joints.single import Single
 from joda.measured.reading import Measured
 from joda.profile import Profile
@@ -68,18 +68,40 @@ class Asked:
         noise = judge.overdispersion(fit.squares)
         return np.asarray(noise * np.linalg.inv(H + np.diag(base.unknowns.doubt**-2.0)))
 
+    @cached_property
+    def knocks(self) -> dict[int, Knocks]:
+        """At each end that has some, -1 low and 1 high."""
+        return knocks_at(self.judge.windows, self.base, self.given)
+
+    @cached_property
+    def rebounds(self) -> dict[int, Rebound]:
+        """What the knocks at each end tell of it, where the model is as it was fitted."""
+        profile = self.base.written(self.fit.x)
+        return {side: knocks.rebound(profile) for side, knocks in self.knocks.items()}
+
     def tell(self, hypothesis: Hypothesis) -> Guess | None:
         """The hypothesis fitted; None if the data cannot tell of it."""
         if hypothesis.effect == RESTITUTION:
-            return next(iter(self.bouncy([hypothesis], surely=False)), None)
+            return self._thrown_back(hypothesis)
         return self.finished(self.rough(hypothesis))
 
-    def bouncy(
-        self, ends: Sequence[Hypothesis], others: Sequence[Profile] = (), surely: bool = True
-    ) -> list[Guess]:
-        """How bouncy the ends are, see `knock_guesses`."""
-        fixed = self.judge, self.base, self.given, self.fit
-        return knock_guesses(*fixed, ends, others, surely)
+    def bouncy(self, ends: Sequence[Hypothesis], others: Sequence[Profile] = ()) -> list[Guess]:
+        """How bouncy the ends are that throw the joint back clearly faster than the model's do.
+
+        Args:
+            ends: an end that is bouncy, or both.
+            others: what else the joint's profile may be: with all of them that must be so too.
+        """
+        sure = {
+            side
+            for side, own in self.rebounds.items()
+            if own.bouncier and all(self.knocks[side].rebound(o).bouncier for o in others)
+        }
+        there = [self._thrown_back(end) for end in ends if sure.issuperset(ends_of(end))]
+        return [guess for guess in there if guess]
+
+    def _thrown_back(self, end: Hypothesis) -> Guess | None:
+        return knock_guess(self.judge, self.base, self.fit, self.rebounds, end)
 
     def rough(self, hypothesis: Hypothesis) -> "Rough":
         """The hypothesis fitted roughly, in longer steps, to windows without knocks."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._core import stop_damping
 from joda.diagnosis.baseline import LEAST, Base
 from joda.diagnosis.guessing import Guess, guessed
 from joda.diagnosis.hypotheses import Hypothesis
@@ -14,7 +13,7 @@ from joda.diagnosis.judge import Fit, Judge
 from joda.diagnosis.windows import Windows
 from joda.joints.single import Single
 from joda.profile import Channels, Profile
-from joda.scenes.limits import IMPEDANCE, STIFFNESS
+from joda.scenes.limits import IMPEDANCE, KNOCK_STEPS, rebounding
 
 Array = NDArray[np.float64]
 
@@ -28,6 +27,8 @@ MOST = 24
 """Windows with knocks at an end from which on only some are looked at."""
 RATIOS = np.linspace(0.2, 0.95, 11)
 """Restitutions that are tried."""
+FEWEST = 3
+"""Restitutions between which the best one is told, at the least."""
 SHORTEST, TIMES = 6, 8
 """Steps that a knock lasts at the least without damping, and how many durations are tried."""
 CLEAR = 3.0
@@ -38,43 +39,23 @@ KNOCK_TIME = 0.6
 """In which a joint goes through its range towards a knock, s."""
 
 
-def knock_guesses(
-    judge: Judge,
-    base: Base,
-    given: Single,
-    fit: Fit,
-    hypotheses: Sequence[Hypothesis],
-    others: Sequence[Profile] = (),
-    surely: bool = True,
-) -> list[Guess]:
-    """How bouncy the ends are, by the windows with knocks there.
-
-    How long and how deep a knock is tells of the stop's stiffness, which is another matter: every
-    restitution is tried with the stiffness that suits it best.
+def knock_guess(
+    judge: Judge, base: Base, fit: Fit, rebounds: dict[int, "Rebound"], hypothesis: Hypothesis
+) -> Guess | None:
+    """How bouncy an end is, or both, by the windows with knocks there; None if there are none.
 
     Args:
         judge, base, fit: the model and how it was fitted.
-        given: the joint with its own ends.
-        hypotheses: an end that is bouncy, or both.
-        others: what else the joint's profile may be: with all of them an end must be bouncier too.
-        surely: whether it is asked if they are; else all that have knocks are told.
+        rebounds: what the knocks at each end tell.
+        hypothesis: bouncy ends.
     """
-    found: dict[int, Rebound] = {}
-    for side, knocks in knocks_at(judge.windows, base, given).items():
-        told = knocks.rebound(base.written(fit.x))
-        if not surely or (told.bouncier and all(knocks.rebound(o).bouncier for o in others)):
-            found[side] = told
-    out = []
-    for hypothesis in hypotheses:
-        ends = ends_of(hypothesis)
-        there = [found[side] for side in ends if side in found]
-        if not there or (surely and len(there) < len(ends)):
-            continue
-        whole = Rebound.together(there)
-        ratio = best_ratio(whole, judge.windows, base, ends)[0]
-        x = np.append(fit.x, np.clip(ratio, hypothesis.unknowns.low, hypothesis.unknowns.high))
-        out.append(guessed(judge, hypothesis, replace(fit, x=x, loss=fit.loss - whole.gain)))
-    return out
+    ends = ends_of(hypothesis)
+    if not (there := [rebounds[side] for side in ends if side in rebounds]):
+        return None
+    whole = Rebound.together(there)
+    ratio = best_ratio(whole, judge.windows, base, ends)[0]
+    x = np.append(fit.x, np.clip(ratio, hypothesis.unknowns.low, hypothesis.unknowns.high))
+    return guessed(judge, hypothesis, replace(fit, x=x, loss=fit.loss - whole.gain))
 
 
 def best_ratio(
@@ -159,6 +140,9 @@ class Rebound:
 class Knocks:
     """The windows with knocks at an end.
 
+    How long and how deep a knock is tells of the stop's stiffness, which is another matter: every
+    restitution is tried with the stiffness that suits it best.
+
     Attributes:
         judge: of these windows alone.
         given: the joint with the model's own ends.
@@ -188,7 +172,10 @@ class Knocks:
 
 
 def knocks_at(windows: Windows, base: Base, given: Single) -> dict[int, Knocks]:
-    """Of each end that has knocks, -1 low and 1 high, some of them, evenly spread."""
+    """Of each end that has knocks, -1 low and 1 high, some of them, evenly spread.
+
+    None of ends that throw back so much in the model that hardly more can be tried.
+    """
     sides, own, shortest = knocked(windows, base), rebound(base, given), SHORTEST * base.h
     times = np.geomspace(shortest, max(2 * windows.length, 2 * shortest), TIMES)
     out = {}
@@ -200,6 +187,8 @@ def knocks_at(windows: Windows, base: Base, given: Single) -> dict[int, Knocks]:
         seen = speed_ratios(windows, base, [side])
         ratios = np.append(RATIOS, mean_of(seen)[0] if len(seen) else [])
         tried = np.unique(ratios[(ratios > own + CLEARLY) & (ratios <= RATIOS[-1])])
+        if len(tried) < FEWEST:
+            continue
         judge = Judge(windows.only(kept), np.ones(int(kept.sum()), bool))
         out[side] = Knocks(judge, given, own, times, tried)
     return out
@@ -207,10 +196,8 @@ def knocks_at(windows: Windows, base: Base, given: Single) -> dict[int, Knocks]:
 
 def stopped(single: Single, ratio: float, time: float) -> Single:
     """The joint with ends of a restitution, at which a knock without damping lasts a time (s)."""
-    frequency = np.pi / time
-    damping = stop_damping(ratio) / np.sqrt(STIFFNESS) * frequency
-    solref = float(-IMPEDANCE * frequency**2), float(-damping)
-    return replace(single, solref=solref, solimp=(IMPEDANCE, IMPEDANCE, *single.solimp[2:]))
+    solimp = IMPEDANCE, IMPEDANCE, *single.solimp[2:]
+    return replace(single, solref=rebounding(ratio, time / KNOCK_STEPS), solimp=solimp)
 
 
 def ends_of(hypothesis: Hypothesis) -> list[int]:

@@ -29,7 +29,7 @@ from joda.diagnosis.hypotheses.base import (
 )
 from joda.diagnosis.hypotheses.intervals import GRID
 from joda.diagnosis.judge import Judge, Make, Unknowns
-from joda.diagnosis.knocks import Rebound, best_ratio, ends_of, knocks_at
+from joda.diagnosis.knocks import Rebound, best_ratio, ends_of
 from joda.field import merge
 from joda.profile import CHANNELS, Profile
 
@@ -250,11 +250,7 @@ def _restitution(asked: Asked, found: Guess) -> Uncertainty:
     """
     windows, base, sides = asked.judge.windows, asked.base, ends_of(found.hypothesis)
     size = found.hypothesis.magnitude(found.x)
-    profile = base.written(asked.fit.x)
-    told = {
-        side: knocks.rebound(profile)
-        for side, knocks in knocks_at(windows, base, asked.given).items()
-    }
+    told = asked.rebounds
     whole = Rebound.together([told[side] for side in sides if side in told])
     error = float(
         np.hypot(best_ratio(whole, windows, base, sides)[1], OWN_SHAPE[RESTITUTION] * size)

@@ -13,14 +13,29 @@ import numpy as np
 
 from joda._core import stop_damping
 
-STIFFNESS = (np.pi / 16) ** 2
-"""Of a stop with a restitution, times the timestep squared: as kStopStiffness in cpp/end_stop.h."""
+KNOCK_STEPS = 16
+"""How many timesteps a knock at a stop with a restitution lasts without damping: as kKnockSteps in
+cpp/end_stop.h."""
+STIFFNESS = (np.pi / KNOCK_STEPS) ** 2
+"""Of such a stop, times the timestep squared: as kStopStiffness there."""
 IMPEDANCE = 0.99
 """As kStopImpedance there."""
 YIELDING, FIRM = 1e-2, 1e-3
 """A stop that yields by more than the first share of the range is made to yield by the second."""
 MOST = 0.9999
 """Largest impedance that MuJoCo takes."""
+
+
+def rebounding(restitution: float, timestep: float) -> tuple[float, float]:
+    """The attribute solreflimit of a joint, with the constant impedance `IMPEDANCE`.
+
+    Args:
+        restitution: speed after a knock divided by the speed before, 0 <= restitution < 1.
+        timestep: s; a knock lasts `KNOCK_STEPS` of these without damping.
+    """
+    # documented: the stiffness is multiplied by d / d^2 and the damping by 1 / d; then, with the
+    # impedance d, the row makes the share d of the acceleration
+    return -IMPEDANCE * STIFFNESS / timestep**2, -stop_damping(restitution) / timestep
 
 
 @cache
@@ -31,11 +46,8 @@ def limit_parameters(restitution: float, timestep: float) -> tuple[str, str]:
         restitution: speed after a knock divided by the speed before, 0 <= restitution < 1.
         timestep: s; for another one the restitution is another one too.
     """
-    stiffness, damping = STIFFNESS / timestep**2, stop_damping(restitution) / timestep
-    # documented: the stiffness is multiplied by d / d^2 and the damping by 1 / d; then, with the
-    # impedance d, the row makes the share d of the acceleration
-    d = IMPEDANCE
-    return f"{-stiffness * d:.6g} {-damping:.6g}", f"{d:g} {d:g} 0.001"
+    stiffness, damping = rebounding(restitution, timestep)
+    return f"{stiffness:.6g} {damping:.6g}", f"{IMPEDANCE:g} {IMPEDANCE:g} 0.001"
 
 
 def firm_limit(
