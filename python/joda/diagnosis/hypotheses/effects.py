@@ -54,6 +54,13 @@ VARIED = 0.5
 """How much a curve varies at least that differs along the way, in units of its mean."""
 KEPT = 3
 """Rough fits of a load behind a play that are fitted to the end: each knock may be or not."""
+JAMMED = 1.0
+"""Friction per load that no force moves."""
+HEAVY = 300.0
+"""Added inertia, in units of the joint's, up to which is looked."""
+MOVED = 0.9
+"""Part of the largest friction per load, or added inertia, from which no force is felt to move the
+joint: something else does."""
 TINY = 1e-12
 """As good as no force."""
 
@@ -113,6 +120,7 @@ def _effect(
     unit: str,
     direction: Direction = "both",
     remains: float = KNOWN_LAW,
+    itself: Callable[[Array], bool] = lambda x: True,
 ) -> Hypothesis:
     """One of the effects beyond the channels."""
     return Hypothesis(
@@ -125,6 +133,7 @@ def _effect(
         magnitude,
         unit,
         remains=remains,
+        itself=itself,
     )
 
 
@@ -180,11 +189,12 @@ def _resistances(units: Units) -> Iterator[Hypothesis]:
     if units.forced or units.weight:
         yield _effect(
             "load_dependent_friction",
-            [(0.0, 0.7, 0.002, np.nan, 2.0)],
+            [(0.0, 0.7, 0.002, np.nan, JAMMED)],
             [[0.05]],
             lambda x: LoadDependentFriction(coefficient=float(x[0])),
             lambda x: float(x[0]),
             "1",
+            itself=lambda x: bool(x[0] < MOVED * JAMMED),
         )
 
 
@@ -212,11 +222,12 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
     F, M = units.force, units.inertia
     yield _effect(
         "added_inertia",
-        [(1e-4, 5.0, 0.002, np.nan, 300.0)],
+        [(1e-4, 5.0, 0.002, np.nan, HEAVY)],
         [[0.1]],
         lambda x: AddedInertia(inertia=M * float(x[0])),
         lambda x: M * float(x[0]),
         "kg·m²" if units.hinge else "kg",
+        itself=lambda x: bool(x[0] < MOVED * HEAVY),
     )
     if units.hinge:
         yield _effect(
