@@ -74,7 +74,7 @@ def windows_of(
             place = (time - time[0]) / h
             index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
             spread = _spread(time, position, sigma)
-            begins = _before_knocks(begins, index, (position - lo) / span, spread / span)
+            begins, hits = _before_knocks(begins, index, (position - lo) / span, spread / span)
             many = len(begins)
             window = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST
@@ -90,10 +90,10 @@ def windows_of(
             parts.append((force, step + begins, fresh, start, doubts, same))
             window = np.where(enough[window] & _thinned(window), window + count, -1)
             noise = spread, smoothing.force_error(time, run.force[piece], run.forced)
-            samples.append((step + index, place - index, position, time, window, *noise))
+            samples.append((step + index, place - index, position, time, window, hits, *noise))
             step, count = step + steps, count + many
     force, at, fresh, start, doubts, run_of = (np.concatenate(x) for x in zip(*parts, strict=True))
-    index, share, position, time, window, spread, push = (
+    index, share, position, time, window, hits, spread, push = (
         np.concatenate(x) for x in zip(*samples, strict=True)
     )
     rows = rows_of(window, count)
@@ -112,7 +112,7 @@ def windows_of(
         rows=rows,
         sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
         shared=_shared(rows, time, spread, push / inertia),
-        knocks=_knocks(rows, (position - lo) / span, spread / span),
+        knocks=_knocks(rows, (position - lo) / span, spread / span, hits),
         rests=_rests(rows, (position - lo) / span, spread / span),
     )
 
@@ -201,22 +201,44 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
     return out
 
 
-def _before_knocks(begins: Integers, index: Integers, s: Array, noise: Array) -> Integers:
-    """Where windows begin, also just before a knock: what is before it tells of the joint."""
+def _before_knocks(
+    begins: Integers, index: Integers, s: Array, noise: Array
+) -> tuple[Integers, NDArray[np.bool_]]:
+    """Where windows begin, also just before a knock: what is before it tells of the joint; and
+    which samples are knocks."""
     rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
-    more = []
-    for row, knock in zip(rows, _each_knock(rows, s, noise), strict=True):
-        before = 0 if knock is None else knock - APPROACH
-        if knock is not None and before < FEWEST:  # a short stroke: up to the knock itself
-            before = knock
-        if before >= smoothing.LEAST:
-            more.append(index[row[before]] // GRID * GRID)
-    return np.unique(np.append(begins, np.array(more, int)))
+    knocks = _each_knock(rows, s, noise)
+    many = (rows >= 0).sum(axis=1)
+    more, fewer, hits = [], [], np.zeros(len(s), bool)
+    for k, knock in enumerate(knocks):
+        if knock is None:
+            continue
+        hit = rows[k][knock]
+        hits[hit] = True
+        before = knock - APPROACH
+        joined = k > 0 and knocks[k - 1] is None and many[k - 1] + before >= 2 * FEWEST
+        if before >= FEWEST:
+            more.append(hit - APPROACH)
+        elif joined:  # the window before ends there
+            more.append(hit - APPROACH)
+            fewer.append(begins[k])
+        elif knock >= smoothing.LEAST:  # a short stroke: up to the knock itself
+            more.append(hit)
+    kept = np.setdiff1d(begins, np.array(fewer, int))
+    return np.union1d(kept, index[np.array(more, int)] // GRID * GRID), hits
 
 
-def _knocks(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
-    """Whether the joint comes to an end of its range in a window, at some speed."""
-    return np.array([knock is not None for knock in _each_knock(rows, s, noise)], bool)
+def _knocks(rows: Integers, s: Array, noise: Array, hits: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether the joint comes to an end of its range in a window, at some speed: as windows show
+    it, or these cut anew before a knock, where what is before it is no longer in the same one."""
+    found = _each_knock(rows, s, noise)
+    return np.array(
+        [
+            hits[row[row >= 0]].any() or knock is not None
+            for row, knock in zip(rows, found, strict=True)
+        ],
+        bool,
+    )
 
 
 def _rests(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.effects import EndStopRestitution
 from joda.field import merge
 from joda.profile import CHANNELS, Channels, Profile
 
@@ -49,7 +50,7 @@ def places(profile: Profile, effect: str, given: Profile | None = None) -> list[
     """Where a profile's effect acts, in normalised position, by each of the levels: of its force,
     and of how far that rises above its least value.
 
-    All over the range if it is a law.
+    All over the range if it is a law, at its end if it is an end of the range.
 
     Args:
         profile: that has it.
@@ -62,7 +63,8 @@ def places(profile: Profile, effect: str, given: Profile | None = None) -> list[
         if channel.components:
             value = np.abs(merge(channel)(np.linspace(0, 1, GRID))[0])
             return [_felt(own, level) for own in (value, value - value.min()) for level in LEVELS]
-    return [(0.0, 1.0)]
+    ends = [one.interval for one in own.effects if isinstance(one, EndStopRestitution)]
+    return ends or [(0.0, 1.0)]
 
 
 def _felt(value: Array, level: float) -> Interval:

@@ -36,6 +36,8 @@ from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
 
+FALLEN = 0.95
+"""Part of an error held out that an effect leaves at most, where only a second look knows of it."""
 SLOWEST = 0.02
 """Part of the range per second that a motion is proposed at, at the least."""
 SURE = 0.9
@@ -162,7 +164,8 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     profile = ranking.guesses[sized[0]].written(ranking.asked.base)
     first = findings[0]
     helps = first.held_out_error_after < first.held_out_error_before
-    if first_weighed.verdict == "adequate" and not helps and weighed.excess[0] < MUCH:
+    hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
+    if first_weighed.verdict == "adequate" and hardly and weighed.excess[0] < MUCH:
         return Diagnosed(_calm(measured, first_ranking))  # nor do windows held out know of anything
     verdict = weighed.verdict if helps else "unexplained"
     base, guess = ranking.asked.base, ranking.guesses[sized[0]]

@@ -106,6 +106,11 @@ class Backlash(Effect):
         return self
 
 
+End = Literal["both", "low", "high"]
+ENDS: dict[End, tuple[float, float]] = {"both": (0.0, 1.0), "low": (0.0, 0.02), "high": (0.98, 1.0)}
+"""Where an end of the range acts, in normalised position."""
+
+
 class EndStopRestitution(Effect):
     """How the ends of the range, or one of them, throw the joint back."""
 
@@ -118,6 +123,11 @@ class EndStopRestitution(Effect):
     restitution: float = parameter(
         "speed after a knock per speed before", "1", "1", (0, 0.8), ge=0, lt=1
     )
-    end: Literal["both", "low", "high"] = Field(
+    end: End = Field(
         default="both", description="of the range that does so; the other one stays the scene's"
     )
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Where it acts, in normalised position; all of the range stands for both ends."""
+        return ENDS[self.end]

@@ -37,14 +37,10 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
-from joda.effects.mechanics import HEAVIEST
+from joda.effects.mechanics import ENDS, HEAVIEST, End
 from joda.profile import Profile
 
 Way = Literal["positive", "negative"]
-End = Literal["both", "low", "high"]
-
-ENDS: dict[End, tuple[float, float]] = {"both": (0.0, 1.0), "low": (0.0, 0.02), "high": (0.98, 1.0)}
-"""Where an end of the range acts."""
 
 KNOTS = 9
 """Control points of a free curve."""
