@@ -9,7 +9,7 @@ from test_scene_contacts import pushed
 
 from joda import compare
 from joda.measured.comparison import _places
-from joda.measured.failing import COLUMNS, Failing, failing
+from joda.measured.failing import COLUMNS, KNOCK, Failing, failing
 from joda.measured.reading import read_measured
 from joda.measured.runs import read_run
 
@@ -102,3 +102,17 @@ def test_a_whole_run_that_no_constant_force_explains_blames_none(tmp_path):
 def test_a_small_share_is_no_bare_zero():
     assert "By load: less than 1 % of the error is under" in sentence(share=0.003)
     assert "By load: 3 % of the error is under" in sentence(share=0.03)
+
+
+def test_what_is_missed_in_knocks_is_told_by_place_alone():
+    """All knocks at the high end come in one direction, at one time, fast; the rest is missed by
+    friction in the other."""
+    knocks = rows(-3.0, 0.02, ways=(1.0,), count=20)
+    knocks[:, 0], knocks[:, 3], knocks[:, KNOCK] = 0.99, 5.0, 1.0
+    rest = rows(0.7, 0.02, ways=(-1.0,))
+    rest[:, 5:8] = 1.5, 40, 90.0
+    found = failing(np.concatenate([knocks, rest]))
+    assert found[0].by == "position"
+    others = [place for place in found if place.by == "direction"]
+    assert [place.interval for place in others] == [(-1.0, 0.0)]
+    assert others[0].share < 0.1

@@ -1,7 +1,7 @@
 """Where a model fails: windows sorted by position, velocity, direction, time and load."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -35,7 +35,14 @@ AGREE = 0.8
 """Part of the evidence that must have the sign of the mean force for that force to be told."""
 FORCE = 8
 """Column of the rows: residual force; the next is its standard deviation."""
-COLUMNS = 12
+COLUMNS = 13
+KNOCK = 12
+"""Column of the rows: whether the joint is at an end of its range in the window."""
+REACH = 0.004
+"""How near an end it is there, in normalised position, beside noise."""
+MOSTLY = 0.8
+"""Part of what is beyond the noise at ends from which speed, direction, time and load are told by
+other windows alone: a knock has all of these, but by its place."""
 LEFT = 0.5
 """Part of what is beyond the noise that a mean force must explain to be told."""
 
@@ -104,9 +111,16 @@ def failing(rows: Array) -> list[Failing]:
         return []
     values, found = rows[:, :5], rows[:, 5:]
     beyond = np.maximum(found[:, 2] - found[:, 1], 0.0)
-    out = []
-    for column, by in enumerate(("position", "velocity", "direction", "time", "load")):
-        out += _by(by, values[:, column], found, beyond)  # type: ignore[arg-type]
+    rest = np.ones(len(rows), bool)
+    knocks = rows[:, KNOCK] > 0
+    if beyond[knocks].sum() > MOSTLY * beyond.sum():
+        rest = ~knocks
+    out = _by("position", values[:, 0], found, beyond)
+    others: tuple[By, ...] = ("velocity", "direction", "time", "load")
+    for column, by in enumerate(others, 1):
+        for place in _by(by, values[rest, column], found[rest], beyond[rest]):
+            share = place.share * float(beyond[rest].sum() / beyond.sum())
+            out.append(replace(place, share=share))
     return sorted(out, key=lambda place: (not place.significant, -place.share))
 
 
@@ -115,7 +129,8 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
 
     Columns: normalised position, velocity, direction / 2, time, load; RMS misfit, samples, sum of
     squares in units of the noise (the position's, and what the force's makes of it), residual
-    force, its standard deviation, sums of squares from the best start without and with that force.
+    force, its standard deviation, sums of squares from the best start without and with that force;
+    whether the joint is at an end of its range.
     """
     rows = []
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
@@ -133,7 +148,7 @@ def _tells(window: Window, sigma: float) -> bool:
 
 def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
     """The same of pieces of whole runs, with the whole run's force, NaN if that is long, and each
-    its part of what that force explains."""
+    its part of what that force explains; none is a knock, which is not what is missed there."""
     rows = []
     for run, sigma, path in zip(measured.runs, measured.sigma, paths, strict=True):
         there = np.flatnonzero(~np.isnan(path))
@@ -152,7 +167,7 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
                 misfit = path[samples] - run.position[samples]
                 part = squares * len(samples) / len(there)
                 piece = Window(samples, misfit, force, doubt, pushed=off, squares=tuple(part))
-                rows.append(_row(measured, run, sigma, piece))
+                rows.append([*_row(measured, run, sigma, piece)[:KNOCK], 0.0])
     return np.array(rows).reshape(-1, COLUMNS)
 
 
@@ -174,9 +189,12 @@ def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[flo
     load = float(run.force[window.samples].mean()) + gravity
     square = float(np.sum(window.misfit**2) / (sigma**2 + window.pushed**2))
     place = (middle - lo) / (hi - lo)
+    s = (run.position[window.samples] - lo) / (hi - lo)
+    reach = REACH + BLIND * sigma / (hi - lo)
+    knock = float((s < reach).any() or (s > 1 - reach).any())
     row = [place, speed, 0.5 * float(np.sign(speed)), float(run.time[ends].mean()), load]
     size = rms(window.misfit), len(window.misfit), square
-    return [*row, *size, window.force, window.doubt, *window.squares]
+    return [*row, *size, window.force, window.doubt, *window.squares, knock]
 
 
 def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:

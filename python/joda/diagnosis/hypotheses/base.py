@@ -74,8 +74,8 @@ class Hypothesis:
         rarity: twice the logarithm of how much rarer it is than others.
         remains: part of the excess misfit that it may leave where it is the true one: more where
             only the rough shape of its curve is known.
-        itself: whether it is, with these numbers, what its name says: more than a simpler effect would
-            be, and no size at which forces no longer count.
+        itself: whether it is, with these numbers, what its name says: more than a simpler effect
+            would be, and of no size at which forces no longer count.
         kept: how many rough fits are fitted to the end: several where the motion jumps in a number.
     """
 
