@@ -41,8 +41,10 @@ py::array_t<double> Coefficients(const joda::PiecewiseCubic& channel) {
 
 joda::Solo MakeSolo(double lo, double hi, const Texts& texts, double inertia, double row_inertia,
                     const std::array<double, 2>& weight, bool hinge,
-                    const std::array<double, 2>& solref, const std::array<double, 5>& solimp) {
-  const joda::Body body = {{lo, hi}, inertia, row_inertia, weight, hinge, solref, solimp};
+                    const std::array<double, 2>& solref, const std::array<double, 5>& solimp,
+                    const std::array<double, 2>& friction_row) {
+  const joda::Body body = {{lo, hi}, inertia, row_inertia, weight,
+                           hinge,    solref,  solimp,      friction_row};
   return joda::Solo(body, Pointers(texts).data());
 }
 
@@ -141,12 +143,14 @@ Args:
   weight: hinge: factors of cos q and sin q of gravity's torque; slide: its force, and 0.
   hinge: whether it is a hinge.
   solref, solimp: of the range's ends.
+  friction_row: of MuJoCo's own friction row: damping, 1/s, and stiffness over inertia; zeros: the
+    plugin's row.
 
 Raises:
   ValueError: a text cannot be read, or a number is impossible; one sentence says why.)")
       .def(py::init(&MakeSolo), py::arg("lo"), py::arg("hi"), py::arg("texts"), py::arg("inertia"),
            py::arg("row_inertia"), py::arg("weight"), py::arg("hinge"), py::arg("solref"),
-           py::arg("solimp"))
+           py::arg("solimp"), py::arg("friction_row") = std::array<double, 2>{0, 0})
       .def("replay", &Replay, py::arg("force"), py::arg("at"), py::arg("start"), py::arg("fresh"),
            py::arg("h"), R"(Steps through forces, set to a start here and there.
 

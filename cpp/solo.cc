@@ -84,7 +84,11 @@ void Solo::Advance(double h, double force, State* state) const {
   const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
   const FrictionRow row = StiffenFrictionRow(effects, h, held, bound, v, inertia, load.resistance);
   drag += row.damping;
-  const Friction friction = {held - row.D * v / h, row.D, bound};
+  Friction friction = {held - row.D * v / h, row.D, bound};
+  if (const auto [per_second, stiff] = body_.friction_row; stiff > 0) {
+    const double D = stiff * inertia;  // MuJoCo's own: no memory of what held before
+    friction = {-D * per_second * v, D, bound};
+  }
 
   const double mass = body_.inertia + h * drag;
   const double drive =

@@ -25,6 +25,8 @@ struct Body {
   bool hinge;
   std::array<double, 2> solref;  // of the range's ends
   std::array<double, 5> solimp;
+  // Of MuJoCo's own friction row: damping (1/s), and stiffness over inertia; 0: the plugin's row.
+  std::array<double, 2> friction_row = {0, 0};
 };
 
 class Solo {

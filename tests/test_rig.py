@@ -12,6 +12,7 @@ from joda.joints.rig import rig
 from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scenes.model import find_joint, load_model
 from joda.scenes.motion import gravity_force, release, settle
+from joda.scenes.native import native_attributes, own_friction_row, whole_profile
 
 SEEDS = range(24)
 
@@ -227,3 +228,44 @@ def test_settling_ends_when_patience_does():
     motion = settle(model, 0, 0.3, 4.0)
     assert motion.time[-1] == pytest.approx(4.0, abs=0.02)
     assert motion.position == pytest.approx(0.5 - 0.2 * np.cos(np.sqrt(40) * motion.time), abs=0.01)
+
+
+DRAWER = """<mujoco><compiler angle="radian"/>
+  <option timestep="0.002" integrator="implicitfast" gravity="0 0 0" tolerance="1e-14"/>
+  <worldbody><body>
+    <joint name="j" type="slide" axis="1 0 0" range="-0.3 0.4" damping="1.5" stiffness="20"
+           springref="0.1" frictionloss="0.8" solreffriction="0.03 0.9" solimpfriction="0.8 0.9"/>
+    <geom size="0.1" mass="0.7"/>
+  </body></worldbody></mujoco>"""
+
+
+def test_a_joint_with_native_elements_alone_is_the_scenes_own(tmp_path):
+    """Friction that yields as MuJoCo's default row does; with the plugin it would not."""
+    (tmp_path / "in.xml").write_text(DRAWER)
+    scene = load_model(tmp_path / "in.xml")
+    found = context(tmp_path / "in.xml", "j")
+    profile = whole_profile(scene, 0, Profile(joint=found.joint))
+    assert native_attributes(profile) == {
+        "stiffness": pytest.approx((20.0,)),
+        "springref": pytest.approx((0.1,)),
+        "frictionloss": (0.8,),
+        "damping": (1.5,),
+    }
+    row = own_friction_row(scene, 0)
+    forces = 3 * np.sin(0.01 * np.arange(2000))
+    paths = []
+    for model in (scene, rig(found, profile, row), rig(found, profile)):
+        data = mujoco.MjData(model)
+        data.qpos[0], path = 0.05, []
+        model.opt.tolerance = 1e-14
+        for force in forces:
+            data.qfrc_applied[0] = force
+            mujoco.mj_step(model, data)
+            path.append(data.qpos[0])
+        paths.append(np.array(path))
+    np.testing.assert_allclose(paths[1], paths[0], rtol=0, atol=1e-7)
+    assert np.abs(paths[2] - paths[0]).max() > 1e-4
+    more = profile.with_component(
+        "friction", Component(label="pad", interval=(0, 1), x=(0, 1), y=(1, 1))
+    )
+    assert native_attributes(more) == {}

@@ -9,7 +9,7 @@ from joda import context, templates
 from joda._core import Solo
 from joda.effects import Backlash, PreslidingFriction
 from joda.joints.rig import gravity_factors
-from joda.joints.single import ONLY_SLIDES
+from joda.joints.single import ONLY_SLIDES, friction_row
 from joda.profile import ATTRIBUTES
 
 PLAIN = ("", "sum", "0 1 | 0 1 | 1 1", "sum", "0 1 | 0 1 | 0.1 0.1", "sum", "")
@@ -261,3 +261,27 @@ def test_a_mistake_in_a_joint_is_told():
         joint(inertia=0.0)
     with pytest.raises(ValueError, match="increasing"):
         Solo(1, 1, PLAIN, **BODY)
+
+
+@pytest.mark.parametrize(
+    ("solref", "solimp"),
+    [("0.02 1", "0.9 0.95"), ("0.05 0.7", "0.8 0.9"), ("-100 -50", "0.95 0.99")],
+)
+def test_the_engines_own_friction_row_yields_as_in_the_engine(solref, solimp):
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco>
+      <option timestep="0.001" gravity="0 0 0"/>
+      <worldbody><body>
+        <joint name="j" type="slide" axis="1 0 0" frictionloss="0.2" solreffriction="{solref}"
+               solimpfriction="{solimp}"/>
+        <geom size="0.1" mass="0.14"/>
+      </body></worldbody></mujoco>""")
+    own = friction_row(tuple(model.dof_solref[0]), tuple(model.dof_solimp[0]), 1e-3)
+    forces = 0.5 * np.sin(5e-3 * np.arange(4000))
+    forces[2000:2600] = 0.1  # it all but rests
+    friction = "0 1 | 0 1 | 0.2 0.2"
+    body = BODY | {"inertia": 0.14}
+    alone = Solo(-5, 5, ["", "sum", friction, "sum", "", "sum", ""], **body, friction_row=own)
+    _, after = alone.replay(forces, [0], [(0.0, 0.0)], [True], 1e-3)
+    expected = engine(model, 0.0, forces)[1:]
+    np.testing.assert_allclose(after, expected, rtol=0, atol=1e-10)
+    assert np.ptp(expected[2200:2590]) > 1e-4  # it creeps

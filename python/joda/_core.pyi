@@ -35,6 +35,7 @@ class Solo:
         hinge: bool,
         solref: Sequence[float] | NDArray[np.float64],
         solimp: Sequence[float] | NDArray[np.float64],
+        friction_row: Sequence[float] = (0.0, 0.0),
     ) -> None: ...
     def replay(
         self, force: ArrayLike, at: ArrayLike, start: ArrayLike, fresh: ArrayLike, h: float

@@ -241,7 +241,8 @@ Trial TrySolo(Random& random) {
       {Odd(random, 1), Odd(random, -1)},
       Below(random, 2) == 0,
       {Odd(random, 0.02), Odd(random, 1)},
-      {Odd(random, 0.9), Odd(random, 0.95), Odd(random, 0.001), Odd(random, 0.5), Odd(random, 2)}};
+      {Odd(random, 0.9), Odd(random, 0.95), Odd(random, 0.001), Odd(random, 0.5), Odd(random, 2)},
+      {Odd(random, 100), Odd(random, Below(random, 2) ? 9 : 0)}};
   Trial out = {Joined(texts)};
   try {
     const Solo solo(body, Pointers(texts).data());

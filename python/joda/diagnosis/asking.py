@@ -36,6 +36,8 @@ from joda.template import read_templates
 
 Array = NDArray[np.float64]
 
+CLEARLY = 10.0
+"""Gain in loss from which runs tell that friction yields as MuJoCo's own does."""
 RESTITUTION = "end_stop_restitution"
 """Effect that only knocks tell of."""
 
@@ -141,8 +143,22 @@ class Rough:
         return min(self.fits, key=lambda fit: fit.loss)
 
 
+def _fitted(judge: Judge, base: Base, near: Array | None) -> tuple[Fit, Fit]:
+    """A model's strengths fitted, and as they are given."""
+    ones = np.ones(len(base.places))
+    given = replace(judge.started(base.solo(ones)), x=ones)
+    tried = [(ones, judge.windows.start), (ones, given.start)]
+    if near is not None:
+        tried.append((near, judge.started(base.solo(near)).start))
+    fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in tried]
+    return judge.refit(base.solo, base.unknowns, min(fits, key=lambda f: f.loss)), given
+
+
 def asked(measured: Measured, length: float | None = None, near: Array | None = None) -> Asked:
     """Fits the model's own strengths.
+
+    Its native friction may yield as MuJoCo's own row does, where the runs are of such a joint; else
+    it holds as the plugin's, and as that of real joints.
 
     Args:
         measured: the joint and its runs.
@@ -152,14 +168,14 @@ def asked(measured: Measured, length: float | None = None, near: Array | None = 
     """
     windows = windows_for(measured, length)
     judge = Judge(windows, usable(windows))
-    base = base_of(measured.profile, single_for(measured, windows.h), windows.h)
-    ones = np.ones(len(base.places))
-    given = replace(judge.started(base.solo(ones)), x=ones)
-    tried = [(ones, windows.start), (ones, given.start)]
-    if near is not None:
-        tried.append((near, judge.started(base.solo(near)).start))
-    fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in tried]
-    fit = judge.refit(base.solo, base.unknowns, min(fits, key=lambda f: f.loss))
+    single, own = single_for(measured, windows.h), measured.single.friction_row
+    base = base_of(measured.profile, single, windows.h)
+    fit, given = _fitted(judge, base, near)
+    if measured.runs and own:
+        yielding = base_of(measured.profile, replace(single, friction_row=own), windows.h)
+        fit_so, given_so = _fitted(judge, yielding, near)
+        if fit_so.loss < fit.loss - CLEARLY:
+            base, fit, given = yielding, fit_so, given_so
     every = hypotheses(units_of(windows, measured), read_templates(), measured.profile)
     begun = begins(judge.coarser, base.coarser(), given, fit)
     return Asked(judge, base, measured.single, fit, begun, tuple(every))

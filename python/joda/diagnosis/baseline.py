@@ -163,8 +163,10 @@ def single_for(measured: Measured, h: float) -> Single:
 
 
 def as_it_is(measured: Measured) -> Single:
-    """The joint as its scene has it; where there are only curves it is not simulated."""
-    return measured.single if measured.runs else Still(**vars(measured.single))
+    """The joint as its scene has it, with the plugin; where there are only curves it is not
+    simulated."""
+    single = measured.single.with_plugin
+    return single if measured.runs else Still(**vars(single))
 
 
 def _yields(measured: Measured) -> bool:

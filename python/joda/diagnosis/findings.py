@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from joda.diagnosis.corrections import Correction
 from joda.diagnosis.weighing import Verdict
 from joda.errors import JodaError
 from joda.files import read_json
@@ -71,6 +72,7 @@ class Diagnosis:
         next_experiment: that would decide what is open; None if nothing is.
         notes: what is suspicious about the data.
         contacts: of the scene that resist the joint where it was measured.
+        corrections: numbers of the model that the data contradict, apart from what is missing.
         doubt: why the first effect may be none however well it explains the runs, a clause: then it
             is added only if it is asked for by name. None if nothing speaks for that.
     """
@@ -85,6 +87,7 @@ class Diagnosis:
     next_experiment: str | None
     notes: tuple[str, ...]
     contacts: tuple[Contact, ...]
+    corrections: tuple[Correction, ...] = ()
     doubt: str | None = None
 
     def to_json(self) -> str:

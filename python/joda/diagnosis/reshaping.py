@@ -6,7 +6,7 @@ ones.
 """
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,11 +46,14 @@ class Likelihood:
         """Cuts the runs into windows."""
         self.single, self.windows = as_it_is(measured), windows_for(measured, WINDOW, fine=False)
         self.judge = Judge(self.windows, self.windows.count >= LEAST)
+        self.given = measured.profile
+        self.own = replace(self.single, friction_row=measured.single.friction_row)
 
     def loss(self, profile: Profile) -> float:
         """Twice the negative log-likelihood, robustly: a window that is missed altogether, as the
         joint goes over a barrier or just not, counts little."""
-        return self.judge.started(self.single.solo(profile, self.windows.h)).loss
+        single = self.own if profile is self.given else self.single
+        return self.judge.started(single.solo(profile, self.windows.h)).loss
 
 
 @dataclass(frozen=True)

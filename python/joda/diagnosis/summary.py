@@ -1,27 +1,13 @@
 """The verdict as a sentence."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from joda.diagnosis import phrases
-from joda.diagnosis.baseline import Base
 from joda.diagnosis.findings import Finding
-from joda.diagnosis.guessing import Guess
-from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.weighing import MUCH, Weighed
 from joda.measured.gauge import compared
 from joda.measured.reading import Measured
 
-Array = NDArray[np.float64]
-
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
-ALIKE = 0.12
-"""By how much factors may differ that are one."""
-OFF, FAR_OFF = 0.05, 0.3
-"""By how much a strength must be off to be worth a word; and where something else is missing."""
-CLEARLY = 3.0
-"""And by so many of its standard errors."""
 EVEN = 0.5
 """Probability above which an answer is more likely than not."""
 SAME = (
@@ -35,72 +21,11 @@ BLIND = (
 )
 
 
-def strengths_off(ranking: Ranking) -> str:
-    """Which of the model's own strengths are off, by more than 5 % and than three of their standard
-    errors, with these; empty if none is."""
-    base, x = ranking.asked.base, ranking.asked.fit.x
-    return ", ".join(
-        f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.3g} ± {error:.2g}"
-        for place, factor, error in zip(base.places, x, _errors(ranking), strict=True)
-        if abs(factor - 1) > max(OFF, CLEARLY * error)
-    )
-
-
-def by_one_factor(ranking: Ranking) -> str:
-    """That all strengths that the data tell are off by one factor, a further sentence: then it may
-    be the force's."""
-    x = ranking.asked.fit.x[_errors(ranking) < OFF]
-    mean = float(x.mean()) if len(x) > 1 else 1.0
-    if abs(mean - 1) < FAR_OFF or np.abs(x / mean - 1).max() > ALIKE:
-        return ""
-    return (
-        f" All by one factor, about {mean:.2g}: the measured force may be in another unit, or its "
-        "lever arm another."
-    )
-
-
-def _errors(ranking: Ranking) -> Array:
-    return np.asarray(np.sqrt(np.diag(ranking.asked.covariance)))
-
-
-def strengths_beside(base: Base, guess: Guess) -> str:
-    """Which of them are far off with an effect, as a further sentence."""
-    factors = ", ".join(
-        f"{_label(base, place)} \N{MULTIPLICATION SIGN} {factor:.2f}"
-        for place, factor in zip(base.places, guess.fit.x, strict=False)
-        if abs(factor - 1) > FAR_OFF
-    )
-    return f" The model's own numbers are off besides: {factors}." if factors else ""
-
-
-def one_factor(base: Base, guess: Guess) -> str | None:
-    """That more inertia and all the model's strengths are one factor, a clause: then it may be that
-    of the recorded force. None if that is not so."""
-    if guess.hypothesis.effect != "added_inertia" or not base.places:
-        return None
-    inertia = 1 + guess.hypothesis.magnitude(guess.x) / base.single.inertia
-    factors = np.array([inertia, *guess.fit.x[: len(base.places)]])
-    mean = float(factors.mean())
-    if mean < 1 + ALIKE or np.abs(factors / mean - 1).max() > ALIKE:
-        return None
-    return (
-        f"inertia and all of the model's own numbers are too small by one factor, about "
-        f"{mean:.2g}: the recorded force may be so many times too large (its unit, a lever arm), "
-        "and nothing be missing"
-    )
-
-
 def other_unit(measured: Measured) -> str | None:
     """That the force of a curve may be in another unit, a clause; None if not."""
     if not (times := measured.doubtful_unit):
         return None
     return f"{compared(times)}: see to its unit first"
-
-
-def _label(base: Base, place: tuple[str, int]) -> str:
-    """A component's own name, or its channel's."""
-    channel, number = place
-    return getattr(base.profile.channels, channel).components[number].label or channel
 
 
 def summarised(

@@ -7,6 +7,16 @@ import numpy as np
 
 from joda.diagnosis.asking import Asked
 from joda.diagnosis.baseline import joined, usable, windows_for
+from joda.diagnosis.corrections import (
+    FAR_OFF,
+    OFF,
+    by_one_factor,
+    corrections,
+    off,
+    off_beside,
+    one_factor,
+    strengths,
+)
 from joda.diagnosis.coverage import moved_one_way, too_little, too_noisy
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.holdout import Holdout
@@ -19,11 +29,7 @@ from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import (
     BOUNCY,
     SAME,
-    by_one_factor,
-    one_factor,
     other_unit,
-    strengths_beside,
-    strengths_off,
     summarised,
 )
 from joda.diagnosis.uncertainty import uncertainty
@@ -171,9 +177,14 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     base, guess = ranking.asked.base, ranking.guesses[sized[0]]
     doubt = one_factor(base, guess) or other_unit(measured)
     summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy, doubt)
-    summary += f" But {doubt}." if doubt else strengths_beside(base, guess)
+    numbers = strengths(ranking.asked, guess)
+    summary += f" But {doubt}." if doubt else off_beside(numbers)
     likely = tuple(one for one in findings if one.probability >= WORTH_NAMING)
-    said = replace(_said(measured, verdict, summary, likely, experiment), doubt=doubt)
+    said = replace(
+        _said(measured, verdict, summary, likely, experiment),
+        corrections=() if doubt else corrections(numbers, measured.profile.joint, FAR_OFF),
+        doubt=doubt,
+    )
     return Diagnosed(said, profile if likely else None, findings, puzzling)
 
 
@@ -184,25 +195,28 @@ def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
     left = worst(measured, ranking.asked)
     if left.free > BEYOND:
         return _said(measured, "unexplained", DRIFTING.format(left.free), (), AGAIN)
-    off, worst_run = strengths_off(ranking), worst_missed(measured)
-    if off and moved_one_way(measured):
+    numbers, worst_run = strengths(ranking.asked), worst_missed(measured)
+    told = off(numbers)
+    if told and moved_one_way(measured):
         experiment = _next(measured, ranking, weigh(ranking), one_way=True)
-        summary = EITHER.format(off) + SAME + "."
+        summary = EITHER.format(told) + SAME + "."
         summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
         return _said(measured, "unexplained", summary, (), experiment)
-    off = f" Its own numbers are off: {off}.{by_one_factor(ranking)}" if off else ""
+    if told:
+        told = f" Its own numbers are off: {told}.{by_one_factor(numbers)}"
     missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
-    if off and worst_run and worst_run.fault:
-        summary = WITH_THESE.format(missed, off, noise)
+    if told and worst_run and worst_run.fault:
+        summary = WITH_THESE.format(missed, told, noise)
     else:
-        summary = f"The model is adequate: {noise} that an effect would explain.{off}"
+        summary = f"The model is adequate: {noise} that an effect would explain.{told}"
         if missed > MULTIPLE and left.whole <= BEYOND:
             summary += WITHOUT.format(missed, left.whole)
     summary += AT_ENDS.format(left.whole) if left.whole > BEYOND else ""
     if doubt := other_unit(measured):
         summary += f" But {doubt}."
-    return _said(measured, "adequate", summary, (), None)
+    calm = _said(measured, "adequate", summary, (), None)
+    return replace(calm, corrections=corrections(numbers, measured.profile.joint, OFF))
 
 
 def _said_uneven(measured: Measured) -> str:

@@ -1,6 +1,6 @@
 """Whole runs of a model with its own strengths fitted: how much they are missed by, and why."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -46,8 +46,11 @@ def worst(measured: Measured, asked: Asked) -> Worst:
         asked: the model fitted to them.
     """
 
+    row = asked.base.single.friction_row
+    single = replace(measured.single, friction_row=row)
+
     def with_(strengths: Array) -> Replayer:
-        return measured.changed(asked.base.written(strengths)).replayer
+        return measured.changed(asked.base.written(strengths), single=single).replayer
 
     @cache  # only a run that is missed by much asks for them
     def others() -> list[Replayer]:

@@ -16,6 +16,7 @@ from joda.profile import Profile
 from joda.scenes.attaching import attach
 from joda.scenes.context import Context
 from joda.scenes.model import load_model
+from joda.scenes.native import Row, native_attributes
 
 GRAVITY = 9.81
 TIMESTEP = 0.002
@@ -26,7 +27,7 @@ XML = """
   <option timestep="{timestep}" gravity="0 0 {gravity}" integrator="implicitfast"/>
   <worldbody>
     <body>
-      <joint name="joint" type="{kind}" axis="{axis}" range="{lo} {hi}" limited="true"/>
+      <joint name="joint" type="{kind}" axis="{axis}" range="{lo} {hi}" limited="true" {own}/>
       <inertial pos="{x} 0 {z}" mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>
     </body>
   </worldbody>
@@ -34,25 +35,33 @@ XML = """
 """
 
 
-def rig(context: Context, profile: Profile) -> mujoco.MjModel:
+def rig(context: Context, profile: Profile, friction_row: Row | None = None) -> mujoco.MjModel:
     """The joint alone, with a profile.
 
     Args:
         context: the joint.
         profile: of that joint.
+        friction_row: solref and solimp of MuJoCo's own friction row: a profile of nothing but
+            native elements is then the joint's own, without the plugin.
 
     Returns:
         a model whose only joint has the same range, generalised inertia and gravity force.
     """
     inertia, (lo, hi) = context.equivalent_inertia, context.joint.range
     numbers = _hinge(context) if context.joint.type == "hinge" else _slide(context)
+    native = native_attributes(profile) if friction_row else {}
+    if friction_row and native:
+        native["solreffriction"], native["solimpfriction"] = friction_row
     text = XML.format(
         timestep=TIMESTEP,
         kind=context.joint.type,
         lo=lo,
         hi=hi,
+        own=" ".join(f'{key}="{" ".join(map(repr, x))}"' for key, x in native.items()),
         **{"gravity": -GRAVITY, "inertia": inertia, **numbers},
     )
+    if native:
+        return mujoco.MjModel.from_xml_string(text)
     on_rig = profile.model_copy(
         update={"joint": profile.joint.model_copy(update={"name": "joint"})}
     )

@@ -11,7 +11,10 @@ from joda.joints.rig import gravity_factors
 from joda.profile import CHANNELS, Profile
 from joda.scenes.context import Context
 from joda.scenes.limits import limit_parameters
+from joda.scenes.native import Row, own_friction_row
 
+IMPEDANCES = 1e-4, 0.9999
+"""To which MuJoCo limits `solimp`."""
 ONLY_SLIDES = 2
 """In `mjModel.body_simple`."""
 
@@ -26,6 +29,8 @@ class Single:
         weight: hinge: factors of cos q and sin q of gravity's torque, N·m; slide: force, N, and 0.
         hinge: whether it is a hinge.
         solref, solimp: of the ends of the range.
+        friction_row: solref and solimp of MuJoCo's own friction row, which yields where the joint
+            all but rests; None: the plugin's, which hardly does.
     """
 
     inertia: float
@@ -34,6 +39,7 @@ class Single:
     hinge: bool
     solref: tuple[float, ...]
     solimp: tuple[float, ...]
+    friction_row: Row | None = None
 
     def solo(self, profile: Profile, h: float) -> Solo:
         """The joint with a profile, for steps of h (s)."""
@@ -45,7 +51,13 @@ class Single:
         solref, solimp = self.limits(profile, h)
         lo, hi = profile.joint.range
         fixed = self.inertia, self.row_inertia, self.weight, self.hinge
-        return Solo(lo, hi, texts, *fixed, solref, solimp)
+        row = friction_row(*self.friction_row, h) if self.friction_row else (0.0, 0.0)
+        return Solo(lo, hi, texts, *fixed, solref, solimp, row)
+
+    @property
+    def with_plugin(self) -> "Single":
+        """The same with the plugin's friction row."""
+        return replace(self, friction_row=None)
 
     def without_weight(self) -> "Single":
         """The same joint where there is no gravity."""
@@ -62,6 +74,17 @@ class Single:
                 solref, solimp = (tuple(map(float, text.split())) for text in words)
                 return solref, (*solimp, *self.solimp[len(solimp) :])
         return self.solref, self.solimp
+
+
+def friction_row(
+    solref: tuple[float, ...], solimp: tuple[float, ...], h: float
+) -> tuple[float, float]:
+    """Of MuJoCo's own friction row, for steps of h (s): its damping, 1/s, and its stiffness over
+    the inertia. Source: MuJoCo's documentation, Computation, Parameters."""
+    least, most = np.clip(solimp[:2], *IMPEDANCES)
+    time, ratio = solref
+    damping = 2 / (most * max(time, 2 * h)) if time > 0 else -ratio / most
+    return float(damping), float(least / (1 - least))
 
 
 def single(context: Context, profile: Profile, model: mujoco.MjModel, joint: int) -> Single:
@@ -83,6 +106,7 @@ def single(context: Context, profile: Profile, model: mujoco.MjModel, joint: int
         hinge=hinge,
         solref=tuple(map(float, model.jnt_solref[joint])),
         solimp=tuple(map(float, model.jnt_solimp[joint])),
+        friction_row=own_friction_row(model, joint),
     )
 
 

@@ -44,7 +44,7 @@ class Measured:
     Attributes:
         context: of the joint.
         profile: all that acts on it (`joda.scenes.native`).
-        single: all of the joint but its profile.
+        single: all of the joint but its profile; friction that is MuJoCo's own has its row.
         timestep: of the model, s.
         replayer: of that profile.
         runs: measured.
@@ -78,7 +78,8 @@ class Measured:
         """The same joint with another profile, another body, or with some of its runs only."""
         numbers = range(len(self.runs)) if runs is None else runs
         new = self.profile if profile is None else profile
-        own = single or self.single
+        same = profile is None
+        own = single or (self.single if same else self.single.with_plugin)
         found = self.context if single is None else weighing(self.context, single)
         return replace(
             self,

@@ -114,7 +114,8 @@ class Replayer:
 
     def __init__(self, context: Context, profile: Profile, single: Single, timestep: float) -> None:
         """Args: the joint in its scene; its whole profile (`scenes.native`); the rest; step, s."""
-        self.model = rig(context.model_copy(update={"equivalent_inertia": single.inertia}), profile)
+        alone = context.model_copy(update={"equivalent_inertia": single.inertia})
+        self.model = rig(alone, profile, single.friction_row)
         self.model.opt.timestep = self.h = timestep
         solref, solimp = single.limits(profile, timestep)
         self.model.jnt_solref[0], self.model.jnt_solimp[0] = solref, solimp
