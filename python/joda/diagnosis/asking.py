@@ -168,7 +168,7 @@ def asked(measured: Measured, length: float | None = None, near: Array | None = 
     """
     windows = windows_for(measured, length)
     judge = Judge(windows, usable(windows))
-    single, own = single_for(measured, windows.h), measured.single.friction_row
+    single, own = single_for(measured, windows.h), measured.own_row
     base = base_of(measured.profile, single, windows.h)
     fit, given = _fitted(judge, base, near)
     if measured.runs and own:

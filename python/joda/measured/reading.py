@@ -13,8 +13,9 @@ from joda.joints.single import Single, single, weighing
 from joda.measured import smoothing
 from joda.measured.driven import read_logs
 from joda.measured.gauge import Gauged, gauged
+from joda.measured.misfit import joined, rms
 from joda.measured.obstructed import Clear, clear_of_contacts
-from joda.measured.replay import Replayer
+from joda.measured.replay import WINDOW, Replayer
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow import as_curve
 from joda.measured.suspicions import suspicions
@@ -24,11 +25,15 @@ from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact
 from joda.scenes.context import Context, context
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
-from joda.scenes.native import whole_profile
+from joda.scenes.native import Row, whole_profile
 from joda.scenes.scene import profiles_of
 
 Array = NDArray[np.float64]
 
+CLEARLY = 0.9
+"""Part of the error in windows to which another friction row must bring it."""
+ENOUGH = 4
+"""Runs that tell which row that is."""
 FINEST = 1e-6
 """Least noise, in units of the range."""
 STEPS = 5_000_000
@@ -44,7 +49,9 @@ class Measured:
     Attributes:
         context: of the joint.
         profile: all that acts on it (`joda.scenes.native`).
-        single: all of the joint but its profile; friction that is MuJoCo's own has its row.
+        single: all of the joint but its profile, as it is replayed.
+        own_row: of friction that is MuJoCo's own in the scene, whichever is replayed; None if none
+            is.
         timestep: of the model, s.
         replayer: of that profile.
         runs: measured.
@@ -59,6 +66,7 @@ class Measured:
     context: Context
     profile: Profile
     single: Single
+    own_row: Row | None
     timestep: float
     replayer: Replayer
     runs: tuple[Run, ...]
@@ -181,6 +189,13 @@ def read_measured(
     return taken(compiled, number, found, profile, clear, notes, whole=not besides)
 
 
+def _missed(replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float]) -> float:
+    """RMS error in windows of some runs, rad or m; NaN if there are none."""
+    pairs = list(zip(runs, sigma, strict=True))[:ENOUGH]
+    windows = [joined(replayer.windows(run, noise)) for run, noise in pairs]
+    return rms(np.concatenate(windows))
+
+
 def taken(
     model: mujoco.MjModel,
     joint: int,
@@ -206,8 +221,22 @@ def taken(
     usual = smoothing.pooled_noise([(run.time, run.position) for run in timed])
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     sigma = tuple(max(smoothing.noise(run.time, run.position), least) for run in timed)
-    own = single(found, profile, model, joint)
+    yielding = single(found, profile, model, joint)
+    own = yielding.with_plugin
     replayer = Replayer(found, profile, own, step)
+    if yielding.friction_row and timed:
+        other = Replayer(found, profile, yielding, step)
+        with_plugin, natively = (_missed(one, timed, sigma) for one in (replayer, other))
+        if natively < CLEARLY * with_plugin:
+            own, replayer = yielding, other
+        elif with_plugin < CLEARLY * natively:
+            unit = found.joint.unit
+            notes.append(
+                f"MuJoCo's own friction row yields near rest (solreffriction, solimpfriction): by "
+                f"it windows of {WINDOW:g} s are missed by {natively:.2g} {unit}, by the same "
+                f"friction in a profile, which is what is replayed here, by {with_plugin:.2g} "
+                f"{unit}."
+            )
     static = [curve for curve in clear.measured if isinstance(curve, QuasiStatic)]
 
     def replay(run: Run, sigma: float) -> Array:
@@ -229,6 +258,7 @@ def taken(
         context=found,
         profile=profile,
         single=own,
+        own_row=yielding.friction_row,
         timestep=step,
         replayer=replayer,
         runs=timed,
