@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from joda import JodaError
-from joda.measured.runs import QuasiStatic, Run, read_measurement, read_run
+from joda.measured.runs import (
+    QuasiStatic,
+    Run,
+    check_known,
+    evened,
+    read_measurement,
+    read_run,
+)
 
 HEAD = "time,position,force\n"
 ROWS = "0,0.1,1\n0.1,0.2,2\n0.3,0.3,\n0.4,0.5,4\n"
@@ -124,3 +131,38 @@ def test_a_column_that_is_not_there_is_named(tmp_path):
     said = r"run\.csv: no column 'force'; it has position, and without time it is a quasi-static"
     with pytest.raises(JodaError, match=said):
         read_measurement(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("every", [2, 3, 8])
+def test_a_slower_gauges_force_is_linear_between_its_samples(every):
+    time = np.arange(400) / 100
+    force = np.sin(3 * time)
+    kept = np.where(np.arange(400) % every == 1, force, np.nan)
+    run = Run("run.csv", time, 0.1 * time, None, kept, True)
+    filled, note = evened(run)
+    assert f"one sample of {every}" in note
+    assert np.isnan(filled.force).sum() == 0
+    np.testing.assert_allclose(filled.force[1 : -every - 1], force[1 : -every - 1], atol=0.01)
+
+
+def test_a_long_gap_of_a_slower_gauge_stays_unknown():
+    time = np.arange(400) / 100
+    kept = np.where(np.arange(400) % 3 == 0, 1.0, np.nan)
+    kept[100:160] = np.nan
+    filled, _ = evened(Run("run.csv", time, 0.1 * time, None, kept, True))
+    assert np.isnan(filled.force[105:155]).all()
+    assert np.isnan(filled.force).sum() < 70
+
+
+def test_a_force_that_is_known_nearly_everywhere_is_left_as_it_is():
+    time = np.arange(100) / 100
+    kept = np.where(np.arange(100) % 10 == 9, np.nan, 1.0)
+    run = Run("run.csv", time, 0.1 * time, None, kept, True)
+    assert evened(run) == (run, None)
+
+
+def test_a_force_that_is_known_nowhere_for_long_is_refused():
+    time = np.arange(100) / 100
+    kept = np.where(np.arange(100) % 6 > 2, np.nan, 1.0)
+    with pytest.raises(JodaError, match="nowhere is 'force' filled in for 7 samples"):
+        check_known([Run("run.csv", time, 0.1 * time, None, kept, True)])

@@ -513,6 +513,22 @@ def test_the_step_of_an_encoder_is_found(step, rng):
     assert resolution(q) == 0
 
 
+@pytest.mark.parametrize("digits", [5, 7, 12])
+def test_a_steady_motion_is_no_encoders_steps(digits, rng):
+    for count in (12, 30, 200):
+        for _ in range(30):
+            noise = rng.normal(0, 3e-4, count)
+            q = 0.5 + rng.uniform(0.75, 3.75) * 5e-3 * np.arange(count)
+            assert resolution(np.round(q + noise, digits)) < 3e-5
+            assert resolution(q) == 0
+
+
+def test_an_encoders_steps_are_found_behind_rounded_decimals(rng):
+    q = 0.7 * np.sin(np.arange(0, 20, 1e-3))
+    step = 2 * np.pi / 4096
+    assert resolution(np.round(step * np.round(q / step), 4)) == pytest.approx(step, rel=0.01)
+
+
 def test_whatever_the_numbers_are_something_readable_is_said(rng):
     found = bare("hinge", (0, 1), 1.0)
     for _ in range(3 * COUNT):

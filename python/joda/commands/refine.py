@@ -21,7 +21,7 @@ from joda.measured.excerpts import excerpts
 from joda.measured.gauge import compared
 from joda.measured.obstructed import clear_of_contacts
 from joda.measured.reading import Measured, checked, taken
-from joda.measured.runs import QuasiStatic, Run
+from joda.measured.runs import QuasiStatic, Run, check_known
 from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.profile import Profile
@@ -160,6 +160,7 @@ def refine(
         begin = resolved(begin)
     timed = [one for one in clear.measured if isinstance(one, Run)]
     still = [one for one in clear.measured if not isinstance(one, Run)]
+    check_known(timed)
     parts, _, cut = excerpts(timed)
     notes += cut
     unit = gravity_scale(found, begin)

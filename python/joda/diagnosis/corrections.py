@@ -20,6 +20,8 @@ OFF, FAR_OFF = 0.05, 0.3
 """By how much a number must be off to be worth a word; and where something else is missing."""
 CLEARLY = 3.0
 """And by so many of its standard errors."""
+ANYTHING = 10.0
+"""How far off a number may be of which the data tell nothing, in its own unit."""
 ALIKE = 0.12
 """By how much factors may differ that are one."""
 
@@ -85,8 +87,7 @@ def strengths(asked: Asked, guess: Guess | None = None) -> tuple[Strength, ...]:
     """Of the model's components, as fitted alone or together with an effect."""
     base, fit = asked.base, guess.fit if guess else asked.fit
     n = len(base.places)
-    covariance = _beside(asked, guess) if guess else asked.covariance
-    errors = np.sqrt(np.diag(covariance)[:n])
+    errors = _errors(asked, guess)[:n]
     parts = (getattr(base.profile.channels, name).components[k] for name, k in base.places)
     return tuple(
         Strength(part.label or place[0], part, float(factor), float(error))
@@ -94,12 +95,16 @@ def strengths(asked: Asked, guess: Guess | None = None) -> tuple[Strength, ...]:
     )
 
 
-def _beside(asked: Asked, guess: Guess) -> Array:
-    """Covariance of all numbers of a guess, with what is left over as noise."""
-    judge, (make, unknowns) = asked.judge, joined(asked.base, guess.hypothesis)
-    H = judge.linear(make, unknowns, guess.fit.x, guess.fit.start).normal()[0]
-    noise = judge.overdispersion(guess.fit.squares)
-    return np.asarray(noise * np.linalg.pinv(H + np.diag(unknowns.doubt**-2.0)))
+def _errors(asked: Asked, guess: Guess | None) -> Array:
+    """Standard errors of all fitted numbers by the data alone, with what is left over as noise:
+    what was known of them before makes none of them surer."""
+    judge, base = asked.judge, asked.base
+    make, unknowns = joined(base, guess.hypothesis) if guess else (base.solo, base.unknowns)
+    fit = guess.fit if guess else asked.fit
+    H = judge.linear(make, unknowns, fit.x, fit.start).normal()[0]
+    noise = judge.overdispersion(fit.squares)
+    known = np.diag(np.full(len(H), ANYTHING**-2))
+    return np.asarray(np.sqrt(np.diag(noise * np.linalg.pinv(H + known))))
 
 
 def corrections(found: Sequence[Strength], joint: Joint, least: float) -> tuple[Correction, ...]:

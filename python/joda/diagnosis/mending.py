@@ -18,7 +18,7 @@ from joda.diagnosis.judge import BLAS
 from joda.diagnosis.plausible import Needs, implausible, unseen_place
 from joda.diagnosis.reshaping import Trials, Tried, checked
 from joda.diagnosis.share import overlap
-from joda.measured.errors import Errors, errors
+from joda.measured.errors import Errors, errors, known
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.profile import Profile
@@ -48,8 +48,8 @@ class Error:
     """How far a model is off.
 
     Attributes:
-        whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where there are only
-            curves.
+        whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where none can be
+            replayed, as the force at its beginning is unknown, or there are only curves.
         window: RMS of windows of 0.4 s, rad or m; of curves the force's, N·m or N.
     """
 
@@ -88,7 +88,7 @@ def _replayed(measured: Measured, profile: Profile | None = None) -> tuple[Error
     if not model.runs:
         return Error(None, rms(np.concatenate([curve.excess for curve in model.curves]))), None
     found = errors(model)
-    return Error(found.whole, found.window), found
+    return Error(known(found.whole), found.window), found
 
 
 def mend(

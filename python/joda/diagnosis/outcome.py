@@ -13,6 +13,7 @@ from joda.measured.errors import MULTIPLE
 from joda.measured.excerpts import excerpts
 from joda.measured.maps import draw_models, draw_runs, shade
 from joda.measured.reading import Measured, read_measured
+from joda.measured.runs import check_known
 from joda.measured.visited import unvisited
 from joda.pictures.changes import draw_channels
 from joda.pictures.style import house_style
@@ -37,6 +38,7 @@ def read_runs(
         JodaError: a file cannot be read, or what it holds cannot be of this joint.
     """
     measured = read_measured(model, joint, runs, passive)
+    check_known(measured.runs)
     ignored = tuple(
         f"{one.curve.name}: a quasi-static curve, not used as there are timed runs."
         for one in measured.curves

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from joda.errors import JodaError
-from joda.measured.runs import QuasiStatic, Run, read_measurement
+from joda.measured.runs import QuasiStatic, Run, evened, read_measurement
 from joda.measured.table import header
 from joda.scenes.actuators import actuators_on
 from joda.scenes.model import joint_name
@@ -36,6 +36,9 @@ def read_logs(
     for path in map(Path, paths):
         notes += _unused(model, joint, path, acting, passive)
         one = read_measurement(path)
+        if isinstance(one, Run):
+            one, note = evened(one)
+            notes += [note] if note else []
         if acting and not passive and isinstance(one, Run) and not one.forced:
             raise JodaError(
                 f"{path}: {_driven(model, joint, acting)}, and the run has no column 'force'; "

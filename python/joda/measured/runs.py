@@ -1,6 +1,8 @@
 """Measurements of a joint, one CSV file each: timed runs, and quasi-static curves."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,8 @@ Array = NDArray[np.float64]
 COLUMNS = ("time", "position", "velocity", "force")
 LEAST = 4
 """Fewest samples that make a run or a curve."""
+WIDER = 2.5
+"""Gaps, in units of the usual one, over which a force is not taken as linear."""
 EPOCH = 1e6
 """Times from which on too few digits are left for samples, s: they are counted from the first."""
 
@@ -144,6 +148,38 @@ def known(run: Run) -> list[NDArray[np.intp]]:
     numbers = np.flatnonzero(~np.isnan(run.force))
     groups = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
     return [group for group in groups if len(group) >= smoothing.LEAST]
+
+
+def check_known(runs: Sequence[Run]) -> None:
+    """Raises JodaError where no run has a stretch in which the force is known."""
+    if runs and not any(known(run) for run in runs):
+        raise JodaError(
+            f"{', '.join(run.name for run in runs)}: nowhere is 'force' filled in for "
+            f"{smoothing.LEAST} samples in a row; give the force of each sample, or leave the "
+            "column out where nothing moved the joint."
+        )
+
+
+def evened(run: Run) -> tuple[Run, str | None]:
+    """A run of which a slower gauge recorded the force, with it at every sample; and a note.
+
+    That is so if there are never two samples in a row, or hardly ever. Between two of them that are
+    as near as usual the force is linear.
+    """
+    there = np.flatnonzero(~np.isnan(run.force))
+    gaps = np.diff(there)
+    if len(there) < LEAST or np.median(gaps) < 2:
+        return run, None
+    force = np.interp(run.time, run.time[there], run.force[there])
+    usual = float(np.median(gaps))
+    edges = [-1, *there, len(force)]
+    for first, last in pairwise(edges):
+        if last - first > WIDER * usual:
+            force[first + 1 : last] = np.nan
+    return replace(run, force=force), (
+        f"{run.name}: force is known at one sample of {usual:.0f} only; between them it is taken "
+        "as linear."
+    )
 
 
 def write_run(path: Path, run: Run) -> None:

@@ -25,6 +25,10 @@ CLEAR_MOTION = 10.0
 """Displacement, in noises, that tells a speed."""
 LEAST = 7
 """Fewest samples in a window."""
+EXACT = 1e-3
+"""How exactly, in steps, values lie on a lattice that are not rounded."""
+DIGITS, FEW_DIGITS = 13, 6
+"""Decimals that are looked for; units of the last one that make a step which rounding hides not."""
 COARSE = 8
 """Samples for each step between values from which a signal of few values is quantised."""
 REST = 2.0
@@ -153,18 +157,37 @@ def departures(time: Array, position: Array) -> Array:
 
 
 def resolution(position: Array) -> float:
-    """Smallest step of a quantised signal, in its unit; 0 where it is not seen to be quantised."""
+    """Smallest step of a quantised signal, in its unit; 0 where it is not seen to be quantised.
+
+    Its values lie on a lattice as exactly as they are written: a steady motion has nearly even
+    steps too.
+    """
     values = np.unique(position)
     steps = np.diff(values)
     steps = steps[steps > 1e-6 * (values[-1] - values[0])]  # smaller ones are rounding
+    rounding = _rounding(values)
     if len(steps) < 3:  # many samples of two or three values are coarse steps
         return float(steps.min()) if len(steps) and len(position) > COARSE * len(steps) else 0.0
     for parts in range(1, 7):  # the smallest difference that occurs may be a few steps
         step = steps.min() / parts
         near = steps[steps < 10 * step * parts]
         counts = np.round(near / step)
-        if 2 * len(near) > len(steps) and np.mean(np.abs(near / step - counts) < 0.15) > 0.95:
-            return float(near.sum() / counts.sum())
+        mean = float(near.sum() / counts.sum())
+        off = np.abs(near - mean * counts)
+        within = rounding if mean > FEW_DIGITS * rounding else 0.0
+        exact = np.mean(off <= max(within, EXACT * mean)) > 0.95
+        steady = len(values) == len(position) and counts.max() == counts.min()
+        if 2 * len(near) > len(steps) and exact and not steady:
+            return mean
+    return 0.0
+
+
+def _rounding(values: Array) -> float:
+    """Unit of the last decimal that numbers are written with; 0 where they are not rounded."""
+    for digits in range(DIGITS):
+        scaled = values * 10.0**digits
+        if np.abs(scaled - np.round(scaled)).max() < 1e-6 * max(1.0, np.abs(scaled).max() * 1e-6):
+            return 1.01 * 10.0**-digits
     return 0.0
 
 
