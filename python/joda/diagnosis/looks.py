@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joda.diagnosis.asking import asked
+from joda.diagnosis.asking import Asked, asked
 from joda.diagnosis.coverage import moved_one_way
+from joda.diagnosis.plausible import Needs
 from joda.diagnosis.ranking import Ranking, Told, rank
 from joda.diagnosis.weighing import (
     SETTINGS,
@@ -50,7 +51,7 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
         exclude: effects that are not considered.
         told: how much is done, of how much, and what.
     """
-    ranking = rank(asked(measured), exclude, told)
+    ranking = _ranked(measured, asked(measured), exclude, told)
     strictness = LOOSELY if moved_one_way(measured) else 1.0
     found = evidence(ranking)
     weighed = decide(found, strictness)
@@ -85,14 +86,19 @@ def _again(
         longer = asked(measured, min(LONGER * judge.windows.length, LONGEST), ranking.asked.fit.x)
         if calm and excess_of(longer) <= SETTINGS.noticed:
             return None
-        return rank(longer, exclude, told)
+        return _ranked(measured, longer, exclude, told)
     if calm:
         return None
     best = ranking.guesses[0].fit if ranking.guesses else ranking.asked.fit
     left = best.squares / np.maximum(judge.windows.count, 1)
     factor = max(float(np.sqrt(np.median(left[judge.counts]))), 1.0)
+    noisier = measured.with_curves([curve.noisier(factor) for curve in measured.curves])
+    return _ranked(measured, asked(noisier), exclude, told)
+
+
+def _ranked(measured: Measured, begun: Asked, exclude: Collection[str], told: Told) -> Ranking:
+    """What may be missing and needs no more force than the measurements can."""
+    needs = Needs(measured)
     return rank(
-        asked(measured.with_curves([curve.noisier(factor) for curve in measured.curves])),
-        exclude,
-        told,
+        begun, exclude, told, possible=lambda effect, profile: not needs.exceeded(profile, effect)
     )

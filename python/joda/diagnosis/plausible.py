@@ -50,9 +50,9 @@ def implausible(needs: "Needs", profile: Profile, effect: str | None = None) -> 
             "it works only in a joint with next to no friction and damping, much less than the "
             "model has, and no force is recorded: something may have moved the joint"
         )
-    force = needs.exerted(divided(profile, effect)[0] if effect else profile)
-    if force <= EXCESS * needs.force:
+    if not needs.exceeded(profile, effect):
         return None
+    force = needs.exerted(divided(profile, effect)[0] if effect else profile)
     unit = profile.joint.force_unit
     return (
         f"it would exert up to {force:.2g} {unit}, {force / needs.force:.0f} times the "
@@ -112,6 +112,11 @@ class Needs:
                 most = float(np.abs(merge(channel)(grid)[0]).max())
                 total += most * (self.speed if name == "damping" else 1.0)
         return total + self._of(profile.effects)
+
+    def exceeded(self, profile: Profile, effect: str | None = None) -> bool:
+        """Whether an effect of a profile, or all of it, exerts far more than the runs can need."""
+        force = self.exerted(divided(profile, effect)[0] if effect else profile)
+        return force > EXCESS * self.force
 
     def unresisted(self, profile: Profile) -> bool:
         """Whether a fit has taken nearly all resistance from a joint that moves by itself."""

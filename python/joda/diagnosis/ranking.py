@@ -13,6 +13,7 @@ from joda.diagnosis.asking import RESTITUTION, Asked, Rough
 from joda.diagnosis.guessing import Guess, beside
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS, Fit, Judge
+from joda.profile import Profile
 
 POLISHED, NEAR = 4, 3.0
 """Of how many effects the numbers are tried elsewhere, and up to which part of the least loss."""
@@ -60,6 +61,7 @@ def rank(
     exclude: Collection[str] = (),
     heed: Told = lambda done, total, what: None,
     roughly: bool = False,
+    possible: Callable[[str, Profile], bool] = lambda effect, profile: True,
 ) -> Ranking:
     """Fits every hypothesis to measured runs.
 
@@ -68,6 +70,7 @@ def rank(
         exclude: effects that are not tried.
         heed: told how many hypotheses are done, of how many, and the last one's name.
         roughly: whether only the most promising ones are fitted to the end.
+        possible: whether a profile with an effect can be meant.
     """
     tried = [h for h in begun.hypotheses if h.effect not in {*exclude, RESTITUTION}]
     bouncy = [h for h in begun.hypotheses if h.effect == RESTITUTION]
@@ -83,7 +86,11 @@ def rank(
         others = [one.written(begun.base) for one in _best(guesses)[:1]]
         ends = begun.bouncy(bouncy, others)
         guesses += [guess for guess in ends if not silent]
-    there = [one for one in guesses if not one.vanished]
+    there = [
+        one
+        for one in guesses
+        if not one.vanished and possible(one.hypothesis.effect, one.written(begun.base))
+    ]
     return Ranking(begun, *_scored(begun.judge, there), bouncy=silent and bool(ends))
 
 

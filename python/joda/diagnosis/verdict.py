@@ -177,12 +177,13 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     base, guess = ranking.asked.base, ranking.guesses[sized[0]]
     doubt = one_factor(base, guess) or other_unit(measured)
     summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy, doubt)
-    numbers = strengths(ranking.asked, guess)
+    sure = verdict == "missing_effect" and not doubt  # else they stand in for what is not known
+    numbers = strengths(ranking.asked, guess) if sure else ()
     summary += f" But {doubt}." if doubt else off_beside(numbers)
     likely = tuple(one for one in findings if one.probability >= WORTH_NAMING)
     said = replace(
         _said(measured, verdict, summary, likely, experiment),
-        corrections=() if doubt else corrections(numbers, measured.profile.joint, FAR_OFF),
+        corrections=corrections(numbers, measured.profile.joint, FAR_OFF),
         doubt=doubt,
     )
     return Diagnosed(said, profile if likely else None, findings, puzzling)

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 BEYOND = 5.0
 """How many times what errors explain of it a model that is adequate may miss a whole run by."""
+TRAVELLED = 0.3
+"""Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
 DRAWS = 8
 """Strengths that are drawn, to tell how far their errors move a run."""
 
@@ -30,7 +32,7 @@ class Worst:
 
     Attributes:
         free: of runs up to where the joint meets an end of its range: after that the stop decides
-            too, not only a law of the joint.
+            too, not only a law of the joint. Of all of them if it meets one soon in every run.
         whole: of all of the runs.
     """
 
@@ -71,13 +73,14 @@ def worst(measured: Measured, asked: Asked) -> Worst:
         spread = [sigma, replayer.scatter(part, start), apart]
         return missed * sigma / float(np.linalg.norm(spread))
 
-    free, whole = 0.0, 0.0
+    told, whole = [], 0.0
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         part = _free(run, sigma, measured.profile.joint.range)
         found = times(part, sigma)
-        free = max(free, found)
+        if np.ptp(part.position) >= TRAVELLED * np.ptp(run.position):
+            told.append(found)
         whole = max(whole, found if len(part.time) == len(run.time) else times(run, sigma))
-    return Worst(free, whole)
+    return Worst(max(told, default=whole), whole)
 
 
 def _drawn(asked: Asked) -> Array:
