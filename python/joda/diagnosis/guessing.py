@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from joda.diagnosis.balance import balanced
 from joda.diagnosis.baseline import Base, joined
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypotheses.base import FREE_CURVE
@@ -37,6 +38,8 @@ OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
 NOTHING = 0.1
 """Part of its step below which a strength is none."""
+LOST = 10.0
+"""Mean square residual of windows, in the median, from which a model's fit leads nowhere."""
 MANY = 4000
 """Samples that count as many: from there on, what was fitted first is hardly in the way."""
 
@@ -165,7 +168,15 @@ def rough(
         ]
         return sorted(near, key=lambda f: f.loss)[: hypothesis.kept]
 
-    return tuple(fit for begin in begun for fit in fitted(begin))
+    found = tuple(fit for begin in begun for fit in fitted(begin))
+    if usual(judge, begun[0].fit) < LOST or not judge.windows.force.any():
+        return found
+    own = np.ones(len(base.places))
+    begin = replace(begun[0], fit=replace(begun[0].fit, start=judge.windows.start))
+    starts = (np.append(own, x) for x in balanced(judge.windows, base, hypothesis))
+    more = [_leaving(judge, make, unknowns, x, begin) for x in starts]
+    near = [replace(fit, loss=judge.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in more]
+    return (*found, *sorted(near, key=lambda fit: fit.loss)[:1])
 
 
 def _leaving(judge: Judge, make: Make, unknowns: Unknowns, x: Array, begin: Begin) -> Fit:
@@ -207,13 +218,16 @@ def moved(judge: Judge, base: Base, found: Guess) -> Guess:
     first = len(base.places)
     places = [(k, by) for by in MOVES for k in range(n - found.hypothesis.ends, n)]
     shapes = [(k, FAR * unknowns.step[k]) for k in range(first, n - found.hypothesis.ends)]
-    for k, by in places + shapes:
-        for way in (-by, by):
-            x = best.x.copy()
+    moves = [(k, way) for k, by in places + shapes for way in (-by, by)]
+    for k, way in [(None, 0.0), *moves]:
+        x = best.x.copy()
+        if k is None:  # the model's own strengths as given
+            x[:first] = 1.0
+        else:
             x[k] += way
-            trial = judge.fit(make, unknowns, x, best.start, FEW)
-            if trial.loss < best.loss - 1:
-                best = judge.fit(make, unknowns, trial.x, trial.start)
+        trial = judge.fit(make, unknowns, x, best.start, FEW)
+        if trial.loss < best.loss - 1:
+            best = judge.fit(make, unknowns, trial.x, trial.start)
     return _free(judge, base, guessed(judge, found.hypothesis, judge.refit(make, unknowns, best)))
 
 

@@ -1,0 +1,83 @@
+"""Where to begin a fit of a force over position: with what balances the recorded forces.
+
+A model that lacks a force which holds what pushes the joint is carried off within a window: from
+there no fit finds the way. The inverse dynamics of the measured motion (Armstrong, Khatib and
+Burdick, ICRA 1986) need no simulation: what is left of inertia times acceleration by the recorded
+force and the model's own is what an effect must exert.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.diagnosis.baseline import Base
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.windows import Windows
+from joda.effects import GravityOffset
+from joda.field import merge
+from joda.joints.resistance import friction_bounds
+from joda.profile import Profile
+
+Array = NDArray[np.float64]
+
+TAKEN = 2
+"""How many trials are begun with."""
+
+
+def balanced(windows: Windows, base: Base, hypothesis: Hypothesis) -> list[Array]:
+    """The hypothesis' numbers from which to begin, the best first: trials of another strength.
+
+    Args:
+        windows: of runs whose force is recorded.
+        base: the model as it is.
+        hypothesis: none but one that exerts a force over position is balanced.
+
+    Returns:
+        shape (k,) each; empty if nothing tells.
+    """
+    s, missing, q = _missing(windows, base)
+    found = []
+    for trial in hypothesis.trials if len(s) else ():
+        force = _exerted(hypothesis.write(base.profile, trial), s, q)
+        force = force - _exerted(base.profile, s, q)
+        square = float(force @ force)
+        if not square:
+            continue
+        times = float(force @ missing) / square
+        if times <= 0:
+            continue
+        x = trial.copy()
+        low, high = hypothesis.unknowns.low[0], hypothesis.unknowns.high[0]
+        x[0] = np.clip(times * trial[0], low, high)
+        found.append((float(np.abs(missing - times * force).mean()), x))
+    found.sort(key=lambda one: one[0])
+    return [x for _, x in found[:TAKEN]]
+
+
+def _missing(windows: Windows, base: Base) -> tuple[Array, Array, Array]:
+    """Normalised position, force that the model lacks there, and position, from each window to the
+    next of its run; shape (n,) each."""
+    at, (q, v) = windows.at, windows.start.T
+    pairs = np.flatnonzero(~windows.fresh[1:] & ~windows.knocks[1:] & ~windows.rests[1:])
+    total = np.append(0.0, np.cumsum(windows.force))
+    steps = at[pairs + 1] - at[pairs]
+    pushed = (total[at[pairs + 1]] - total[at[pairs]]) / steps
+    acceleration = (v[pairs + 1] - v[pairs]) / (steps * windows.h)
+    q, v = (q[pairs] + q[pairs + 1]) / 2, (v[pairs] + v[pairs + 1]) / 2
+    lo, hi = base.profile.joint.range
+    s = np.clip((q - lo) / (hi - lo), 0.0, 1.0)
+    single, profile = base.single, base.profile
+    a, b = single.weight
+    weight = a * np.cos(q) + b * np.sin(q) if single.hinge else np.full(len(q), a)
+    up, down = friction_bounds(profile, s)
+    resisted = np.where(v > 0, up, -down) + merge(profile.channels.damping)(s)[0] * v
+    known = pushed + weight + _exerted(profile, s, q) - resisted
+    return s, single.inertia * acceleration - known, q
+
+
+def _exerted(profile: Profile, s: Array, q: Array) -> Array:
+    """Force over position of a profile, N·m or N."""
+    out = merge(profile.channels.conservative)(s)[0]
+    for effect in profile.effects:
+        if isinstance(effect, GravityOffset):
+            out = out + effect.sin * np.sin(q) + effect.cos * np.cos(q) + effect.force
+    return np.asarray(out)
