@@ -1,5 +1,7 @@
 """Asking a model: pictures go out, proposals come in, a failure is a sentence with its cost."""
 
+import base64
+import html
 import json
 import os
 import re
@@ -8,6 +10,7 @@ import subprocess
 import sys
 from io import BytesIO
 from pathlib import Path
+from urllib.parse import quote
 
 import anthropic
 import pytest
@@ -322,6 +325,29 @@ def test_a_key_is_hidden_however_it_is_escaped(monkeypatch, key):
         assert json.loads(text)["said"].count(key) == 1
         assert json.loads(hide(text)) == {"said": "é [secret] \\u0041 \n"}
     assert hide(f"no JSON: {key}") == "no JSON: [secret]"
+
+
+KEY = "sk-proj-Zq9x/W+7aLm3-4kTvB=8sPdYhJ"
+
+
+@pytest.mark.parametrize(
+    "echo",
+    [
+        quote(KEY, safe=""),
+        base64.b64encode(KEY.encode()).decode(),
+        base64.b64encode(f"Bearer {KEY}".encode()).decode(),
+        html.escape(KEY),
+        f"{KEY[:17]}\n{KEY[17:]}",
+        KEY[:20],
+        KEY[-16:],
+    ],
+)
+def test_a_key_is_hidden_in_other_forms_and_in_parts(monkeypatch, echo):
+    monkeypatch.setenv("ANTHROPIC_API_KEY", KEY)
+    hidden = Credentials("ANTHROPIC", None).hide(f"the key {echo} is wrong, see sk-proj")
+    assert "[secret]" in hidden and hidden.endswith("is wrong, see sk-proj")
+    assert not any(KEY[k : k + 12] in hidden for k in range(len(KEY) - 11))
+    assert echo not in hidden
 
 
 def test_another_service_is_a_sentence(server):

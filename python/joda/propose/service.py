@@ -1,13 +1,20 @@
 """The services that are asked: keys and addresses, and what is never told of them."""
 
+import base64
+import html
 import json
 import os
 import re
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
+
+import numpy as np
 
 from joda.errors import JodaError
 
+HIDDEN = "[secret]"
+PART = 12
+"""Successive characters of a secret that nothing else has by chance."""
 SHORTEST_SECRET = 6
 """Letters; less is no secret but a word."""
 MOST_TOKENS = 10**9
@@ -48,15 +55,38 @@ class Credentials:
         self._secrets = sorted((s for s in sent if len(s) >= SHORTEST_SECRET), key=len)[::-1]
 
     def hide(self, said: str) -> str:
-        """What the service says, without the secrets that it may echo, escaped as in JSON or not.
+        """What the service says, without the secrets that it may echo: whole or in part, plain or
+        as JSON, URLs, HTML and Base64 write them.
 
         JSON stays JSON of the same meaning, but for the secrets.
         """
         said = ESCAPED.sub(_plainly, said)
         for secret in self._secrets:
-            for form in (secret, json.dumps(secret)[1:-1]):
-                said = said.replace(form, "[secret]")
+            for form in _forms(secret):
+                said = said.replace(form, HIDDEN)
+            said = _without_parts(said, secret)
         return said
+
+
+def _forms(secret: str) -> set[str]:
+    """How a secret may be written."""
+    coded = {base64.b64encode(f"{front}{secret}".encode()).decode() for front in ("", "Bearer ")}
+    plain = {secret, json.dumps(secret)[1:-1], quote(secret, safe=""), html.escape(secret)}
+    return plain | {form.rstrip("=") for form in coded}
+
+
+def _without_parts(said: str, secret: str) -> str:
+    """The same without parts of a secret, as of one that was cut off or broken into lines."""
+    if json.dumps(secret)[1:-1] != secret:  # parts of escapes are none
+        return said
+    there = np.zeros(len(said), bool)
+    for k in range(len(secret) - PART + 1):
+        for found in re.finditer(re.escape(secret[k : k + PART]), said):
+            there[slice(*found.span())] = True
+    edges = np.flatnonzero(np.diff(there, prepend=False, append=False))
+    for begin, end in zip(edges[::2][::-1], edges[1::2][::-1], strict=True):
+        said = said[:begin] + HIDDEN + said[end:]
+    return said
 
 
 def _plainly(escape: re.Match[str]) -> str:

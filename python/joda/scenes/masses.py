@@ -19,6 +19,9 @@ THINNEST = 0.5
 """Mass per area of the largest faces, kg/m²: cardboard."""
 WATER, SOLID = 1000.0, 30.0
 """MuJoCo's default density (kg/m³); from so many kg on a part of that density should be hollow."""
+HOLLOW, ROUGHLY, LIGHT = 4.0, 0.1, 1.0
+"""How many times what a mesh encloses MuJoCo counts of a thin hull, how near that the mass then is,
+and what is too little (kg) to be worth a word."""
 NEARLY = 0.01
 """How near that density a mean density is taken for it."""
 ARMATURE = 0.5
@@ -78,6 +81,9 @@ def _of_mass(name: str, mass: float, sizes: Array) -> str:
             "set the mass that was weighed (<inertial> or the geoms' mass), have it estimated "
             "(joda weigh), or mend the scale."
         )
+    twice = (np.abs(mass / counted / WATER - 1) < ROUGHLY) & (counted > HOLLOW * volumes)
+    if mass > LIGHT and np.any(twice):
+        return _counted_twice(said, mass, volumes[twice][0])
     if mass <= SOLID:
         return ""
     if np.any(np.abs(mass / volumes / WATER - 1) < NEARLY):
@@ -87,12 +93,16 @@ def _of_mass(name: str, mass: float, sizes: Array) -> str:
             'inertia="shell" on its mesh.'
         )
     if np.any(twice := np.abs(mass / counted / WATER - 1) < NEARLY):
-        return (
-            f"{said}, as MuJoCo counts {mass:.3g} litres of its default density (1000 kg/m³) for "
-            f"meshes that enclose {1e3 * volumes[twice][0]:.3g}: set the mass that was weighed, or "
-            'inertia="exact" or "shell" on the mesh.'
-        )
+        return _counted_twice(said, mass, volumes[twice][0])
     return ""
+
+
+def _counted_twice(said: str, mass: float, volume: float) -> str:
+    return (
+        f"{said}, as MuJoCo counts {mass:.3g} litres of its default density (1000 kg/m³) for "
+        f"meshes that enclose {1e3 * volume:.3g}: set the mass that was weighed, or "
+        'inertia="exact" or "shell" on the mesh.'
+    )
 
 
 def _of_armature(model: mujoco.MjModel, joint: int, inertia: float) -> str:
