@@ -7,11 +7,14 @@ import pytest
 from scenes import write
 from test_scene_contacts import pushed
 
-from joda import compare
+from joda import attach, compare, context
 from joda.measured.comparison import _places
 from joda.measured.failing import COLUMNS, KNOCK, Failing, failing
 from joda.measured.reading import read_measured
 from joda.measured.runs import read_run
+from joda.profile import Profile
+from joda.scenes.model import load_model
+from joda.scenes.native import whole_profile
 
 STICKS = """<mujoco><compiler angle="radian"/><option timestep=".002"/><worldbody><body>
   <joint name="lid" axis="0 1 0" range="-1 1" stiffness="{spring}" springref="{rest}"
@@ -70,9 +73,12 @@ def test_a_force_that_explains_no_misfit_is_not_blamed():
 )
 def test_noise_free_runs_that_stick_blame_no_tiny_force(friction, spring, rest, mass, tmp_path):
     text = STICKS.format(friction=friction, spring=spring, rest=rest, mass=mass)
-    path = write(tmp_path, text, "model.xml")
+    bare = write(tmp_path, text, "model.xml")
+    joint = context(bare, "lid").joint
+    path = tmp_path / "scene.xml"  # friction of a profile, which holds the lid at rest
+    attach(bare, whole_profile(load_model(bare), 0, Profile(joint=joint)), path)
     runs = [
-        pushed(text, "lid", lambda t: 0.0, tmp_path, f"{k}.csv", 2.0, start, noise=0.0)
+        pushed(path.read_text(), "lid", lambda t: 0.0, tmp_path, f"{k}.csv", 2.0, start, noise=0.0)
         for k, start in enumerate((rest, -0.6, 0.8))
     ]
     found = compare(path, "lid", runs)

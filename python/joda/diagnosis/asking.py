@@ -27,7 +27,7 @@ from joda.diagnosis.guessing import (
     searched,
 )
 from joda.diagnosis.hypotheses import Hypothesis, hypotheses
-from joda.diagnosis.judge import Fit, Judge
+from joda.diagnosis.judge import Fit, Judge, excess
 from joda.diagnosis.knocks import Knocks, Rebound, ends_of, knock_guess, knocks_at
 from joda.joints.single import Single
 from joda.measured.reading import Measured
@@ -36,8 +36,9 @@ from joda.template import read_templates
 
 Array = NDArray[np.float64]
 
-CLEARLY = 10.0
-"""Gain in loss from which runs tell that friction yields as MuJoCo's own does."""
+CLEARLY, CALM = 10.0, 0.1
+"""Gain in loss from which runs tell that friction yields as MuJoCo's own does, and what that may
+leave per sample beyond noise."""
 RESTITUTION = "end_stop_restitution"
 """Effect that only knocks tell of."""
 
@@ -174,7 +175,8 @@ def asked(measured: Measured, length: float | None = None, near: Array | None = 
     if measured.runs and own:
         yielding = base_of(measured.profile, replace(single, friction_row=own), windows.h)
         fit_so, given_so = _fitted(judge, yielding, near)
-        if fit_so.loss < fit.loss - CLEARLY:
+        calm = excess(fit_so.loss, max(judge.samples, 1.0)) < CALM  # else something else is missing
+        if calm and fit_so.loss < fit.loss - CLEARLY:
             base, fit, given = yielding, fit_so, given_so
     every = hypotheses(units_of(windows, measured), read_templates(), measured.profile)
     begun = begins(judge.coarser, base.coarser(), given, fit)

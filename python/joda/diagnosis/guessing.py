@@ -218,16 +218,13 @@ def moved(judge: Judge, base: Base, found: Guess) -> Guess:
     first = len(base.places)
     places = [(k, by) for by in MOVES for k in range(n - found.hypothesis.ends, n)]
     shapes = [(k, FAR * unknowns.step[k]) for k in range(first, n - found.hypothesis.ends)]
-    moves = [(k, way) for k, by in places + shapes for way in (-by, by)]
-    for k, way in [(None, 0.0), *moves]:
-        x = best.x.copy()
-        if k is None:  # the model's own strengths as given
-            x[:first] = 1.0
-        else:
+    for k, by in places + shapes:
+        for way in (-by, by):
+            x = best.x.copy()
             x[k] += way
-        trial = judge.fit(make, unknowns, x, best.start, FEW)
-        if trial.loss < best.loss - 1:
-            best = judge.fit(make, unknowns, trial.x, trial.start)
+            trial = judge.fit(make, unknowns, x, best.start, FEW)
+            if trial.loss < best.loss - 1:
+                best = judge.fit(make, unknowns, trial.x, trial.start)
     return _free(judge, base, guessed(judge, found.hypothesis, judge.refit(make, unknowns, best)))
 
 

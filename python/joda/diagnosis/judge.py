@@ -35,6 +35,11 @@ ROWS = ((0, 1), (0, 1))
 """Axes of windows and samples, over which products are summed."""
 
 
+def excess(loss: float, count: float) -> float:
+    """A loss per sample, beyond what noise makes of it."""
+    return loss / count - BEND * float(np.log1p(1 / BEND))
+
+
 @dataclass(frozen=True)
 class Unknowns:
     """The numbers of a model, shape (k,) each.

@@ -11,7 +11,7 @@ import numpy as np
 
 from joda.diagnosis.asking import Asked
 from joda.diagnosis.hypotheses.base import KNOWN_LAW
-from joda.diagnosis.judge import BEND
+from joda.diagnosis.judge import excess
 from joda.diagnosis.ranking import WORST, Ranking, levelled
 
 Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
@@ -126,11 +126,7 @@ class Weighed:
 
 def excess_of(asked: Asked) -> float:
     """Of the model as it is, per sample, beyond what noise makes."""
-    return _excess(asked.fit.loss, max(asked.judge.samples, 1.0))
-
-
-def _excess(loss: float, count: float) -> float:
-    return loss / count - BEND * float(np.log1p(1 / BEND))
+    return excess(asked.fit.loss, max(asked.judge.samples, 1.0))
 
 
 def evidence(ranking: Ranking) -> Evidence:
@@ -145,12 +141,12 @@ def evidence(ranking: Ranking) -> Evidence:
         noisy=ranking.level > WORST,
         bouncy=ranking.bouncy,
         model=excess_of(ranking.asked),
-        calm=_excess(calm, samples),
-        own=_excess(levelled(judge, fit, ranking.level), samples),
+        calm=excess(calm, samples),
+        own=excess(levelled(judge, fit, ranking.level), samples),
         gain=fit.loss - first.fit.loss - first.cost if first else 0.0,
         remains=first.hypothesis.remains if first else KNOWN_LAW,
         effects=tuple(guess.hypothesis.effect for guess in guesses),
-        left=tuple(_excess(guess.score, max(ranking.told, 1.0)) for guess in guesses),
+        left=tuple(excess(guess.score, max(ranking.told, 1.0)) for guess in guesses),
     )
 
 
