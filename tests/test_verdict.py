@@ -66,7 +66,7 @@ def test_missing_is_said_only_of_what_is_likely_and_helps(probability, after, he
 
 def test_what_is_below_the_noise_is_a_guess():
     said = summarised(DETENT, weighed(0.9), 0.02, one_way=False, bouncy=False)
-    assert said.startswith("Best guess: a click-stop") and "faster" in said
+    assert said.startswith("Best guess: a click-stop") and "record faster" in said
 
 
 def test_two_that_cannot_be_told_apart_are_likely_together():

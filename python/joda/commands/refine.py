@@ -177,7 +177,7 @@ def refine(
         return whole_profile(compiled, number, profile)
 
     problem: Problem | CurveProblem = (
-        Problem(at_first.single.with_plugin, parameters, parts, at_first.timestep, all_of)
+        Problem(at_first.single, parameters, parts, at_first.timestep, all_of)
         if timed
         else CurveProblem(found, all_of, parameters, still)
     )

@@ -66,10 +66,8 @@ class Asked:
     @cached_property
     def covariance(self) -> Array:
         """Of the fitted factors, with what is left over as noise; shape (k, k)."""
-        judge, base, fit = self.judge, self.base, self.fit
-        H = judge.linear(base.solo, base.unknowns, fit.x, fit.start).normal()[0]
-        noise = judge.overdispersion(fit.squares)
-        return np.asarray(noise * np.linalg.inv(H + np.diag(base.unknowns.doubt**-2.0)))
+        unknowns = self.base.unknowns
+        return self.judge.covariance(self.base.solo, unknowns, self.fit, unknowns.doubt)
 
     @cached_property
     def knocks(self) -> dict[int, Knocks]:

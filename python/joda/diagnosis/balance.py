@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from joda.diagnosis.baseline import Base
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.windows import Windows
-from joda.effects import GravityOffset
 from joda.field import merge
 from joda.joints.resistance import friction_bounds
-from joda.profile import Profile
+from joda.measured.gauge import exerted
 
 Array = NDArray[np.float64]
 
@@ -37,8 +36,8 @@ def balanced(windows: Windows, base: Base, hypothesis: Hypothesis) -> list[Array
     s, missing, q = _missing(windows, base)
     found = []
     for trial in hypothesis.trials if len(s) else ():
-        force = _exerted(hypothesis.write(base.profile, trial), s, q)
-        force = force - _exerted(base.profile, s, q)
+        force = exerted(hypothesis.write(base.profile, trial), s, q)
+        force = force - exerted(base.profile, s, q)
         square = float(force @ force)
         if not square:
             continue
@@ -66,18 +65,7 @@ def _missing(windows: Windows, base: Base) -> tuple[Array, Array, Array]:
     lo, hi = base.profile.joint.range
     s = np.clip((q - lo) / (hi - lo), 0.0, 1.0)
     single, profile = base.single, base.profile
-    a, b = single.weight
-    weight = a * np.cos(q) + b * np.sin(q) if single.hinge else np.full(len(q), a)
     up, down = friction_bounds(profile, s)
     resisted = np.where(v > 0, up, -down) + merge(profile.channels.damping)(s)[0] * v
-    known = pushed + weight + _exerted(profile, s, q) - resisted
+    known = pushed + single.weight_at(q) + exerted(profile, s, q) - resisted
     return s, single.inertia * acceleration - known, q
-
-
-def _exerted(profile: Profile, s: Array, q: Array) -> Array:
-    """Force over position of a profile, N·m or N."""
-    out = merge(profile.channels.conservative)(s)[0]
-    for effect in profile.effects:
-        if isinstance(effect, GravityOffset):
-            out = out + effect.sin * np.sin(q) + effect.cos * np.cos(q) + effect.force
-    return np.asarray(out)

@@ -98,13 +98,10 @@ def strengths(asked: Asked, guess: Guess | None = None) -> tuple[Strength, ...]:
 def _errors(asked: Asked, guess: Guess | None) -> Array:
     """Standard errors of all fitted numbers by the data alone, with what is left over as noise:
     what was known of them before makes none of them surer."""
-    judge, base = asked.judge, asked.base
+    base, fit = asked.base, guess.fit if guess else asked.fit
     make, unknowns = joined(base, guess.hypothesis) if guess else (base.solo, base.unknowns)
-    fit = guess.fit if guess else asked.fit
-    H = judge.linear(make, unknowns, fit.x, fit.start).normal()[0]
-    noise = judge.overdispersion(fit.squares)
-    known = np.diag(np.full(len(H), ANYTHING**-2))
-    return np.asarray(np.sqrt(np.diag(noise * np.linalg.pinv(H + known))))
+    doubt = np.full(len(fit.x), ANYTHING)
+    return np.asarray(np.sqrt(np.diag(asked.judge.covariance(make, unknowns, fit, doubt))))
 
 
 def corrections(found: Sequence[Strength], joint: Joint, least: float) -> tuple[Correction, ...]:

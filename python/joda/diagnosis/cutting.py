@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.windows import GRID, LOOSE, Array, Integers, Windows, rows_of
 from joda.measured import smoothing
+from joda.measured.failing import STOP
 from joda.measured.runs import Run, known
 
 SHORTEST, LONGEST = 0.1, 0.5
@@ -23,8 +24,6 @@ MOST = 160
 """Samples of a window that count at most; of more, every second or third does."""
 STEPS = 300
 """Steps that a window has at least."""
-STOP = 0.004
-"""How near an end of the range, in normalised position, counts as touching it."""
 HOP = 0.25
 """How far a joint must fall back to an end to knock there, in units of that."""
 APPROACH = 8

@@ -158,25 +158,24 @@ def rough(
     """The hypothesis fitted roughly: from each begin, its most promising trials."""
     make, unknowns = joined(base, hypothesis)
 
-    def fitted(begin: Begin) -> list[Fit]:
-        trials = (
-            np.concatenate([begin.fit.x, x]) for x in screened(judge, base, begin, hypothesis)
-        )
-        fits = [_leaving(judge, make, unknowns, x, begin) for x in trials]
+    def best(begin: Begin, trials: Sequence[Array], kept: int) -> list[Fit]:
+        starts = (np.concatenate([begin.fit.x, x]) for x in trials)
+        fits = [_leaving(judge, make, unknowns, x, begin) for x in starts]
         near = [
             replace(fit, loss=judge.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in fits
         ]
-        return sorted(near, key=lambda f: f.loss)[: hypothesis.kept]
+        return sorted(near, key=lambda f: f.loss)[:kept]
 
-    found = tuple(fit for begin in begun for fit in fitted(begin))
-    if usual(judge, begun[0].fit) < LOST or not judge.windows.force.any():
-        return found
-    own = np.ones(len(base.places))
-    begin = replace(begun[0], fit=replace(begun[0].fit, start=judge.windows.start))
-    starts = (np.append(own, x) for x in balanced(judge.windows, base, hypothesis))
-    more = [_leaving(judge, make, unknowns, x, begin) for x in starts]
-    near = [replace(fit, loss=judge.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in more]
-    return (*found, *sorted(near, key=lambda fit: fit.loss)[:1])
+    found = [
+        fit
+        for begin in begun
+        for fit in best(begin, screened(judge, base, begin, hypothesis), hypothesis.kept)
+    ]
+    windows, first = judge.windows, begun[0]
+    if usual(judge, first.fit) >= LOST and windows.force.any():
+        given = replace(first.fit, x=np.ones(len(base.places)), start=windows.start)
+        found += best(replace(first, fit=given), balanced(windows, base, hypothesis), 1)
+    return tuple(found)
 
 
 def _leaving(judge: Judge, make: Make, unknowns: Unknowns, x: Array, begin: Begin) -> Fit:

@@ -228,6 +228,21 @@ class Judge:
         each = self.loss(squares) / max(self.samples, 1.0)
         return max(each / (BEND * float(np.log1p(1 / BEND))), 1.0)
 
+    def covariance(self, make: Make, unknowns: Unknowns, fit: Fit, doubt: Array) -> Array:
+        """Of a fit's numbers, with what is left over as noise, if they were known so well before.
+
+        Args:
+            make, unknowns, fit: the model, its numbers, and how they were fitted.
+            doubt: their standard deviations before the data, shape (k,).
+
+        Returns:
+            shape (k, k).
+        """
+        H = self.linear(make, unknowns, fit.x, fit.start).normal()[0]
+        return np.asarray(
+            self.overdispersion(fit.squares) * np.linalg.inv(H + np.diag(doubt**-2.0))
+        )
+
     def linear(
         self,
         make: Make,

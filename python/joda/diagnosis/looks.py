@@ -1,7 +1,7 @@
 """One look at the measurements or two: the usual windows, and longer ones where these leave a
 question."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,14 +51,22 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
         exclude: effects that are not considered.
         told: how much is done, of how much, and what.
     """
-    ranking = _ranked(measured, asked(measured), exclude, told)
+    needs = Needs(measured)
+
+    def ranked(begun: Asked) -> Ranking:
+        """What may be missing and needs no more force than the measurements can."""
+        return rank(
+            begun, exclude, told, possible=lambda *one: not needs.exceeded(needs.exerted(*one))
+        )
+
+    ranking = ranked(asked(measured))
     strictness = LOOSELY if moved_one_way(measured) else 1.0
     found = evidence(ranking)
     weighed = decide(found, strictness)
     first = ranking, weighed
     if weighed.verdict == "missing_effect":
         return Looked(ranking, weighed, first, (found,))
-    again = _again(measured, first, exclude, told)
+    again = _again(measured, first, ranked)
     if again is None:
         return Looked(ranking, weighed, first, (found,))
     more = evidence(again)
@@ -72,7 +80,7 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
 
 
 def _again(
-    measured: Measured, first: tuple[Ranking, Weighed], exclude: Collection[str], told: Told
+    measured: Measured, first: tuple[Ranking, Weighed], ranked: Callable[[Asked], Ranking]
 ) -> Ranking | None:
     """A second ranking; None where nothing shows that is to be explained.
 
@@ -86,19 +94,11 @@ def _again(
         longer = asked(measured, min(LONGER * judge.windows.length, LONGEST), ranking.asked.fit.x)
         if calm and excess_of(longer) <= SETTINGS.noticed:
             return None
-        return _ranked(measured, longer, exclude, told)
+        return ranked(longer)
     if calm:
         return None
     best = ranking.guesses[0].fit if ranking.guesses else ranking.asked.fit
     left = best.squares / np.maximum(judge.windows.count, 1)
     factor = max(float(np.sqrt(np.median(left[judge.counts]))), 1.0)
     noisier = measured.with_curves([curve.noisier(factor) for curve in measured.curves])
-    return _ranked(measured, asked(noisier), exclude, told)
-
-
-def _ranked(measured: Measured, begun: Asked, exclude: Collection[str], told: Told) -> Ranking:
-    """What may be missing and needs no more force than the measurements can."""
-    needs = Needs(measured)
-    return rank(
-        begun, exclude, told, possible=lambda effect, profile: not needs.exceeded(profile, effect)
-    )
+    return ranked(asked(noisier))

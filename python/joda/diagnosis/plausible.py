@@ -50,9 +50,9 @@ def implausible(needs: "Needs", profile: Profile, effect: str | None = None) -> 
             "it works only in a joint with next to no friction and damping, much less than the "
             "model has, and no force is recorded: something may have moved the joint"
         )
-    if not needs.exceeded(profile, effect):
+    force = needs.exerted(profile, effect)
+    if not needs.exceeded(force):
         return None
-    force = needs.exerted(divided(profile, effect)[0] if effect else profile)
     unit = profile.joint.force_unit
     return (
         f"it would exert up to {force:.2g} {unit}, {force / needs.force:.0f} times the "
@@ -102,8 +102,11 @@ class Needs:
         self.resistance = self._resisted(measured.profile)
         self.forced = not measured.runs or any(run.forced for run in measured.runs)
 
-    def exerted(self, profile: Profile) -> float:
-        """Largest force of a profile where and as fast as runs went, N·m or N."""
+    def exerted(self, profile: Profile, effect: str | None = None) -> float:
+        """Largest force of a profile, or of one effect of it, where and as fast as runs went; N·m
+        or N."""
+        if effect:
+            profile = divided(profile, effect)[0]
         grid = np.linspace(*self.visited, GRID)
         total = 0.0
         for name in CHANNELS:
@@ -113,9 +116,8 @@ class Needs:
                 total += most * (self.speed if name == "damping" else 1.0)
         return total + self._of(profile.effects)
 
-    def exceeded(self, profile: Profile, effect: str | None = None) -> bool:
-        """Whether an effect of a profile, or all of it, exerts far more than the runs can need."""
-        force = self.exerted(divided(profile, effect)[0] if effect else profile)
+    def exceeded(self, force: float) -> bool:
+        """Whether a force (N·m or N) is far more than the runs can need."""
         return force > EXCESS * self.force
 
     def unresisted(self, profile: Profile) -> bool:

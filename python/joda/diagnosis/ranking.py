@@ -61,7 +61,7 @@ def rank(
     exclude: Collection[str] = (),
     heed: Told = lambda done, total, what: None,
     roughly: bool = False,
-    possible: Callable[[str, Profile], bool] = lambda effect, profile: True,
+    possible: Callable[[Profile, str], bool] = lambda profile, effect: True,
 ) -> Ranking:
     """Fits every hypothesis to measured runs.
 
@@ -89,7 +89,7 @@ def rank(
     there = [
         one
         for one in guesses
-        if not one.vanished and possible(one.hypothesis.effect, one.written(begun.base))
+        if not one.vanished and possible(one.written(begun.base), one.hypothesis.effect)
     ]
     return Ranking(begun, *_scored(begun.judge, there), bouncy=silent and bool(ends))
 

@@ -17,8 +17,7 @@ SAME = (
 BOUNCY = "The ends of the range throw the joint back more than the model's: not explained."
 BLIND = (
     " With its own numbers fitted the model misses windows held out by less than what was taken "
-    "for noise, part of which may be what the joint does between two samples: record "
-    "faster."
+    "for noise, part of which may be what the joint does between two samples: record faster."
 )
 
 

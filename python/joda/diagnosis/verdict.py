@@ -26,12 +26,7 @@ from joda.diagnosis.plausible import unseen_place
 from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
 from joda.diagnosis.ranking import Ranking, Told
 from joda.diagnosis.rivals import indistinguishable
-from joda.diagnosis.summary import (
-    BOUNCY,
-    SAME,
-    other_unit,
-    summarised,
-)
+from joda.diagnosis.summary import BOUNCY, SAME, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, MUCH, Evidence, Verdict, Weighed, weigh
 from joda.diagnosis.whole import BEYOND, worst

@@ -4,17 +4,18 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from joda._core import Solo
 from joda.effects import EndStopRestitution
 from joda.joints.rig import gravity_factors
 from joda.profile import CHANNELS, Profile
 from joda.scenes.context import Context
-from joda.scenes.limits import limit_parameters
-from joda.scenes.native import Row, own_friction_row
+from joda.scenes.limits import IMPEDANCES, limit_parameters
+from joda.scenes.native import Row
 
-IMPEDANCES = 1e-4, 0.9999
-"""To which MuJoCo limits `solimp`."""
+Array = NDArray[np.float64]
+
 ONLY_SLIDES = 2
 """In `mjModel.body_simple`."""
 
@@ -58,6 +59,13 @@ class Single:
     def with_plugin(self) -> "Single":
         """The same with the plugin's friction row."""
         return replace(self, friction_row=None)
+
+    def weight_at(self, position: Array) -> Array:
+        """Gravity's force at positions (rad or m), N·m or N; shape (n,)."""
+        a, b = self.weight
+        if not self.hinge:
+            return np.full(len(position), a)
+        return np.asarray(a * np.cos(position) + b * np.sin(position))
 
     def without_weight(self) -> "Single":
         """The same joint where there is no gravity."""
@@ -106,13 +114,10 @@ def single(context: Context, profile: Profile, model: mujoco.MjModel, joint: int
         hinge=hinge,
         solref=tuple(map(float, model.jnt_solref[joint])),
         solimp=tuple(map(float, model.jnt_solimp[joint])),
-        friction_row=own_friction_row(model, joint),
     )
 
 
 def weighing(context: Context, own: Single) -> Context:
     """The context where gravity pulls as on this joint."""
-    a, b = own.weight
-    q = np.array(context.positions)
-    force = a * np.cos(q) + b * np.sin(q) if own.hinge else np.full(len(q), a)
+    force = own.weight_at(np.array(context.positions))
     return context.model_copy(update={"gravity_force": tuple(map(float, force))})

@@ -38,8 +38,8 @@ FORCE = 8
 COLUMNS = 13
 KNOCK = 12
 """Column of the rows: whether the joint is at an end of its range in the window."""
-REACH = 0.004
-"""How near an end it is there, in normalised position, beside noise."""
+STOP = 0.004
+"""How near an end of the range, in normalised position, counts as touching it, beside noise."""
 MOSTLY = 0.8
 """Part of what is beyond the noise at ends from which speed, direction, time and load are told by
 other windows alone: a knock has all of these, but by its place."""
@@ -136,7 +136,11 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         least = (smoothing.LEAST + 1) * float(np.median(np.diff(run.time)))
         windows = measured.replayer.windows(run, sigma, max(length, least))
-        rows += [_row(measured, run, sigma, window) for window in windows if _tells(window, sigma)]
+        rows += [
+            [*_row(measured, run, sigma, window), float(_at_end(measured, run, sigma, window))]
+            for window in windows
+            if _tells(window, sigma)
+        ]
     return np.array(rows).reshape(-1, COLUMNS)
 
 
@@ -167,7 +171,7 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
                 misfit = path[samples] - run.position[samples]
                 part = squares * len(samples) / len(there)
                 piece = Window(samples, misfit, force, doubt, pushed=off, squares=tuple(part))
-                rows.append([*_row(measured, run, sigma, piece)[:KNOCK], 0.0])
+                rows.append([*_row(measured, run, sigma, piece), 0.0])
     return np.array(rows).reshape(-1, COLUMNS)
 
 
@@ -189,12 +193,17 @@ def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[flo
     load = float(run.force[window.samples].mean()) + gravity
     square = float(np.sum(window.misfit**2) / (sigma**2 + window.pushed**2))
     place = (middle - lo) / (hi - lo)
-    s = (run.position[window.samples] - lo) / (hi - lo)
-    reach = REACH + BLIND * sigma / (hi - lo)
-    knock = float((s < reach).any() or (s > 1 - reach).any())
     row = [place, speed, 0.5 * float(np.sign(speed)), float(run.time[ends].mean()), load]
     size = rms(window.misfit), len(window.misfit), square
-    return [*row, *size, window.force, window.doubt, *window.squares, knock]
+    return [*row, *size, window.force, window.doubt, *window.squares]
+
+
+def _at_end(measured: Measured, run: Run, sigma: float, window: Window) -> bool:
+    """Whether the joint is at an end of its range in a window."""
+    lo, hi = measured.profile.joint.range
+    s, noise = (run.position[window.samples] - lo) / (hi - lo), sigma / (hi - lo)
+    reach = STOP + BLIND * noise
+    return bool((s < reach).any() or (s > 1 - reach).any())
 
 
 def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:

@@ -161,11 +161,9 @@ def held_force(profile: Profile, weight: Array, position: Array, direction: Arra
     """The same where gravity's force (N·m or N, shape (n,)) is known: for many profiles."""
     lo, hi = profile.joint.range
     s, growth = (position - lo) / (hi - lo), 0.0
-    own = merge(profile.channels.conservative)(s)[0]
+    own = exerted(profile, s, position)
     for effect in profile.effects:
-        if isinstance(effect, GravityOffset):
-            own = own + effect.sin * np.sin(position) + effect.cos * np.cos(position) + effect.force
-        elif isinstance(effect, LoadDependentFriction):
+        if isinstance(effect, LoadDependentFriction):
             growth = effect.coefficient
     if growth >= 1:
         raise JodaError(
@@ -177,6 +175,15 @@ def held_force(profile: Profile, weight: Array, position: Array, direction: Arra
     # The load is `unloaded` + direction * growth * |load|, of the same sign.
     load = unloaded / (1 - growth * np.sign(unloaded) * direction)
     return np.asarray(load - weight)
+
+
+def exerted(profile: Profile, s: Array, position: Array) -> Array:
+    """A profile's force over normalised position s, and position (rad or m), N·m or N."""
+    out = merge(profile.channels.conservative)(s)[0]
+    for effect in profile.effects:
+        if isinstance(effect, GravityOffset):
+            out = out + effect.sin * np.sin(position) + effect.cos * np.cos(position) + effect.force
+    return np.asarray(out)
 
 
 def gravity(context: Context, position: Array) -> Array:

@@ -13,7 +13,7 @@ from joda.joints.single import Single, single, weighing
 from joda.measured import smoothing
 from joda.measured.driven import read_logs
 from joda.measured.gauge import Gauged, gauged
-from joda.measured.misfit import joined, rms
+from joda.measured.misfit import missed
 from joda.measured.obstructed import Clear, clear_of_contacts
 from joda.measured.replay import WINDOW, Replayer
 from joda.measured.runs import QuasiStatic, Run
@@ -25,7 +25,7 @@ from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact
 from joda.scenes.context import Context, context
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
-from joda.scenes.native import Row, whole_profile
+from joda.scenes.native import Row, own_friction_row, whole_profile
 from joda.scenes.scene import profiles_of
 
 Array = NDArray[np.float64]
@@ -34,6 +34,11 @@ CLEARLY = 0.9
 """Part of the error in windows to which another friction row must bring it."""
 ENOUGH = 4
 """Runs that tell which row that is."""
+YIELDS = (
+    "MuJoCo's own friction row yields near rest (solreffriction, solimpfriction): by it windows of "
+    "{0:g} s are missed by {2:.2g} {3}, by the same friction in a profile, which is what is "
+    "replayed here, by {1:.2g} {3}."
+)
 FINEST = 1e-6
 """Least noise, in units of the range."""
 STEPS = 5_000_000
@@ -86,8 +91,7 @@ class Measured:
         """The same joint with another profile, another body, or with some of its runs only."""
         numbers = range(len(self.runs)) if runs is None else runs
         new = self.profile if profile is None else profile
-        same = profile is None
-        own = single or (self.single if same else self.single.with_plugin)
+        own = single or (self.single if profile is None else self.single.with_plugin)
         found = self.context if single is None else weighing(self.context, single)
         return replace(
             self,
@@ -189,13 +193,6 @@ def read_measured(
     return taken(compiled, number, found, profile, clear, notes, whole=not besides)
 
 
-def _missed(replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float]) -> float:
-    """RMS error in windows of some runs, rad or m; NaN if there are none."""
-    pairs = list(zip(runs, sigma, strict=True))[:ENOUGH]
-    windows = [joined(replayer.windows(run, noise)) for run, noise in pairs]
-    return rms(np.concatenate(windows))
-
-
 def taken(
     model: mujoco.MjModel,
     joint: int,
@@ -221,22 +218,16 @@ def taken(
     usual = smoothing.pooled_noise([(run.time, run.position) for run in timed])
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     sigma = tuple(max(smoothing.noise(run.time, run.position), least) for run in timed)
-    yielding = single(found, profile, model, joint)
-    own = yielding.with_plugin
+    own, row = single(found, profile, model, joint), own_friction_row(model, joint)
     replayer = Replayer(found, profile, own, step)
-    if yielding.friction_row and timed:
+    if row and timed:
+        yielding = replace(own, friction_row=row)
         other = Replayer(found, profile, yielding, step)
-        with_plugin, natively = (_missed(one, timed, sigma) for one in (replayer, other))
-        if natively < CLEARLY * with_plugin:
+        errors = [missed(one, timed[:ENOUGH], sigma[:ENOUGH]) for one in (replayer, other)]
+        if errors[1] < CLEARLY * errors[0]:
             own, replayer = yielding, other
-        elif with_plugin < CLEARLY * natively:
-            unit = found.joint.unit
-            notes.append(
-                f"MuJoCo's own friction row yields near rest (solreffriction, solimpfriction): by "
-                f"it windows of {WINDOW:g} s are missed by {natively:.2g} {unit}, by the same "
-                f"friction in a profile, which is what is replayed here, by {with_plugin:.2g} "
-                f"{unit}."
-            )
+        elif errors[0] < CLEARLY * errors[1]:
+            notes.append(YIELDS.format(WINDOW, *errors, found.joint.unit))
     static = [curve for curve in clear.measured if isinstance(curve, QuasiStatic)]
 
     def replay(run: Run, sigma: float) -> Array:
@@ -258,7 +249,7 @@ def taken(
         context=found,
         profile=profile,
         single=own,
-        own_row=yielding.friction_row,
+        own_row=row,
         timestep=step,
         replayer=replayer,
         runs=timed,

@@ -165,9 +165,9 @@ def resolution(position: Array) -> float:
     values = np.unique(position)
     steps = np.diff(values)
     steps = steps[steps > 1e-6 * (values[-1] - values[0])]  # smaller ones are rounding
-    rounding = _rounding(values)
     if len(steps) < 3:  # many samples of two or three values are coarse steps
         return float(steps.min()) if len(steps) and len(position) > COARSE * len(steps) else 0.0
+    rounding = _rounding(values)
     for parts in range(1, 7):  # the smallest difference that occurs may be a few steps
         step = steps.min() / parts
         near = steps[steps < 10 * step * parts]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.measured.misfit import joined, rms
+from joda.measured.misfit import missed, rms
 from joda.measured.reading import Measured
 from joda.measured.replay import Replayer
 
@@ -25,11 +25,7 @@ def timestep_note(measured: Measured, error: float) -> str | None:
         return None
     step = measured.timestep / FINER
     finer = Replayer(measured.context, measured.profile, measured.single, step)
-    windows = [
-        joined(finer.windows(run, sigma))
-        for run, sigma in zip(measured.runs, measured.sigma, strict=True)
-    ]
-    less = rms(np.concatenate(windows))
+    less = missed(finer, measured.runs, measured.sigma)
     if less > CLEARLY * error:
         return None
     unit = measured.profile.joint.unit

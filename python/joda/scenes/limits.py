@@ -22,8 +22,8 @@ IMPEDANCE = 0.99
 """As kStopImpedance there."""
 YIELDING, FIRM = 1e-2, 1e-3
 """A stop that yields by more than the first share of the range is made to yield by the second."""
-MOST = 0.9999
-"""Largest impedance that MuJoCo takes."""
+IMPEDANCES = 1e-4, 0.9999
+"""Smallest and largest impedance that MuJoCo takes."""
 
 
 def rebounding(restitution: float, timestep: float) -> tuple[float, float]:
@@ -75,7 +75,7 @@ def firm_limit(
     if stiffness <= 0 or pressed * (1 - solimp[1]) / stiffness <= YIELDING * span:
         return None
     hardest = (2 * timestep * ratio) ** -2
-    d = float(np.clip(1 - FIRM * span * hardest / pressed, solimp[1], MOST))
+    d = float(np.clip(1 - FIRM * span * hardest / pressed, solimp[1], IMPEDANCES[1]))
     words = f"{d:.6g} {d:.6g}"
     if direct:
         damping = -solref[1] * np.sqrt(hardest / stiffness)
