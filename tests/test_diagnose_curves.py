@@ -92,8 +92,9 @@ def test_what_changes_from_sample_to_sample_clears_nothing(tmp_path):
 
 @pytest.mark.parametrize("samples", [15, 40, 150])
 def test_curves_of_a_true_model_are_cleared(tmp_path, samples):
-    found = [compared(tmp_path, lambda s, d: 0 * s, samples=samples) for _ in range(20)]
-    assert sum(one.curves_adequacy == "within_noise" for one in found) >= 17
+    found = [compared(tmp_path, lambda s, d: 0 * s, samples=samples) for _ in range(40)]
+    # about nine of ten are
+    assert sum(one.curves_adequacy == "within_noise" for one in found) >= 28
     assert any("no fault of the model" in " ".join(sentences(one)) for one in found)
 
 
