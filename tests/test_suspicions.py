@@ -339,7 +339,15 @@ def few(one, run, rng):
     return resampled(run, np.arange(rng.integers(4, 19)))
 
 
+def wrapped(one, run, rng):
+    """The zero is in the middle of the motion, and angles count from 0 to a turn."""
+    turn = rng.choice([2 * np.pi, 360.0])
+    position = run.position * turn / (2 * np.pi)
+    return replace(run, position=(position - np.median(position)) % turn, velocity=None)
+
+
 MISTAKES = {
+    "wrapped": (wrapped, dict(accept=hinges)),
     "degrees": (degrees, dict(accept=hinges)),
     "millimetres": (degrees, dict(accept=lambda one: not hinges(one))),
     "sign": (mirrored, dict(accept=lambda one: from_zero(one) and full(one))),
@@ -358,7 +366,7 @@ MISTAKES = {
 }
 
 
-FATAL = {"degrees", "millimetres", "sign", "zero", "short"}
+FATAL = {"wrapped", "degrees", "millimetres", "sign", "zero", "short"}
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.scenes.assembly import put
+from joda.scenes.model import joint_name
 
 Array = NDArray[np.float64]
 Act = Callable[[mujoco.MjData], bool]
@@ -28,6 +29,8 @@ APART = 0.05
 LEAN = 0.3
 """How long a joint that is pressed against its stop takes to come to rest there, s."""
 
+_BAD = mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC
+"""Warnings that tell of a dof."""
 _CONTACT = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 
 
@@ -101,17 +104,34 @@ def play(
         if len(out) == steps or not (going or steps):
             out.append((*state, felt(model, data, dof)))
             return Motion(*np.array(out).T)
-        mujoco.mj_step(model, data, stride)
+        _advance(model, data, stride)
         out.append((*state, felt(model, data, dof)))
-        if data.time <= state[0]:  # MuJoCo has begun anew
-            raise _unstable(model, state[0])
 
 
-def _unstable(model: mujoco.MjModel, time: float) -> JodaError:
-    return JodaError(
-        f"the simulation is unstable at {time:.3g} s; make the scene's timestep, "
-        f"{model.opt.timestep:g} s, smaller."
+def _advance(model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
+    """Steps the scene; raises JodaError if it is unstable, of which MuJoCo says nothing then."""
+    before, heard = data.time, mujoco.get_mju_user_warning()
+    if heard is None:  # else MuJoCo would print it, and leave a log file where one stands
+        mujoco.set_mju_user_warning(_unheard)
+    try:
+        mujoco.mj_step(model, data, steps)
+    finally:
+        if heard is None:
+            mujoco.set_mju_user_warning(None)
+    if data.time > before:
+        return  # else MuJoCo has begun anew
+    dofs = [data.warning[kind].lastinfo for kind in _BAD if data.warning[kind].number]
+    joint = [joint_name(model, int(model.dof_jntid[dof])) for dof in dofs[:1]]
+    raise JodaError(
+        f"the simulation is unstable at {before:.3g} s"
+        + "".join(f", where joint '{name}' runs away" for name in joint)
+        + f": make the scene's timestep, {model.opt.timestep:g} s, smaller, or check the forces, "
+        "stiffness and masses that act there."
     )
+
+
+def _unheard(message: str) -> None:
+    pass
 
 
 def at_home(model: mujoco.MjModel) -> mujoco.MjData:
@@ -190,9 +210,7 @@ def settle(model: mujoco.MjModel, joint: int, position: float, patience: float) 
     pause = max(round(0.25 / model.opt.timestep), 1)
     stride = max(pause // 25, 1)
     while data.time < patience:
-        mujoco.mj_step(model, data, stride)
-        if data.time <= out[-1][0]:
-            raise _unstable(model, out[-1][0])
+        _advance(model, data, stride)
         out.append((data.time, data.qpos[qpos], data.qvel[dof], 0.0))
         recent = [row[1] for row in out[-(pause // stride + 1) :]]
         if len(recent) > pause // stride and max(recent) - min(recent) < 1e-4 * span:

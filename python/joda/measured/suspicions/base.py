@@ -19,6 +19,7 @@ Kind = Literal[
     "origin",
     "unread",
     "ticks",
+    "wrapped",
     "force_size",
     "uneven_time",
     "gap",
@@ -29,7 +30,10 @@ Kind = Literal[
     "driven",
 ]
 
-FATAL = {"short", "clock", "degrees", "millimetres", "ticks", "sign", "zero", "force_size"}
+FATAL = {
+    *("short", "clock", "degrees", "millimetres", "ticks", "wrapped", "sign", "zero"),
+    "force_size",
+}
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,14 @@ STRAY, APART, FAR = 5.0, 20.0, 0.02
 noises, and as a share of what was visited, at least."""
 MOSTLY = 0.3
 """Share of samples beyond the range from which on they are no single wrong values."""
+TURNS = (2 * np.pi, 360.0)
+"""A full turn in the units that angles are told in."""
+WRAPPED = 0.15
+"""How far from a full turn a jump may be that wraps an angle, as a part of it."""
+TURNS = {"rad": 2 * np.pi, "degrees": 360.0}
+"""A full turn, by the unit of the positions."""
+WRAP, SMOOTH = 0.85, 0.25
+"""Least part of a turn that an angle jumps where it is wrapped; most that it moves elsewhere."""
 STEPS = 40
 """An encoder with fewer steps over what the joint visited is coarse."""
 
@@ -33,6 +41,10 @@ def noise(run: Run | QuasiStatic, position: Array) -> float:
 
 def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], Array]:
     """What is wrong with unit, sign, zero and range; and the positions without it."""
+    if told := _wrapped(run, context):
+        return [suspect(run, "wrapped", told)], run.position
+    if told := _wrapped(run, context):
+        return [suspect(run, "wrapped", told)], run.position
     glitches, position = _outside(run, run.position, context)
     if 0 < np.sum(position != run.position) <= max(FEW * len(position), 3):
         return glitches, position
@@ -106,6 +118,23 @@ def _unit(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], Ar
         f"{kind}; {remedy}"
     )
     return [suspect(run, kind, told)], position
+
+
+def _wrapped(run: Run | QuasiStatic, context: Context) -> str:
+    """Speaks where an angle jumps by a full turn from one sample to the next."""
+    move = np.abs(np.diff(run.position))
+    if context.joint.type != "hinge" or np.ptp(context.joint.range) >= TURNS["rad"]:
+        return ""
+    for unit, turn in TURNS.items():
+        jumps = move > WRAP * turn
+        if not jumps.any() or np.ptp(run.position) > 1.001 * turn:
+            continue
+        if move[~jumps].max(initial=0.0) < SMOOTH * turn:
+            return (
+                f"positions jump by a full turn ({turn:.4g} {unit}) {jumps.sum()} times: they are "
+                f"wrapped; unwrap them (numpy.unwrap with period={turn:.6g})"
+            )
+    return ""
 
 
 def _ticks(run: Run | QuasiStatic, context: Context) -> list[Suspicion]:
