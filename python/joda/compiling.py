@@ -70,16 +70,24 @@ def compile(  # the command's name
     """
     if output is not None:
         check_target(Path(output), force)
-    read = proposal if isinstance(proposal, Proposal) else Proposal.read(proposal)
+    read, file = (
+        (proposal, "")
+        if isinstance(proposal, Proposal)
+        else (Proposal.read(proposal), f"{proposal}: ")
+    )
     summary = read.joint_summary
     found = model if isinstance(model, Context) else context(model, joint or summary.joint_name)
     kind = {"revolute": "hinge", "prismatic": "slide"}[summary.joint_type]
     if kind != found.joint.type:
         raise JodaError(
-            f"joint '{found.joint.name}' is a {found.joint.type} and the proposal is for a "
+            f"{file}joint '{found.joint.name}' is a {found.joint.type} and the proposal is for a "
             f"{summary.joint_type} joint; set joint_summary.joint_type."
         )
-    parts = contributions(read, found, read_templates(templates), key)
+    library = read_templates(templates)
+    try:
+        parts = contributions(read, found, library, key)
+    except JodaError as error:
+        raise JodaError(f"{file}{error}") from error
     channels = {
         name: {"combine": combine, "components": [part[name] for part in parts if name in part]}
         for name in CHANNELS

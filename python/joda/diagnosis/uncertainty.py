@@ -54,6 +54,7 @@ these and what follows are calibrated by the bench `hidden cover` (docs/reliabil
 OWN_SHAPE = {
     "bistable_mechanism": 0.12,  # its force goes on growing outside the range
     "end_stop_restitution": 0.12,  # an impact lies between two samples
+    "backlash": 0.03,  # a stiff contact yields a little before it carries
     "presliding_friction": 0.04,  # bristles yield before they slide
 }
 """The same of single effects."""
