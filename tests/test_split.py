@@ -99,7 +99,7 @@ def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, c
     assert not (held.train.counts & held.held).any()
     travel = [np.ptp(windows.position[row[row >= 0]]) for row in windows.rows[held.held]]
     if count < 4:
-        assert np.median(travel) > 50 * SIGMA  # one may reach beyond its block
+        assert max(travel) > 50 * SIGMA  # others may reach beyond their block
     else:
         assert set(windows.run[held.held]) == {3}
 
