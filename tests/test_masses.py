@@ -111,8 +111,8 @@ def test_mass_where_nothing_of_the_part_is_is_told(tmp_path):
     assert doubts(tmp_path, inertial.format(0.3, 0.1, 0.1, 0.1) + door) == ()
     (said,) = doubts(tmp_path, inertial.format(30, 0.1, 0.1, 0.1) + door)
     assert "moves 4 kg whose centre lies 29." in said and "correct the pos of <inertial>" in said
-    (said,) = doubts(tmp_path, inertial.format(0.3, 100, 100, 100) + door)
-    assert f"an inertia of {100 + 4 * 0.3**2:.3g} kg·m², as if all of it were 5" in said
+    (said,) = doubts(tmp_path, inertial.format(0.3, 900, 900, 900) + door)
+    assert f"an inertia of {900 + 4 * 0.3**2:.3g} kg·m², as if all of it were 15" in said
 
 
 def test_what_is_heavier_than_lead_is_told(tmp_path):

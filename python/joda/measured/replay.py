@@ -38,7 +38,9 @@ ENSEMBLE = 8
 DENSEST = 50_000
 """Samples of a run from which on only some are looked at for that, their noise averaged."""
 TRIES = 5
-"""Replays, each from a better start than the best before, or nearer to it."""
+"""Replays, each from a better start than the best before, or nearer to it; and one from rest."""
+NEAR_BY = 3.0
+"""How far a path is moved by the starts nearby that tell its slopes, in noises."""
 STUCK = 1e-9
 """Part of the motion that a force makes of a free joint, squared, below which it makes none."""
 START = 3.0
@@ -263,14 +265,17 @@ class Replayer:
         begun = smoothing.smooth(run.time, run.position, at, sigma)
         starts = np.stack([begun.position, begun.velocity], axis=1)
         doubts = np.stack([begun.position_error, begun.velocity_error], axis=1)
+        # starts are tried so near that the path does not meet an end, or rest, because of that
+        near_by = np.minimum(doubts, NEAR_BY * sigma * np.array([1, 1 / length]))
         force = np.where(np.isnan(run.force), 0.0, run.force)
         forces = np.interp(at[:, None] + self.h * np.arange(steps), run.time, force)
         push = 6 * self.inertia * sigma / length**2  # moves the joint by three times the noise
         near, step = np.zeros_like(starts), np.zeros_like(starts)
+        at_rest = np.stack([np.zeros(len(kept)), -starts[:, 1] / doubts[:, 1]], axis=1)
         least, best = np.full(len(kept), np.inf), dict[int, Window]()
-        for _ in range(TRIES):
-            tried = np.clip(near + step, -START, START)
-            nearby = self._nearby(starts + doubts * tried, doubts, forces, push)
+        for number in range(TRIES + 1):
+            tried = np.clip(at_rest if number == 1 else near + step, -START, START)
+            nearby = self._nearby(starts + doubts * tried, near_by, forces, push)
             for k, (samples, paths) in enumerate(zip(pieces, nearby, strict=True)):
                 place = (run.time[samples] - at[k]) / self.h
                 path = np.stack([np.interp(place, np.arange(steps + 1), p) for p in paths])
@@ -278,16 +283,17 @@ class Replayer:
                 square = np.sum((misfit / sigma) ** 2) + np.sum(tried[k] ** 2)
                 if k not in best or square < least[k]:
                     slopes = (path[1:] - path[0]).T / sigma
+                    slopes[:, :2] *= doubts[k] / near_by[k]
                     least[k], near[k] = square, tried[k]
                     step[k], best[k] = _fitted(samples, misfit, slopes, near[k], sigma, push)
-                else:
+                elif number > 1:
                     step[k] /= 4
         if not run.forced:
             return [best[k] for k in range(len(kept))]
         return [_with_force(best[k], run, self.inertia) for k in range(len(kept))]
 
-    def _nearby(self, starts: Array, doubts: Array, forces: Array, push: float) -> Iterator[Array]:
-        """Paths from the starts, from starts one doubt off, and under another constant force.
+    def _nearby(self, starts: Array, offsets: Array, forces: Array, push: float) -> Iterator[Array]:
+        """Paths from the starts, from starts nearby, and under another constant force.
 
         What has a memory (friction, play) keeps it from one window to the next.
 
@@ -297,8 +303,8 @@ class Replayer:
         off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
         pushed = np.array([0.0, 0.0, 0.0, push])
         mujoco.mj_resetData(self.model, self.data)
-        for start, doubt, force in zip(starts, doubts, forces, strict=True):
-            states = self._placed(start + doubt * off)
+        for start, offset, force in zip(starts, offsets, forces, strict=True):
+            states = self._placed(start + offset * off)
             paths, last = self._roll(states, force + pushed[:, None])
             mujoco.mj_setState(self.model, self.data, last[0], FULL)
             yield paths

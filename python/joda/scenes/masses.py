@@ -23,7 +23,7 @@ WATER, SOLID = 1000.0, 30.0
 HOLLOW, ROUGHLY, LIGHT = 4.0, 0.1, 1.0
 """How many times what a mesh encloses MuJoCo counts of a thin hull, how near that the mass then is,
 and what is too little (kg) to be worth a word."""
-FAR = 3.0
+FAR = 10.0
 """How many times farther from a hinge's axis than any geom a mass must seem for a word."""
 NEARLY = 0.01
 """How near that density a mean density is taken for it."""
