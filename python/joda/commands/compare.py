@@ -1,6 +1,7 @@
 """Compares a model with measured runs and curves: numbers, sentences, a picture, a page."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,6 +67,8 @@ def compare(
     short = window_rows(measured)
     judged = adequacy(measured, found, short) if found.runs else None
     places, length = _failing(measured, found, short, judged)
+    if judged and judged.verdict == "within_noise" and places:
+        judged = replace(judged, verdict="not_enough_data")
     described = measured.profile.joint
     note = timestep_note(measured, found.window) if found.runs else None
     forces = tuple(failing_force(measured.curves, described))

@@ -4,10 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import usable, windows_for
+from joda.diagnosis.windows import Windows
 from joda.measured.curves import FEW, TOO_LOUD, too_loud
 from joda.measured.gauge import Gauged
 from joda.measured.reading import Measured
 from joda.measured.slow import one_way, ways
+from joda.measured.smoothing import resolution
+from joda.measured.suspicions.timing import repeated
 
 WINDOWS, MOVES = 4, 8.0
 """Fewest windows with motion that tell anything; and what is motion, in noises."""
@@ -38,6 +41,19 @@ def hardly_moved(measured: Measured) -> str:
     return ""
 
 
+def at_rest(measured: Measured) -> str:
+    """That no run moves the joint, as a clause; nothing if one does."""
+    if not measured.runs or _moving(measured, windows_for(measured)):
+        return ""
+    return "the joint does not move in these runs, and at rest nothing tells how it moves"
+
+
+def _moving(measured: Measured, windows: Windows) -> int:
+    """In how many windows the joint moves by more than noise."""
+    own = [windows.position[row[row >= 0]] for row in windows.rows[usable(windows)]]
+    return sum(bool(np.ptp(position) > MOVES * max(measured.sigma)) for position in own)
+
+
 def too_little(measured: Measured) -> str:
     """Why a model that misses nothing may lack much, as a sentence; nothing if that is not so."""
     if why := hardly_moved(measured):
@@ -46,9 +62,9 @@ def too_little(measured: Measured) -> str:
     if not measured.runs:
         told = len(windows.position)
         return f"{told} samples are too few; record {FEW}." if told < FEW else ""
-    own = [windows.position[row[row >= 0]] for row in windows.rows[usable(windows)]]
-    moving = sum(bool(np.ptp(position) > MOVES * max(measured.sigma)) for position in own)
-    if moving < WINDOWS:
+    if any(repeated(run, run.position, resolution(run.position)) for run in measured.runs):
+        return "Positions repeat while the joint moves, so that what was taken for noise is motion."
+    if (moving := _moving(measured, windows)) < WINDOWS:
         return (
             f"The joint moves in {moving} windows of {windows.length:.2g} s; {WINDOWS} are needed."
         )

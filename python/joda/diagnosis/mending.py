@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.asking import Asked, asked
 from joda.diagnosis.better import FALLEN, worse
+from joda.diagnosis.coverage import at_rest
 from joda.diagnosis.given import FAITHFUL, SHARED, Departures, departures, restored
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS
@@ -116,7 +117,7 @@ def mend(
         given: the profile of the model as it was given; None: the joint's as it is.
     """
     before, replays = _replayed(held)
-    if reason := unseen_place(train, near):
+    if reason := at_rest(train) or unseen_place(train, near):
         return Mended(train.profile, None, before, before, reason)
     told("the effect's own numbers")
     given = given or train.profile

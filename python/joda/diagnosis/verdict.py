@@ -17,7 +17,7 @@ from joda.diagnosis.corrections import (
     one_factor,
     strengths,
 )
-from joda.diagnosis.coverage import moved_one_way, too_little, too_noisy
+from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.looks import Looked, looked
@@ -124,6 +124,9 @@ def diagnosed(
     """
     if not usable(windows_for(measured)).any():
         return Diagnosed(_said(measured, "insufficient_data", TOO_SHORT, (), None))
+    if why := at_rest(measured):
+        why = f"{why[0].upper()}{why[1:]}."
+        return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     looks = looked(measured, exclude, told)

@@ -17,6 +17,8 @@ from joda.measured.errors import MULTIPLE, Errors, Missed
 from joda.measured.failing import FORCE, LENGTHS
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
+from joda.measured.smoothing import resolution
+from joda.measured.suspicions.timing import repeated
 
 Array = NDArray[np.float64]
 Adequate = Literal["within_noise", "beyond_noise", "not_enough_data"]
@@ -46,6 +48,8 @@ class Adequacy:
         whole: whether all that acts on the joint in its scene is replayed, and all of the runs.
         loudness: the largest share of the noise in a run's motion, both RMS: from 0.3 on the noise
             may be motion between two samples.
+        repeats: whether positions of a moving joint repeat, as of a sensor that is slower than its
+            logger: what was taken for noise is motion.
         barred: where the scene would not have let the joint, a sentence; empty if nowhere: else the
             model is beyond the noise however well the rest is replayed.
     """
@@ -56,6 +60,7 @@ class Adequacy:
     pattern: float | None
     whole: bool
     loudness: float
+    repeats: bool
     barred: str
 
 
@@ -74,6 +79,7 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     samples = sum(len(run.time) for run in measured.runs)
     pairs = zip(measured.runs, measured.sigma, strict=True)
     loudness = max((_loudness(run, sigma) for run, sigma in pairs), default=0.0)
+    repeats = any(repeated(run, run.position, resolution(run.position)) for run in measured.runs)
     complete = len(whole) == len(measured.runs) and bool(pieces)
     verdict: Adequate = "within_noise"
     if measured.barred:
@@ -86,11 +92,14 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
         not (complete and measured.whole)
         or max(one.multiple for one in found.missed) >= MULTIPLE
         or loudness >= LOUD
+        or repeats
         or pattern is None
         or _moving(measured) < WINDOWS
     ):
         verdict = "not_enough_data"
-    return Adequacy(verdict, run, segment, pattern, measured.whole, loudness, measured.barred)
+    return Adequacy(
+        verdict, run, segment, pattern, measured.whole, loudness, repeats, measured.barred
+    )
 
 
 def _loudness(run: Run, sigma: float) -> float:

@@ -112,6 +112,16 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
             "Not enough to tell whether the model is right: nothing in what is replayed is beyond "
             "the noise, but not all is replayed (below)."
         )
+    elif found.verdict == "not_enough_data" and comparison.failing:
+        yield (
+            "Not enough to tell whether the model is right: every run and every window is missed "
+            f"by less than {MULTIPLE:g} times the noise, but some by clearly more than others."
+        )
+    elif found.verdict == "not_enough_data" and found.repeats:
+        yield (
+            "Not enough to tell whether the model is right: positions repeat while the joint "
+            "moves, so that what was taken for noise is motion; record each measured value once."
+        )
     elif found.verdict == "not_enough_data" and found.loudness >= LOUD:
         yield f"Not enough to tell whether the model is right: {_loud(found)}"
     elif found.verdict == "not_enough_data":
