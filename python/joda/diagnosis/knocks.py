@@ -111,7 +111,8 @@ class Rebound:
     def may_be(self, ratio: float) -> bool:
         """Whether a restitution is not clearly worse than the best one, or the model's."""
         loss = float(np.interp(ratio, self.ratios, self.losses))
-        return loss - min(self.own, float(self.losses.min())) < CHANCE
+        least = min(self.own, float(self.losses.min()))
+        return loss - least < max(CHANCE, PART * least)
 
     @property
     def ratio(self) -> float:

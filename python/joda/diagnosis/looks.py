@@ -19,6 +19,7 @@ from joda.diagnosis.weighing import (
     excess_of,
     second_counts,
 )
+from joda.diagnosis.whole import FreeRuns, free_runs
 from joda.measured.reading import Measured
 
 LONGER, LONGEST = 9.0, 1.5
@@ -35,12 +36,14 @@ class Looked:
         ranking, weighed: of the look that counts.
         first: the first look's ranking, and what it says.
         evidence: of each look.
+        free: what free runs as a whole say, where windows name nothing for sure; else None.
     """
 
     ranking: Ranking
     weighed: Weighed
     first: tuple[Ranking, Weighed]
     evidence: tuple[Evidence, ...]
+    free: FreeRuns | None = None
 
 
 def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
@@ -66,9 +69,10 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
     first = ranking, weighed
     if weighed.verdict == "missing_effect":
         return Looked(ranking, weighed, first, (found,))
-    again = _again(measured, first, ranked)
+    free = free_runs(measured, ranking.asked)
+    again = _again(measured, first, bool(free and free.drifting), ranked)
     if again is None:
-        return Looked(ranking, weighed, first, (found,))
+        return Looked(ranking, weighed, first, (found,), free)
     more = evidence(again)
     if measured.runs:
         anew = decide(more, SETTINGS.strictly, wholly=True)
@@ -76,13 +80,16 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
         anew = replace(decide(more, strictness), verdict="unexplained")
     if second_counts(weighed, anew):
         ranking, weighed = again, anew
-    return Looked(ranking, weighed, first, (found, more))
+    return Looked(ranking, weighed, first, (found, more), free)
 
 
 def _again(
-    measured: Measured, first: tuple[Ranking, Weighed], ranked: Callable[[Asked], Ranking]
+    measured: Measured,
+    first: tuple[Ranking, Weighed],
+    drifts: bool,
+    ranked: Callable[[Asked], Ranking],
 ) -> Ranking | None:
-    """A second ranking; None where nothing shows that is to be explained.
+    """A second ranking; None where nothing shows that is to be explained, nor free runs drift.
 
     Of curves as if their noise were what the best effect usually leaves: a hand trembles, and
     friction is uneven, by more than a gauge's noise. That stays unexplained, but it no longer
@@ -92,7 +99,7 @@ def _again(
     calm, judge = weighed.verdict == "adequate", ranking.asked.judge
     if measured.runs:
         longer = asked(measured, min(LONGER * judge.windows.length, LONGEST), ranking.asked.fit.x)
-        if calm and excess_of(longer) <= SETTINGS.noticed:
+        if calm and not drifts and excess_of(longer) <= SETTINGS.noticed:
             return None
         return ranked(longer)
     if calm:

@@ -10,6 +10,10 @@ MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
 EVEN = 0.5
 """Probability above which an answer is more likely than not."""
+FAR, PART = 10.0, 0.1
+"""Noises by which windows held out may be missed with what is said to be missing; or part of what
+they are missed by without it."""
+STILL = " With it windows held out of the fit are still missed by {:.0f} times the noise."
 SAME = (
     ": the joint was moved in one direction only, where a resistance and a force over position are "
     "the same"
@@ -39,7 +43,7 @@ def summarised(
     """The verdict in a sentence, where something is missing.
 
     "Missing is" is said only of an answer that is more likely than not, and with which the error on
-    windows held out of the fit falls from more than the noise.
+    windows held out of the fit falls from more than the noise, and not to many times the noise.
 
     Args:
         first: the likeliest effect.
@@ -61,10 +65,12 @@ def summarised(
             f"Something is missing that no known effect explains. Best guess: {name} ({likely}); "
             "but with it windows held out of the fit are missed as much."
         )
+    after = first.held_out_error_after
+    far = after > FAR * floor and after > PART * first.held_out_error_before
     blind = first.held_out_error_before < floor
     probability = _sum(first, weighed) if others else first.probability
-    head = "Best guess:" if blind or doubt or probability <= EVEN else "Missing is"
-    more = BLIND if blind else ""
+    head = "Best guess:" if blind or far or doubt or probability <= EVEN else "Missing is"
+    more = BLIND if blind else STILL.format(after / floor) if far else ""
     if others:
         why = SAME if one_way else ": these data cannot tell which"
         return f"{head} {either}{why}.{more}"

@@ -29,7 +29,7 @@ from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import BOUNCY, SAME, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, MUCH, Evidence, Verdict, Weighed, weigh
-from joda.diagnosis.whole import BEYOND, worst
+from joda.diagnosis.whole import BEYOND, FreeRuns, worst
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
 from joda.measured.misfit import rms
@@ -68,6 +68,16 @@ DRIFTING = (
     "Something is missing that no known effect explains: windows show nothing beyond the noise, "
     "but whole runs are missed by up to {:.0f} times what noise, start and force explain."
 )
+SLOWLY = (
+    "Something is missing that no known effect explains: windows show nothing beyond the noise, "
+    "but of runs in which no force acted as a whole more is left than noise makes, whatever the "
+    "model's own strengths."
+)
+TOGETHER = (
+    "Either the model's own numbers are off, or something is missing, and these runs cannot tell "
+    "which: as it stands the model leaves more of whole free runs than noise makes, and with other "
+    "numbers it would not."
+)
 WITH_THESE = (
     "No effect is missing, but as it stands the model misses whole runs by up to {:.0f} times the "
     "noise.{} With these there is {} that an effect would explain."
@@ -85,8 +95,8 @@ EITHER = "Either the model's own numbers are off ({}), or a force is missing"
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
 OUT_THERE = (
-    "Something is missing that acts from s = {:.2f} on, where no run was or hardly any: what it is "
-    "these data cannot tell, an obstacle, another end of the range, a latch."
+    "Something is missing that acts at s = {:.2f} to {:.2f}, where no run was or hardly any: what "
+    "it is these data cannot tell, an obstacle, another end of the range, a latch."
 )
 NO_EFFECT = "Something is missing that no known effect explains."
 
@@ -142,8 +152,9 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     puzzling = first_ranking if puzzled else None
     if weighed.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
-    if weighed.verdict == "adequate":
-        return Diagnosed(_calm(measured, ranking))
+    suffice = weighed.verdict != "missing_effect" and looks.free and looks.free.suffice
+    if weighed.verdict == "adequate" or suffice:
+        return Diagnosed(_calm(measured, ranking, looks.free))
     held = Holdout(ranking.asked, measured)
     named = range(min(NAMED, len(ranking.guesses)))
     every = {
@@ -160,9 +171,8 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
         said = _said(measured, "unexplained", why, (), experiment)
         return Diagnosed(said, puzzling=puzzling)
     if unseen_place(measured, every[sized[0]].interval):
-        a, b = every[sized[0]].interval
-        edge = a if a > 0.0 else b
-        said = _said(measured, "unexplained", OUT_THERE.format(edge), (), experiment)
+        where = OUT_THERE.format(*every[sized[0]].interval)
+        said = _said(measured, "unexplained", where, (), experiment)
         return Diagnosed(said, puzzling=puzzling)
     findings = tuple(every[k] for k in sized)
     profile = ranking.guesses[sized[0]].written(ranking.asked.base)
@@ -170,7 +180,9 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     helps = first.held_out_error_after < first.held_out_error_before
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
     if first_weighed.verdict == "adequate" and hardly and weighed.excess[0] < MUCH:
-        return Diagnosed(_calm(measured, first_ranking))  # nor do windows held out know of anything
+        return Diagnosed(
+            _calm(measured, first_ranking, looks.free)
+        )  # nor do windows held out know of anything
     verdict = weighed.verdict if helps else "unexplained"
     base, guess = ranking.asked.base, ranking.guesses[sized[0]]
     doubt = one_factor(base, guess) or other_unit(measured)
@@ -187,15 +199,24 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     return Diagnosed(said, profile if likely else None, findings, puzzling)
 
 
-def _calm(measured: Measured, ranking: Ranking) -> Diagnosis:
+def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosis:
     """No effect shows in windows: the model is adequate, unless whole runs or curves deny it."""
     if not measured.runs and _uneven(measured, ranking.asked):
         return _said(measured, "unexplained", _said_uneven(measured), (), GAUGE_AGAIN)
     left = worst(measured, ranking.asked)
     if left.free > BEYOND:
         return _said(measured, "unexplained", DRIFTING.format(left.free), (), AGAIN)
+    if free and free.drifting:
+        return _said(measured, "unexplained", SLOWLY, (), AGAIN)
     numbers, worst_run = strengths(ranking.asked), worst_missed(measured)
+    if free and free.denied:
+        numbers = tuple(
+            replace(one, factor=float(factor), error=float(error))
+            for one, factor, error in zip(numbers, free.factors, free.errors, strict=False)
+        )
     told = off(numbers)
+    if free and free.denied and not told:
+        return _said(measured, "unexplained", TOGETHER, (), AGAIN)
     if told and moved_one_way(measured):
         experiment = _next(measured, ranking, weigh(ranking), one_way=True)
         summary = EITHER.format(told) + SAME + "."

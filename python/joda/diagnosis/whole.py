@@ -5,13 +5,14 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from joda.diagnosis.asking import Asked
-from joda.diagnosis.knocks import CLEAR
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.measured.replay import Replayer
-from joda.measured.runs import Run
+from joda.measured.runs import Run, until_end
+from joda.measured.whiteness import CLEAR, drifts, free_parts, missed_by
 
 Array = NDArray[np.float64]
 
@@ -19,6 +20,11 @@ BEYOND = 5.0
 """How many times what errors explain of it a model that is adequate may miss a whole run by."""
 TRAVELLED = 0.3
 """Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
+FINE, TRIES, EDGE = 0.05, 12, 1e-6
+"""Strengths fitted to whole free runs: change that tells slopes, most steps, least off a bound."""
+CHANCE = 1e-4
+"""Probability, for a model that lacks nothing, of a drift of free runs as clear as one that counts:
+strengths are fitted in a few steps only, and two simulators differ a little."""
 DRAWS = 8
 """Strengths that are drawn, to tell how far their errors move a run."""
 
@@ -48,17 +54,11 @@ def worst(measured: Measured, asked: Asked) -> Worst:
         asked: the model fitted to them.
     """
 
-    row = asked.base.single.friction_row
-    single = replace(measured.single, friction_row=row)
-
-    def with_(strengths: Array) -> Replayer:
-        return measured.changed(asked.base.written(strengths), single=single).replayer
-
     @cache  # only a run that is missed by much asks for them
     def others() -> list[Replayer]:
-        return list(map(with_, _drawn(asked)))
+        return [_replayer(measured, asked, strengths) for strengths in _drawn(asked)]
 
-    replayer = with_(asked.fit.x)
+    replayer = _replayer(measured, asked, asked.fit.x)
 
     def times(part: Run, sigma: float) -> float:
         if not (start := replayer.start(part, sigma)):
@@ -75,12 +75,77 @@ def worst(measured: Measured, asked: Asked) -> Worst:
 
     told, whole = [], 0.0
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        part = _free(run, sigma, measured.profile.joint.range)
+        part = until_end(run, measured.profile.joint.range, CLEAR * sigma)
         found = times(part, sigma)
         if np.ptp(part.position) >= TRAVELLED * np.ptp(run.position):
             told.append(found)
         whole = max(whole, found if len(part.time) == len(run.time) else times(run, sigma))
     return Worst(max(told, default=whole), whole)
+
+
+@dataclass(frozen=True)
+class FreeRuns:
+    """What free runs as a whole, in which errors add up, say of a model.
+
+    Attributes:
+        denied: by them, with the strengths that windows tell.
+        drifting: by them, whatever its strengths.
+        every: whether all runs are free.
+        factors, errors: strengths by the whole runs, and their standard errors; shape (k,).
+    """
+
+    denied: bool
+    drifting: bool
+    every: bool
+    factors: Array
+    errors: Array
+
+    @property
+    def suffice(self) -> bool:
+        """Whether other strengths are all that the runs ask for."""
+        return self.every and self.denied and not self.drifting
+
+
+def free_runs(measured: Measured, asked: Asked) -> FreeRuns | None:
+    """Fits the model's strengths to its free runs, each from the start that suits it best.
+
+    Args:
+        measured: the joint and its runs.
+        asked: the model fitted to their windows, where the fit begins.
+
+    Returns:
+        None if no run is free.
+    """
+    parts, base, x = free_parts(measured), asked.base, asked.fit.x
+    if not parts:
+        return None
+
+    def left(strengths: Array) -> list[Array]:
+        replayer = _replayer(measured, asked, strengths)
+        return [missed_by(replayer, *part) for part in parts]
+
+    denied = drifting = drifts(parts, left(x)) < CHANCE
+    errors = np.sqrt(np.diag(asked.covariance))
+    if denied and len(x):
+        low, high = base.unknowns.low, base.unknowns.high
+        inside = np.clip(x, low + EDGE, high - EDGE)
+        found = least_squares(
+            lambda strengths: np.concatenate(left(strengths)),
+            inside,
+            bounds=(low, high),
+            diff_step=FINE,
+            max_nfev=TRIES,
+        )
+        x, drifting = found.x, drifts(parts, left(found.x)) < CHANCE
+        spread = np.linalg.pinv(found.jac.T @ found.jac) * max(np.mean(found.fun**2), 1.0)
+        errors = np.sqrt(np.diag(spread))
+    return FreeRuns(denied, drifting, len(parts) == len(measured.runs), x, errors)
+
+
+def _replayer(measured: Measured, asked: Asked, strengths: Array) -> Replayer:
+    """Of the model with other strengths, and the friction row of its fit."""
+    single = replace(measured.single, friction_row=asked.base.single.friction_row)
+    return measured.changed(asked.base.written(strengths), single=single).replayer
 
 
 def _drawn(asked: Asked) -> Array:
@@ -91,12 +156,3 @@ def _drawn(asked: Asked) -> Array:
     rng = np.random.default_rng(0)
     drawn = rng.multivariate_normal(x, asked.covariance, DRAWS, method="svd")
     return np.clip(drawn, base.unknowns.low, base.unknowns.high)
-
-
-def _free(run: Run, sigma: float, span: tuple[float, float]) -> Run:
-    """A run up to where the joint comes to an end of its range from elsewhere."""
-    lo, hi = span
-    away = np.minimum(run.position - lo, hi - run.position) > CLEAR * sigma
-    left = int(np.argmax(away)) if away.any() else len(away)
-    back = np.flatnonzero(~away[left:])
-    return run.part(slice(0, left + int(back[0]) if len(back) else len(away)))

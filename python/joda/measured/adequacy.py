@@ -19,6 +19,7 @@ from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.measured.smoothing import resolution
 from joda.measured.suspicions.timing import repeated
+from joda.measured.whiteness import drifts, free_parts, missed_by
 
 Array = NDArray[np.float64]
 Adequate = Literal["within_noise", "beyond_noise", "not_enough_data"]
@@ -44,7 +45,8 @@ class Adequacy:
         run, segment: the whole run and the window that are missed by most, those first that the
             measurement's own errors do not explain; None if there is none.
         pattern: probability that a true model leaves as clear a pattern of residual force (Wald and
-            Wolfowitz's runs test and a sign test, Bonferroni-corrected); None with too few windows.
+            Wolfowitz's runs test and a sign test), or as large means of what is missed of a free
+            run (`joda.measured.whiteness`), Bonferroni-corrected; None with too few windows.
         whole: whether all that acts on the joint in its scene is replayed, and all of the runs.
         loudness: the largest share of the noise in a run's motion, both RMS: from 0.3 on the noise
             may be motion between two samples.
@@ -76,6 +78,10 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     pieces = [one for one in found.missed if one.time is not None]
     run, segment = (max(some, key=lambda one: one.order, default=None) for some in (whole, pieces))
     pattern = residual_pattern(rows)
+    if pattern is not None:
+        parts = free_parts(measured)
+        left = [missed_by(measured.replayer, *part) for part in parts]
+        pattern = min(1.0, 2 * min(pattern, drifts(parts, left)))
     samples = sum(len(run.time) for run in measured.runs)
     pairs = zip(measured.runs, measured.sigma, strict=True)
     loudness = max((_loudness(run, sigma) for run, sigma in pairs), default=0.0)

@@ -135,9 +135,8 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
         every = "every run and window" if found.segment else "every run"
         small = "Beyond noise" if found.loudness >= LOUD else "Small, but not noise"
         yield (
-            f"{small}: {every} is missed by less than {MULTIPLE:g} times the noise, yet the signs "
-            "of the residual force have a pattern that noise makes in "
-            f"{_rarely(found.pattern)}."
+            f"{small}: {every} is missed by less than {MULTIPLE:g} times the noise, yet what is "
+            f"left has a pattern that noise makes in {_rarely(found.pattern)}."
         )
         if found.loudness >= LOUD:
             yield f"How far beyond these runs cannot tell: {_loud(found)}"

@@ -150,6 +150,30 @@ class Replayer:
         paths = self._replay(time, np.vstack([start.best, starts]), np.vstack([force, forces]))
         return float(np.sqrt(np.mean((paths[1:] - paths[0]) ** 2)))
 
+    def residual(self, run: Run, sigma: float) -> Array | None:
+        """Predicted minus measured positions from the start that suits the whole run best.
+
+        Rad or m, shape (n,); None where the force is not known throughout.
+        """
+        start = self.start(run, sigma)
+        time, force = _known(run)
+        if not start or len(time) < len(run.time):
+            return None
+        offsets = np.diag(NEAR_BY * sigma / np.array([1, time[-1]]))
+        tries = np.vstack([np.zeros(2), offsets])
+        forces = np.tile(force, (3, 1))
+        at, step, best, least = start.best, np.zeros(2), None, np.inf
+        for _ in range(TRIES):
+            paths = self._replay(time, at + step + tries, forces)
+            misfit = paths[0] - run.position
+            if (square := float(misfit @ misfit)) >= least or not np.isfinite(paths).all():
+                step = step / 4
+                continue
+            at, best, least = at + step, misfit, square
+            slopes = (paths[1:] - paths[0]).T
+            step = -offsets @ np.linalg.lstsq(slopes, misfit, rcond=None)[0]
+        return best
+
     def start(self, run: Run, sigma: float) -> Start | None:
         """Where a whole run begins; None where its force is unknown from the beginning.
 

@@ -182,6 +182,20 @@ def evened(run: Run) -> tuple[Run, str | None]:
     )
 
 
+def until_end(run: Run, span: tuple[float, float], clear: float) -> Run:
+    """A run up to where the joint comes to an end of its range from elsewhere.
+
+    Args:
+        run: which may begin at an end.
+        span: the range, rad or m.
+        clear: how far off an end the joint must be, rad or m, not to be at it.
+    """
+    away = np.minimum(run.position - span[0], span[1] - run.position) > clear
+    left = int(np.argmax(away)) if away.any() else len(away)
+    back = np.flatnonzero(~away[left:])
+    return run.part(slice(0, left + int(back[0]) if len(back) else len(away)))
+
+
 def write_run(path: Path, run: Run) -> None:
     """Writes a run as `read_run` reads it."""
     write_text(path, run_text(run))

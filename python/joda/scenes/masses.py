@@ -12,7 +12,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from joda.scenes.model import joint_name, moves_with
 
-Array, Mask = NDArray[np.float64], NDArray[np.bool_]
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 LIGHTEST, HEAVIEST = 20.0, 12000.0
 """Mean densities, kg/m³: of foam; a little above lead."""
@@ -23,8 +24,9 @@ WATER, SOLID = 1000.0, 30.0
 HOLLOW, ROUGHLY, LIGHT = 4.0, 0.1, 1.0
 """How many times what a mesh encloses MuJoCo counts of a thin hull, how near that the mass then is,
 and what is too little (kg) to be worth a word."""
-FAR = 10.0
-"""How many times farther from a hinge's axis than any geom a mass must seem for a word."""
+FAR, NEAR = 5.0, 0.02
+"""Of the way from a hinge's axis to the farthest geom, how far a mass must seem to be from the axis
+for a word: so much at the least, or so little at most."""
 NEARLY = 0.01
 """How near that density a mean density is taken for it."""
 ARMATURE = 0.5
@@ -137,11 +139,12 @@ def _of_place(model: mujoco.MjModel, joint: int, moving: Mask) -> str:
     inertia = float(np.sum(about_own + model.body_mass[moving] * away**2))
     gyration = np.sqrt(inertia / mass)
     farthest = float((np.linalg.norm(np.cross(centres - anchor, axis), axis=1) + reach).max())
-    if gyration <= FAR * farthest:
+    if NEAR * farthest <= gyration <= FAR * farthest:
         return ""
     return (
-        f"{said} with an inertia of {inertia:.3g} kg·m², as if all of it were {gyration:.3g} m from "
-        f"the axis, though its geoms reach {farthest:.3g} m: correct the inertia of <inertial>."
+        f"{said} with an inertia of {inertia:.3g} kg·m², as if all of it were {gyration:.3g} m "
+        f"from the axis, though its geoms reach {farthest:.3g} m: correct the inertia in "
+        "<inertial>."
     )
 
 

@@ -22,10 +22,6 @@ STRAY, APART, FAR = 5.0, 20.0, 0.02
 noises, and as a share of what was visited, at least."""
 MOSTLY = 0.3
 """Share of samples beyond the range from which on they are no single wrong values."""
-TURNS = (2 * np.pi, 360.0)
-"""A full turn in the units that angles are told in."""
-WRAPPED = 0.15
-"""How far from a full turn a jump may be that wraps an angle, as a part of it."""
 TURNS = {"rad": 2 * np.pi, "degrees": 360.0}
 """A full turn, by the unit of the positions."""
 WRAP, SMOOTH = 0.85, 0.25
