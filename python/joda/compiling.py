@@ -123,7 +123,7 @@ def contributions(
     seen: dict[str, int] = {}
     out = []
     for effect in proposal.effect_proposals:
-        template = _find(library, effect)
+        template = template_of(library, effect)
         number = seen[effect.effect_name] = seen.get(effect.effect_name, 0) + 1
         added = {}
         for name in CHANNELS:
@@ -158,7 +158,8 @@ def reference_scales(found: Context, ignore_gravity: bool = False) -> dict[str, 
     return {"conservative": force, "friction": force, "damping": force * arm / HAND_SPEED}
 
 
-def _find(library: Mapping[str, Template], effect: EffectProposal) -> Template:
+def template_of(library: Mapping[str, Template], effect: EffectProposal) -> Template:
+    """What an effect is made from; raises JodaError if there is none of its name."""
     if effect.effect_name not in library:
         raise JodaError(
             f"effect '{effect.effect_name}' is not in the library; there are: {', '.join(library)}."

@@ -16,6 +16,7 @@ from joda.propose.asking import Effort
 from joda.propose.history import History
 from joda.propose.session import Progress, Session, relative, silent
 from joda.scenes.model import find_joint, joint_name, joint_type, load_model
+from joda.template import read_templates
 
 ROUNDS = 3
 
@@ -91,9 +92,10 @@ def generate(
     further = [Path(path) for path in templates]
     if not resume or not (folder / "history.json").is_file():
         _check_free(folder, force)
-        choose(
-            proposer, key, vlm, base_url, effort
-        )  # a mistake in it is found before anything is made
+        # a mistake in it is found before anything is made
+        chosen = choose(proposer, key, vlm, base_url, effort)
+        if check := getattr(chosen, "check", None):
+            check(read_templates(further))
     session = begin(folder, source, name, describe, further, key, resume, progress)
     run(session, choose(proposer, session.history.key, vlm, base_url, effort), rounds, force)
     return Generated(folder, session.history, tuple(session.notes))

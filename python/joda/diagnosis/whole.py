@@ -12,7 +12,7 @@ from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.measured.replay import Replayer
 from joda.measured.runs import Run, until_end
-from joda.measured.whiteness import CLEAR, drifts, free_parts, missed_by
+from joda.measured.whiteness import CLEAR, drifts, free_parts
 
 Array = NDArray[np.float64]
 
@@ -20,8 +20,8 @@ BEYOND = 5.0
 """How many times what errors explain of it a model that is adequate may miss a whole run by."""
 TRAVELLED = 0.3
 """Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
-FINE, TRIES, EDGE = 0.05, 12, 1e-6
-"""Strengths fitted to whole free runs: change that tells slopes, most steps, least off a bound."""
+FINE, TRIES, SETTLED = 0.05, 10, 1e-3
+"""Strengths fitted to whole free runs: change that tells slopes, most steps, least gain of one."""
 CHANCE = 1e-4
 """Probability, for a model that lacks nothing, of a drift of free runs as clear as one that counts:
 strengths are fitted in a few steps only, and two simulators differ a little."""
@@ -88,7 +88,7 @@ class FreeRuns:
     """What free runs as a whole, in which errors add up, say of a model.
 
     Attributes:
-        denied: by them, with the strengths that windows tell.
+        denied: by them, as it is.
         drifting: by them, whatever its strengths.
         every: whether all runs are free.
         factors, errors: strengths by the whole runs, and their standard errors; shape (k,).
@@ -111,30 +111,33 @@ def free_runs(measured: Measured, asked: Asked) -> FreeRuns | None:
 
     Args:
         measured: the joint and its runs.
-        asked: the model fitted to their windows, where the fit begins.
+        asked: the model fitted to their windows.
 
     Returns:
         None if no run is free.
     """
-    parts, base, x = free_parts(measured), asked.base, asked.fit.x
+    parts, base = free_parts(measured), asked.base
     if not parts:
         return None
+    near: list[Array | None] = [None] * len(parts)
 
     def left(strengths: Array) -> list[Array]:
-        replayer = _replayer(measured, asked, strengths)
-        return [missed_by(replayer, *part) for part in parts]
+        replayer, out = _replayer(measured, asked, strengths), []
+        for k, (run, sigma) in enumerate(parts):
+            found, near[k] = replayer.followed(run, sigma, near[k])
+            out.append(found / sigma)
+        return out
 
+    x, errors = np.ones(len(asked.fit.x)), np.sqrt(np.diag(asked.covariance))
     denied = drifting = drifts(parts, left(x)) < CHANCE
-    errors = np.sqrt(np.diag(asked.covariance))
     if denied and len(x):
-        low, high = base.unknowns.low, base.unknowns.high
-        inside = np.clip(x, low + EDGE, high - EDGE)
         found = least_squares(
             lambda strengths: np.concatenate(left(strengths)),
-            inside,
-            bounds=(low, high),
+            x,
+            bounds=(base.unknowns.low, base.unknowns.high),
             diff_step=FINE,
             max_nfev=TRIES,
+            ftol=SETTLED,
         )
         x, drifting = found.x, drifts(parts, left(found.x)) < CHANCE
         spread = np.linalg.pinv(found.jac.T @ found.jac) * max(np.mean(found.fun**2), 1.0)

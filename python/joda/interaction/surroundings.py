@@ -10,7 +10,7 @@ import numpy as np
 
 from joda.profile import Profile
 from joda.scenes.actuators import acting_on
-from joda.scenes.assembly import put, taut
+from joda.scenes.assembly import at_others_limit, put, taut
 from joda.scenes.attaching import attach
 from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact, contacts_along
@@ -93,16 +93,18 @@ class Surroundings:
     def allows(self, model: mujoco.MjModel, joint: int, position: float) -> bool:
         """Whether its scene lets the joint be at a normalised position.
 
-        Nothing presses there, what equality constraints couple to it can move along, and tendons
-        reach so far.
+        Nothing presses there, what equality constraints couple to it can move along within its own
+        range, and tendons reach so far.
         """
         ends = (one.interval for one in self.contacts if one.presses)
         if any(a <= position <= b for a, b in ends):
             return False
         lo, hi = model.jnt_range[joint]
         data = at_home(model)
+        before = data.qpos.copy()
         there = put(model, data, joint, float(lo + position * (hi - lo)))
-        return there and not taut(model, data, joint)
+        beyond = at_others_limit(model, data, joint, before) or taut(model, data, joint)
+        return there and not beyond
 
 
 def surroundings(path: Path, joint: str) -> Surroundings | None:

@@ -19,7 +19,7 @@ from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.measured.smoothing import resolution
 from joda.measured.suspicions.timing import repeated
-from joda.measured.whiteness import drifts, free_parts, missed_by
+from joda.measured.whiteness import drifts, free_parts
 
 Array = NDArray[np.float64]
 Adequate = Literal["within_noise", "beyond_noise", "not_enough_data"]
@@ -80,7 +80,7 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     pattern = residual_pattern(rows)
     if pattern is not None:
         parts = free_parts(measured)
-        left = [missed_by(measured.replayer, *part) for part in parts]
+        left = [measured.replayer.followed(*part)[0] / part[1] for part in parts]
         pattern = min(1.0, 2 * min(pattern, drifts(parts, left)))
     samples = sum(len(run.time) for run in measured.runs)
     pairs = zip(measured.runs, measured.sigma, strict=True)

@@ -39,6 +39,8 @@ DENSEST = 50_000
 """Samples of a run from which on only some are looked at for that, their noise averaged."""
 TRIES = 5
 """Replays, each from a better start than the best before, or nearer to it; and one from rest."""
+ASTRAY = 1e9
+"""Error, in noises, of a replay that is not finite."""
 NEAR_BY = 3.0
 """How far a path is moved by the starts nearby that tell its slopes, in noises."""
 STUCK = 1e-9
@@ -150,29 +152,38 @@ class Replayer:
         paths = self._replay(time, np.vstack([start.best, starts]), np.vstack([force, forces]))
         return float(np.sqrt(np.mean((paths[1:] - paths[0]) ** 2)))
 
-    def residual(self, run: Run, sigma: float) -> Array | None:
+    def followed(self, run: Run, sigma: float, near: Array | None = None) -> tuple[Array, Array]:
         """Predicted minus measured positions from the start that suits the whole run best.
 
-        Rad or m, shape (n,); None where the force is not known throughout.
+        Args:
+            run: whose force is known throughout.
+            sigma: noise of its position, rad or m.
+            near: where to look from: position and velocity; None: as `start` says.
+
+        Returns:
+            rad or m, shape (n,); and that start.
         """
-        start = self.start(run, sigma)
-        time, force = _known(run)
-        if not start or len(time) < len(run.time):
-            return None
+        time, force = run.time - run.time[0], np.tile(run.force, (3, 1))
         offsets = np.diag(NEAR_BY * sigma / np.array([1, time[-1]]))
         tries = np.vstack([np.zeros(2), offsets])
-        forces = np.tile(force, (3, 1))
-        at, step, best, least = start.best, np.zeros(2), None, np.inf
+        if near is None and (start := self.start(run, sigma)):
+            near = start.best
+        at, step, least = np.asarray(near), np.zeros(2), np.inf
+        best = np.full(len(time), ASTRAY * sigma)
         for _ in range(TRIES):
-            paths = self._replay(time, at + step + tries, forces)
+            paths = self._replay(time, at + step + tries, force)
             misfit = paths[0] - run.position
-            if (square := float(misfit @ misfit)) >= least or not np.isfinite(paths).all():
+            square = float(misfit @ misfit) if np.isfinite(paths).all() else np.inf
+            gain = least - square
+            if gain > 0:
+                at, best, least = at + step, misfit, square
+                slopes = (paths[1:] - paths[0]).T
+                step = -offsets @ np.linalg.lstsq(slopes, misfit, rcond=None)[0]
+            else:
                 step = step / 4
-                continue
-            at, best, least = at + step, misfit, square
-            slopes = (paths[1:] - paths[0]).T
-            step = -offsets @ np.linalg.lstsq(slopes, misfit, rcond=None)[0]
-        return best
+            if abs(gain) < SETTLED * sigma**2:
+                break
+        return best, at
 
     def start(self, run: Run, sigma: float) -> Start | None:
         """Where a whole run begins; None where its force is unknown from the beginning.

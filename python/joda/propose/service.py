@@ -6,7 +6,7 @@ import json
 import os
 import re
 from typing import Any
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
 import numpy as np
 
@@ -19,6 +19,8 @@ SHORTEST_SECRET = 6
 """Letters; less is no secret but a word."""
 MOST_TOKENS = 10**9
 """Of an answer."""
+UNTOLD = "[an answer that repeats a secret, not shown]"
+BYTE = re.compile(r"\\x([0-9A-Fa-f]{2})")
 ESCAPED = re.compile(r"\\(?:u00([2-7][0-9A-Fa-f])|.)", re.DOTALL)
 """An escape of JSON, with the number of the character if it is one of ASCII's that are seen."""
 
@@ -58,14 +60,15 @@ class Credentials:
         """What the service says, without the secrets that it may echo: whole or in part, plain or
         as JSON, URLs, HTML and Base64 write them.
 
-        JSON stays JSON of the same meaning, but for the secrets.
+        JSON stays JSON of the same meaning, but for the secrets. Where one is still there in
+        another disguise, nothing of what was said is told.
         """
         said = ESCAPED.sub(_plainly, said)
         for secret in self._secrets:
             for form in _forms(secret):
                 said = said.replace(form, HIDDEN)
             said = _without_parts(said, secret)
-        return said
+        return UNTOLD if any(_disguised(said, secret) for secret in self._secrets) else said
 
 
 def _forms(secret: str) -> set[str]:
@@ -87,6 +90,33 @@ def _without_parts(said: str, secret: str) -> str:
     for begin, end in zip(edges[::2][::-1], edges[1::2][::-1], strict=True):
         said = said[:begin] + HIDDEN + said[end:]
     return said
+
+
+def _disguised(said: str, secret: str) -> bool:
+    """Whether a secret can be told from letters and digits alone: spaced, upper-case, reversed, or
+    in a usual code."""
+    code = secret.encode()
+    if len(_bare(secret)) < PART or secret.isalpha() or " " in secret:  # words may be anywhere
+        return False
+    texts = {_bare(text) for text in (said, unquote(said), html.unescape(said), _of_bytes(said))}
+    spelled = [_bare(secret), _bare(secret)[::-1]]
+    parts = {one[k : k + PART] for one in spelled for k in range(len(one) - PART + 1)}
+    # of Base64 and Base32 what does not depend on the neighbours, at each place they can begin at
+    parts |= {_bare(base64.b64encode(b"-" * k + code).decode()[4:-4]) for k in range(3)}
+    parts |= {_bare(base64.b32encode(b"-" * k + code).decode()[8:-8]) for k in range(5)}
+    parts |= {code.hex(), *("".join(f"{byte:{base}}" for byte in code) for base in "do")}
+    coded = {base64.b85encode(code).decode(), base64.a85encode(code).decode()}
+    return any(part in text for text in texts for part in parts) or any(c in said for c in coded)
+
+
+def _bare(text: str) -> str:
+    """Letters and digits alone, small."""
+    return "".join(filter(str.isalnum, text)).lower()
+
+
+def _of_bytes(text: str) -> str:
+    """With escapes such as \\x73 as the characters they are."""
+    return BYTE.sub(lambda found: chr(int(found[1], 16)), text)
 
 
 def _plainly(escape: re.Match[str]) -> str:

@@ -83,6 +83,12 @@ class Session:
                 f"In the scene {self._around.words}; behaviours are simulated in the scene as it "
                 "is."
             )
+        if self.context.actuators:
+            driving = " and ".join(self.context.actuators)
+            self.notes.append(
+                f"On joint '{history.joint}' acts {driving}: behaviours are simulated without, as "
+                "what the joint does by itself."
+            )
         self._templates = [self._path(path) for path in history.templates]
         library, archetypes = read_templates(self._templates), self._archetypes()
         self.turns = [self._turn(round) for round in history.rounds]

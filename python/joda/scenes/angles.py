@@ -28,10 +28,12 @@ def range_doubt(joint: Joint) -> str:
     odd = not _near(degrees, 0.5) and not _near(end, 1e-4)
     whole = _near(degrees, 0.01) or _near(float(np.rad2deg(degrees)), 5, 0.1)
     if hi - lo < SMALL and odd and whole:
+        low, high = np.rad2deg((lo, hi))
+        meant = f"{low:.4g} to {high:.4g}" if lo and hi else f"{degrees:.4g}"
         return (
-            f"{told} is {np.rad2deg(lo):.4g} to {np.rad2deg(hi):.4g} degrees; if "
-            f'{degrees:.4g} rad are meant, add angle="radian" to <compiler>, or write the range in '
-            f"degrees: {np.rad2deg(np.rad2deg(lo)):.4g} to {np.rad2deg(degrees):.4g}."
+            f"{told} is {low:.4g} to {high:.4g} degrees; if {meant} rad are meant, add "
+            'angle="radian" to <compiler>, or write the range in degrees: '
+            f"{np.rad2deg(low):.4g} to {np.rad2deg(high):.4g}."
         )
     return ""
 

@@ -56,6 +56,18 @@ def taut(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> bool:
     return bool(np.any(np.all(slope == 0, axis=1)))
 
 
+def at_others_limit(model: mujoco.MjModel, data: mujoco.MjData, joint: int, before: Array) -> bool:
+    """Whether a joint that moved along is beyond its own range where this one was put.
+
+    `before`: qpos before that, shape (nq,).
+    """
+    mujoco.mj_fwdPosition(model, data)
+    limits = data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
+    beyond = data.efc_id[limits & (data.efc_pos < -HELD)]
+    places = model.jnt_qposadr[beyond]
+    return bool(np.any((beyond != joint) & (data.qpos[places] != before[places])))
+
+
 def _holding(model: mujoco.MjModel, data: mujoco.MjData) -> list[int]:
     """The equality constraints, by id, that hold; none of those that carry a joint's damping."""
     others = [k for k in range(model.neq) if DAMPING_ROW not in model.equality(k).name]

@@ -8,6 +8,18 @@ from joda.measured.suspicions.timing import longest
 
 Array = NDArray[np.float64]
 
+UNITS = {
+    1 / 60: "if time were in minutes",
+    1e-3: "if time were in milliseconds",
+    2 * np.pi: "if positions were in turns",
+    np.pi / 180: "if positions were in degrees",
+    180 / np.pi: "if the velocity were in degrees per second",
+    30 / np.pi: "if the velocity were in turns per minute",
+    1 / (2 * np.pi): "if the velocity were in turns per second",
+}
+"""What makes a velocity so many times the position's derivative."""
+NEARLY = 0.02
+"""How near to such a factor it must be, as a part of it."""
 TRIED = 0.2
 """Longest delay of a velocity that is looked for, s."""
 
@@ -38,6 +50,11 @@ def wrong_velocity(run: Run, position: Array, unit: str) -> str:
     k = best if late else none
     if errors[k] > 0.25 * q.std():
         what = "is not the derivative of the position"
+    elif abs(factors[k] - 1) > 0.15 and (likely := _unit(1 / factors[k])):
+        return (
+            f"the velocity is {1 / factors[k]:.3g} times the derivative of the position, in "
+            f"{unit}/s, as {likely}; correct whichever it is"
+        )
     elif abs(factors[k] - 1) > 0.15:
         what = f"is {1 / factors[k]:.3g} times the derivative of the position, in {unit}/s"
     elif late:
@@ -45,3 +62,9 @@ def wrong_velocity(run: Run, position: Array, unit: str) -> str:
     else:
         return ""
     return f"the velocity {what}; correct it, or leave the column out"
+
+
+def _unit(times: float) -> str:
+    """The likely cause of a velocity that is so many times the derivative; empty if none is."""
+    near = (told for factor, told in UNITS.items() if abs(times / factor - 1) < NEARLY)
+    return next(near, "")
