@@ -333,6 +333,30 @@ KEY = "sk-proj-Zq9x/W+7aLm3-4kTvB=8sPdYhJ"
 @pytest.mark.parametrize(
     "echo",
     [
+        KEY[::-1],
+        KEY.upper(),
+        " ".join(KEY),
+        KEY.encode().hex(":"),
+        "".join(f"\\x{byte:02x}" for byte in KEY.encode()),
+        "".join(f"&#{byte};" for byte in KEY.encode()),
+        "".join(f"%{byte:02X}" for byte in KEY.encode()),
+        ", ".join(map(str, KEY.encode())),
+        base64.b64encode(f"x-api-key: {KEY}".encode()).decode(),
+        base64.b32encode(KEY.encode()).decode(),
+        base64.b85encode(KEY.encode()).decode(),
+    ],
+)
+def test_an_answer_that_holds_a_key_in_disguise_is_not_shown(monkeypatch, echo):
+    monkeypatch.setenv("ANTHROPIC_API_KEY", KEY)
+    monkeypatch.setenv("ANTHROPIC_CUSTOM_HEADERS", "X-Title: articulated objects everywhere")
+    hide = Credentials("ANTHROPIC", None).hide
+    assert hide(f"the key {echo} is wrong") == "[an answer that repeats a secret, not shown]"
+    assert hide("objects, articulated: every where") == "objects, articulated: every where"
+
+
+@pytest.mark.parametrize(
+    "echo",
+    [
         quote(KEY, safe=""),
         base64.b64encode(KEY.encode()).decode(),
         base64.b64encode(f"Bearer {KEY}".encode()).decode(),

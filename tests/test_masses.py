@@ -161,8 +161,8 @@ def test_a_body_without_geoms_raises_no_doubt(tmp_path):
 
 
 COUNTED = {"microwave": 0, "cabinet": 0, "table": 0, "kitchen": 10, "drawer": 0, "door": 0}
-"""Joints of other people's scenes with a doubt: knobs of armature, lamps and burners of air, a switch
-whose mass lies beside it."""
+"""Joints of other people's scenes with a doubt: knobs of armature, lamps and burners of air, a
+switch whose mass lies beside it."""
 
 
 @pytest.mark.sweep(3)

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from test_cli import fails, joda
@@ -327,7 +326,9 @@ def test_targets_that_cannot_be_read(microwave, tmp_path, text, sentence):
 def test_an_unstable_scene_is_one_sentence(slide, tmp_path, monkeypatch, capfd):
     path = slide('stiffness="-1e9"', PUSHER, '<option integrator="Euler"/>')
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(JodaError, match=r"unstable at .*, where joint 'j' runs away: make the scen"):
+    with pytest.raises(
+        JodaError, match=r"unstable at .*, where joint 'j' runs away: make the scen"
+    ):
         simulate(path, "j", release=0.5)
     assert capfd.readouterr() == ("", "")
     assert not list(tmp_path.glob("MUJOCO_LOG*"))

@@ -7,17 +7,17 @@ import pytest
 from hidden_cases import read
 
 from joda.diagnosis.asking import asked
-from joda.diagnosis.whole import BEYOND, _free, worst
+from joda.diagnosis.whole import BEYOND, worst
 from joda.hidden import draw
-from joda.measured.runs import Run
+from joda.measured.runs import Run, until_end
 
 
 def test_a_run_counts_up_to_where_the_joint_comes_to_an_end():
     position = np.array([0.0, 0.001, 0.2, 0.9, 0.999, 0.7, 0.5])
     run = Run("a.csv", np.arange(7.0), position, None, np.zeros(7), False)
-    assert len(_free(run, 1e-3, (0.0, 1.0)).time) == 4
-    assert len(_free(run, 1e-5, (0.0, 1.0)).time) == 7
-    assert len(_free(run, 1.0, (0.0, 1.0)).time) == 7
+    assert len(until_end(run, (0.0, 1.0), 3e-3).time) == 4
+    assert len(until_end(run, (0.0, 1.0), 3e-5).time) == 7
+    assert len(until_end(run, (0.0, 1.0), 3.0).time) == 7
 
 
 @pytest.mark.long

@@ -79,9 +79,11 @@ TOGETHER = (
     "numbers it would not."
 )
 WITH_THESE = (
-    "No effect is missing, but as it stands the model misses whole runs by up to {:.0f} times the "
-    "noise.{} With these there is {} that an effect would explain."
+    "No effect is missing, but as it stands the model {}.{} With these there is {} that an effect "
+    "would explain."
 )
+WHOLE = "misses whole runs by up to {:.0f} times the noise"
+FREELY = "leaves more of whole free runs than noise makes"
 WITHOUT = (
     " Whole runs are missed by up to {:.0f} times the noise all the same, which is up to {:.1f} "
     "times what noise, start and force explain; joda compare says where."
@@ -227,7 +229,9 @@ def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagno
     missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
     if told and worst_run and worst_run.fault:
-        summary = WITH_THESE.format(missed, told, noise)
+        summary = WITH_THESE.format(WHOLE.format(missed), told, noise)
+    elif told and free and free.denied:
+        summary = WITH_THESE.format(FREELY, told, noise)
     else:
         summary = f"The model is adequate: {noise} that an effect would explain.{told}"
         if missed > MULTIPLE and left.whole <= BEYOND:

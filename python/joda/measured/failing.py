@@ -29,6 +29,8 @@ BLIND = 3.0
 not enough to blame the model."""
 SLIGHT = 0.01
 """Mean residual force of a whole run, in units of what acts on it, that is none."""
+SURE = 2.0
+"""Standard errors from which on the direction of a window's motion is known."""
 CLEAR = 3.0
 """Standard deviations from which on a mean residual force is not 0."""
 AGREE = 0.8
@@ -188,14 +190,22 @@ def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[flo
     found = measured.context
     ends = window.samples[[0, -1]]
     middle = float(run.position[window.samples].mean())
-    speed = float(np.diff(run.position[ends])[0] / np.diff(run.time[ends])[0])
+    speed, doubt = _speed(run.time[window.samples], run.position[window.samples], sigma)
+    direction = 0.5 * float(np.sign(speed)) if abs(speed) > SURE * doubt else 0.0
     gravity = float(np.interp(middle, found.positions, found.gravity_force))
     load = float(run.force[window.samples].mean()) + gravity
     square = float(np.sum(window.misfit**2) / (sigma**2 + window.pushed**2))
     place = (middle - lo) / (hi - lo)
-    row = [place, speed, 0.5 * float(np.sign(speed)), float(run.time[ends].mean()), load]
+    row = [place, speed, direction, float(run.time[ends].mean()), load]
     size = rms(window.misfit), len(window.misfit), square
     return [*row, *size, window.force, window.doubt, *window.squares]
+
+
+def _speed(time: Array, position: Array, sigma: float) -> tuple[float, float]:
+    """Of a line through a window's positions, and its standard error."""
+    away = time - time.mean()
+    spread = float(away @ away)
+    return float(away @ position) / spread, sigma / spread**0.5
 
 
 def _at_end(measured: Measured, run: Run, sigma: float, window: Window) -> bool:

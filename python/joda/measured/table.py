@@ -1,6 +1,7 @@
 """CSV files with a header row, as spreadsheets and loggers of many kinds write them."""
 
 import csv
+import unicodedata
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ Array = NDArray[np.float64]
 SEPARATORS = ",;\t"
 LARGEST, LEAST = 1e30, 1e-30
 """Larger numbers are refused, as their squares overflow; smaller ones are zero."""
+SHEET = {"#N/A", "#N/A!", "#NA", "#NULL!", "#DIV/0!", "#VALUE!", "#REF!", "#NUM!", "#NAME?"}
+"""What spreadsheets write for a value that there is not."""
 SHOWN = 80
 """Characters of a header or a cell that a sentence shows."""
 
@@ -62,7 +65,7 @@ def read_table(path: Path, wanted: Sequence[str], expected: str) -> Table:
     number, first = next(rows, (0, []))
     if not first:
         raise JodaError(f"{path}: empty, no header row with {expected}.")
-    head = _without_end([cell.strip() for cell in first], 1)
+    head = _without_end([_seen(cell).strip() for cell in first], 1)
     names = [own.get(cell.lower(), "") for cell in head]
     if not any(names):
         raise JodaError(
@@ -150,13 +153,24 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     try:
         for row in reader:
             begin, end = end + 1, reader.line_num
-            if row and any(map(str.strip, row)) and not row[0].lstrip().startswith("#"):
+            if row and any(map(str.strip, row)) and not _comments(row[0]):
                 if separator != ",":
                     row = [cell.replace(",", ".") if cell.count(",") == 1 else cell for cell in row]
                 yield before + begin, row
     except csv.Error as error:
         line = before + reader.line_num
         raise JodaError(f"{path}, line {line}: not CSV ({error}).") from None
+
+
+def _seen(cell: str) -> str:
+    """Without characters that nobody sees, such as those that turn the direction of writing."""
+    return "".join(letter for letter in cell if unicodedata.category(letter) != "Cf")
+
+
+def _comments(cell: str) -> bool:
+    """Whether a row that begins with this is a comment; a spreadsheet's #N/A is none."""
+    begin = cell.lstrip()
+    return begin.startswith("#") and begin.rstrip() not in SHEET
 
 
 def _without_end(cells: list[str], least: int) -> list[str]:

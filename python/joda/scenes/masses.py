@@ -24,7 +24,7 @@ WATER, SOLID = 1000.0, 30.0
 HOLLOW, ROUGHLY, LIGHT = 4.0, 0.1, 1.0
 """How many times what a mesh encloses MuJoCo counts of a thin hull, how near that the mass then is,
 and what is too little (kg) to be worth a word."""
-FAR, NEAR = 5.0, 0.02
+FAR, NEAR = 10.0, 0.02
 """Of the way from a hinge's axis to the farthest geom, how far a mass must seem to be from the axis
 for a word: so much at the least, or so little at most."""
 NEARLY = 0.01

@@ -1,0 +1,96 @@
+"""Whether what a replay misses of a free run is noise: the means of its blocks.
+
+Windows with starts of their own, and their errors' size, tell little of a fault that adds up slowly
+over many samples, each of which is missed by less than the noise. Means over blocks of a run do:
+noise makes them small, and no start that suits the whole run best does away with a drift. How much
+noise makes of them is told by the differences within the blocks (a long-run variance with
+Bartlett's weights, Newey and West, Econometrica 55 (1987) 703), so that filtered and quantised
+positions have more.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from joda.measured.reading import Measured
+from joda.measured.runs import Run, until_end
+from joda.measured.smoothing import resolution
+
+Array = NDArray[np.float64]
+
+BLOCKS, LEAST, FEW = 16, 10, 5
+"""Blocks of a run, at most; samples of each, at least; and fewest blocks that tell anything."""
+CLEAR = 3.0
+"""How far off an end a joint must be, in noises, not to be at it."""
+SPIKE = 4.0
+"""Errors beyond so many noises count as so many: single wrong samples."""
+TOLERATED = 0.1
+"""Part of the noise by which a block's mean may be off: two solvers differ by as much."""
+
+
+def free_parts(measured: Measured) -> list[tuple[Run, float]]:
+    """Of the runs without a force, what comes before an end of the range, and each one's noise.
+
+    With a recorded force its errors add up as a fault does; and at an end the stop decides too.
+    """
+    span = measured.profile.joint.range
+    pairs = zip(measured.runs, measured.sigma, strict=True)
+    parts = [(until_end(run, span, CLEAR * sigma), sigma) for run, sigma in pairs if not run.forced]
+    return [(run, sigma) for run, sigma in parts if len(run.time) >= FEW * LEAST]
+
+
+def drifts(parts: Sequence[tuple[Run, float]], left: Sequence[Array]) -> float:
+    """Probability that noise makes as large means of what is missed of any run.
+
+    Args:
+        parts: of `free_parts`.
+        left: what is missed of each, in noises.
+    """
+    pairs = zip(parts, left, strict=True)
+    each = [
+        drift(own, run.position, resolution(run.position) / sigma) for (run, sigma), own in pairs
+    ]
+    return min(1.0, len(each) * min(each, default=1.0))
+
+
+def drift(residual: Array, position: Array, step: float) -> float:
+    """Probability that noise makes as large means of blocks of a residual.
+
+    Args:
+        residual: in noises, of a start that was fitted to it, shape (n,).
+        position: measured, shape (n,).
+        step: of a quantised position, in noises; 0: none.
+
+    Returns:
+        1 where nothing can be told.
+    """
+    count = min(BLOCKS, len(residual) // LEAST)
+    if count < FEW:
+        return 1.0
+    blocks = np.array_split(np.clip(residual, -SPIKE, SPIKE), count)
+    changes = np.array([np.sum(np.diff(own) != 0) for own in np.array_split(position, count)])
+    told = changes > 0 if step else np.ones(count, bool)
+    if told.sum() < FEW:
+        return 1.0
+    means, sizes = np.array([(own.mean(), len(own)) for own in blocks])[told].T
+    doubt = max(long_run_variance(blocks), 1.0) / sizes + TOLERATED**2
+    doubt += step**2 / 12 / np.maximum(changes[told], 1)
+    return float(chi2.sf(np.sum(means**2 / doubt), told.sum() - 2))
+
+
+def long_run_variance(blocks: list[Array]) -> float:
+    """Of a mean of many samples, times their number: by what is left of each block's own line."""
+    length = min(map(len, blocks))
+    place = np.linspace(-1, 1, length)
+    line = np.stack([np.ones(length), place]).T
+    rows = np.stack([own[:length] for own in blocks])
+    left = rows - rows @ line @ np.linalg.pinv(line)
+    most = length // 4
+    lags = [np.sum(left[:, k:] * left[:, : length - k]) for k in range(most + 1)]
+    weights = 1 - np.arange(most + 1) / (most + 1)
+    total = lags[0] + 2 * float(weights[1:] @ np.array(lags[1:]))
+    # a line through each block takes 2 / length of the whole from each lag
+    unbiased = max(total / (1 - 2 * (most + 1) / length), lags[0] * length / (length - 2))
+    return float(unbiased / rows.size)

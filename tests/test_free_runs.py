@@ -1,0 +1,144 @@
+"""What free runs as a whole tell, in which errors add up that windows cannot see."""
+
+import numpy as np
+import pytest
+from lids import FRICTION, INERTIA, SIGMA, thrown
+
+from joda import compare
+from joda.diagnosis.asking import asked
+from joda.diagnosis.verdict import diagnosed
+from joda.diagnosis.whole import free_runs
+from joda.measured.whiteness import drift, drifts, free_parts, long_run_variance
+
+SAMPLES = 600
+
+
+@pytest.fixture
+def rng():
+    seed = int(np.random.default_rng().integers(2**31))
+    print(seed)  # shown where a test fails
+    return np.random.default_rng(seed)
+
+
+def compared(folder, count):
+    return compare(folder / "model.xml", "lid", [folder / f"run{k}.csv" for k in range(count)])
+
+
+# --- the test by itself
+def cleared(make, count=200):
+    return np.mean([drift(*make()) > 0.005 for _ in range(count)])
+
+
+def test_white_noise_is_noise(rng):
+    def make():
+        return rng.standard_normal(SAMPLES), rng.standard_normal(SAMPLES), 0.0
+
+    assert cleared(make) > 0.95
+
+
+def test_filtered_noise_is_noise(rng):
+    """A moving mean of five, as loud as was estimated or louder."""
+
+    def make():
+        noise = np.convolve(rng.standard_normal(SAMPLES + 4), np.ones(5) / 2, "valid")
+        return noise, noise, 0.0
+
+    assert cleared(make) > 0.9
+
+
+def test_a_quantised_motion_is_noise(rng):
+    def make():
+        position = rng.uniform(20, 200) * np.sin(np.linspace(0, rng.uniform(2, 6), SAMPLES))
+        steps = np.round(position)
+        return (position - steps) * 12**0.5, steps, 12**0.5
+
+    assert cleared(make) > 0.95
+
+
+def test_half_a_noise_that_comes_and_goes_is_none(rng):
+    slow = 0.5 * np.sin(np.linspace(0, 9, SAMPLES))
+
+    def make():
+        return slow + rng.standard_normal(SAMPLES), slow, 0.0
+
+    assert cleared(make) < 0.05
+
+
+def test_a_few_samples_tell_nothing(rng):
+    assert drift(5 + rng.standard_normal(40), np.arange(40), 0.0) == 1.0
+
+
+def test_the_long_run_variance_of_a_moving_mean(rng):
+    """Of a sum of n independent numbers it is n² times theirs, here with n of 1 and 3."""
+    white = rng.standard_normal(20002)
+    for noise, known in ((white, 1.0), (np.convolve(white, np.ones(3), "valid"), 9.0)):
+        found = long_run_variance(np.array_split(noise, 16))
+        assert found == pytest.approx(known, rel=0.2)
+
+
+# --- of a joint
+def test_a_true_model_follows_its_free_runs(tmp_path, rng):
+    told = []
+    for k in range(8):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        parts = free_parts(measured := thrown(folder, rng, 2, drag=1e-6))
+        told.append(drifts(parts, [measured.replayer.followed(*one)[0] / one[1] for one in parts]))
+    assert np.sum(np.array(told) > 0.005) >= 6
+
+
+def louder(measured, folder, rng, times):
+    """The same runs with more noise, so that no window tells anything."""
+    from joda.measured.reading import read_measured
+    from joda.measured.runs import write_run
+
+    files = [folder / run.name for run in measured.runs]
+    for run, file in zip(measured.runs, files, strict=True):
+        noise = times * SIGMA * rng.standard_normal(len(run.time))
+        moves = np.abs(run.position - run.position[-50:].mean()) > 20 * SIGMA
+        run = run.part(slice(0, int(np.flatnonzero(moves)[-1]) + 50))
+        noise = noise[: len(run.time)]
+        write_run(file, type(run)(run.name, run.time, run.position + noise, None, run.force, False))
+    return read_measured(folder / "model.xml", "lid", files)
+
+
+@pytest.mark.parametrize("times", [1.08, 0.93])
+def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
+    """Eight or seven percent of friction, in a noise that hides it in windows."""
+    quiet = thrown(tmp_path, rng, 3, drag=1e-6, friction=times * FRICTION)
+    measured = louder(quiet, tmp_path, rng, 25)
+    found = free_runs(measured, asked(measured))
+    assert found.denied and found.suffice
+    assert found.factors[0] == pytest.approx(times, abs=max(4 * found.errors[0], 0.01))
+    said = diagnosed(measured).diagnosis
+    assert compared(tmp_path, 3).adequacy.verdict != "within_noise"
+    assert "The model is adequate" not in said.summary
+
+
+def test_a_drag_is_no_friction(tmp_path, rng):
+    """Over a range of speeds no friction stands in for it."""
+    measured = thrown(tmp_path, rng, 3, drag=0.02 * INERTIA / 0.03)
+    found = free_runs(measured, asked(measured))
+    assert found.denied and found.drifting and not found.suffice
+
+
+# --- of runs that tell nothing
+def test_a_joint_at_rest_tells_nothing(tmp_path, rng):
+    measured = thrown(tmp_path, rng, 1, drag=1e-6)
+    run = measured.runs[0]
+    pushed = np.where(run.time < run.time[-1] / 2, 3.0, 0.0)
+    still = 0.7 + SIGMA * rng.standard_normal(len(run.time))
+    stuck = type(run)(run.name, run.time, still, None, pushed, True)
+    said = diagnosed(measured.with_runs([stuck], [0])).diagnosis
+    assert (said.verdict, said.effects) == ("insufficient_data", ())
+    assert "does not move" in said.summary
+
+
+def test_positions_that_repeat_clear_nothing(tmp_path, rng):
+    from joda.measured.runs import write_run
+
+    measured = thrown(tmp_path, rng, 1, drag=1e-6, friction=0.8 * FRICTION)
+    run = measured.runs[0].part(slice(0, 800))
+    held = run.position[np.arange(800) // 8 * 8]
+    write_run(tmp_path / run.name, type(run)(run.name, run.time, held, None, run.force, False))
+    assert compared(tmp_path, 1).adequacy.verdict != "within_noise"
