@@ -8,6 +8,9 @@ from joda import compare
 from joda.diagnosis.asking import asked
 from joda.diagnosis.verdict import diagnosed
 from joda.diagnosis.whole import free_runs
+from joda.errors import JodaError
+from joda.measured.reading import read_measured
+from joda.measured.runs import write_run
 from joda.measured.whiteness import drift, drifts, free_parts, long_run_variance
 
 SAMPLES = 600
@@ -89,9 +92,6 @@ def test_a_true_model_follows_its_free_runs(tmp_path, rng):
 
 def louder(measured, folder, rng, times):
     """The same runs with more noise, so that no window tells anything."""
-    from joda.measured.reading import read_measured
-    from joda.measured.runs import write_run
-
     files = [folder / run.name for run in measured.runs]
     for run, file in zip(measured.runs, files, strict=True):
         noise = times * SIGMA * rng.standard_normal(len(run.time))
@@ -135,10 +135,18 @@ def test_a_joint_at_rest_tells_nothing(tmp_path, rng):
 
 
 def test_positions_that_repeat_clear_nothing(tmp_path, rng):
-    from joda.measured.runs import write_run
-
     measured = thrown(tmp_path, rng, 1, drag=1e-6, friction=0.8 * FRICTION)
     run = measured.runs[0].part(slice(0, 800))
     held = run.position[np.arange(800) // 8 * 8]
     write_run(tmp_path / run.name, type(run)(run.name, run.time, held, None, run.force, False))
     assert compared(tmp_path, 1).adequacy.verdict != "within_noise"
+
+
+def test_what_a_spreadsheet_writes_for_no_value_is_no_comment(tmp_path, rng):
+    thrown(tmp_path, rng, 1, drag=1e-6)
+    file = tmp_path / "run0.csv"
+    rows = file.read_text().splitlines()
+    rows[40] = ",".join(["#N/A", *rows[40].split(",")[1:]])
+    file.write_text("\n".join(rows) + "\n")
+    with pytest.raises(JodaError, match=r"run0\.csv, line 41: time is '#N/A'"):
+        compared(tmp_path, 1)

@@ -112,6 +112,24 @@ def test_what_is_coupled_moves_along_and_hinders_nothing(tmp_path):
     assert np.ptp(motion.position) < 1e-6
 
 
+def test_a_joint_goes_no_farther_than_what_is_coupled_to_it(tmp_path):
+    """The lever turns by half a radian at most: with 2.5 rad/m the drawer goes 0.2 of its 0.4 m."""
+    path = scene(tmp_path, RACK)
+    path.write_text(path.read_text().replace('name="swing"', 'name="swing" range="0 .5"'))
+    around = surroundings(path, "rail")
+    model = load_model(path)
+    rail = find_joint(model, "rail")
+    allowed = [around.allows(model, rail, s) for s in (0.0, 0.3, 0.49, 0.51, 0.8, 1.0)]
+    assert allowed == [True, True, True, False, False, False]
+    assert not seen(path).opening.arrived
+
+
+def test_actuators_that_are_left_out_are_told(tmp_path):
+    path = scene(tmp_path, '<actuator><position name="servo" joint="rail" kp="200"/></actuator>')
+    made = generate(path, "rail", tmp_path / "g", proposer="offline", rounds=1)
+    assert any("acts servo: behaviours are simulated without" in note for note in made.notes)
+
+
 def test_a_hand_that_the_joint_s_own_friction_stops_is_not_held_by_the_scene(tmp_path):
     found, profile = bare(scene(tmp_path, PULLS_OPEN.replace('"400"', '"1"')))
     stuck = Component(interval=(0, 1), x=(0, 1), y=(200.0, 200.0))

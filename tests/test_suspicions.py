@@ -581,3 +581,15 @@ def test_a_joint_that_gains_speed_by_itself_was_driven(rng):
         assert not [one for one in suspicions(calm, found) if one.kind == "driven"]
     pushed = replace(grows, force=0 * run.time, forced=True)
     assert not [one for one in suspicions(pushed, found) if one.kind == "driven"]
+
+
+@pytest.mark.parametrize(
+    ("clock", "turns", "told"),
+    [(60, 1, "time were in minutes"), (1, 2 * np.pi, "positions were in turns")],
+)
+def test_a_velocity_tells_the_unit_of_the_others(rng, clock, turns, told):
+    found, run = swinging(rng)
+    velocity = 0.6 * 4.0 * np.cos(4.0 * run.time)
+    wrong = replace(run, time=run.time / clock, position=run.position / turns, velocity=velocity)
+    sentence = the_one(wrong, found, "velocity").sentence
+    assert f"as if {told}" in sentence and "leave the column out" not in sentence
