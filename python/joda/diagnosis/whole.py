@@ -22,6 +22,11 @@ TRAVELLED = 0.3
 """Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
 FINE, TRIES, SETTLED = 0.05, 10, 1e-3
 """Strengths fitted to whole free runs: change that tells slopes, most steps, least gain of one."""
+APART = 5e-3
+"""Part of a strength by which another simulator's may differ."""
+FINER, FEW = 4, 4
+"""Steps for one of the scene's, and most steps of the fit then: what the scene's step makes of a
+motion is no effect that is missing."""
 CHANCE = 1e-4
 """Probability, for a model that lacks nothing, of a drift of free runs as clear as one that counts:
 strengths are fitted in a few steps only, and two simulators differ a little."""
@@ -119,29 +124,34 @@ def free_runs(measured: Measured, asked: Asked) -> FreeRuns | None:
     parts, base = free_parts(measured), asked.base
     if not parts:
         return None
-    near: list[Array | None] = [None] * len(parts)
+    count, errors = len(asked.fit.x), np.sqrt(np.diag(asked.covariance))
+    begins = [_replayer(measured, asked, np.ones(count)).start(*part) for part in parts]
+    near = [begin.best if begin else np.zeros(2) for begin in begins]
 
-    def left(strengths: Array) -> list[Array]:
-        replayer, out = _replayer(measured, asked, strengths), []
+    def left(strengths: Array, finer: int) -> list[Array]:
+        stepped = replace(measured, timestep=measured.timestep / finer)
+        replayer, out = _replayer(stepped, asked, strengths), []
         for k, (run, sigma) in enumerate(parts):
             found, near[k] = replayer.followed(run, sigma, near[k])
             out.append(found / sigma)
         return out
 
-    x, errors = np.ones(len(asked.fit.x)), np.sqrt(np.diag(asked.covariance))
-    denied = drifting = drifts(parts, left(x)) < CHANCE
-    if denied and len(x):
+    x = np.ones(count)
+    denied = drifting = drifts(parts, left(x, 1)) < CHANCE
+    for finer, tries in ((1, TRIES), (FINER, FEW)):
+        if not drifting or not count:
+            break
         found = least_squares(
-            lambda strengths: np.concatenate(left(strengths)),
+            lambda strengths, finer=finer: np.concatenate(left(strengths, finer)),
             x,
             bounds=(base.unknowns.low, base.unknowns.high),
             diff_step=FINE,
-            max_nfev=TRIES,
+            max_nfev=tries,
             ftol=SETTLED,
         )
-        x, drifting = found.x, drifts(parts, left(found.x)) < CHANCE
+        x, drifting = found.x, drifts(parts, left(found.x, finer)) < CHANCE
         spread = np.linalg.pinv(found.jac.T @ found.jac) * max(np.mean(found.fun**2), 1.0)
-        errors = np.sqrt(np.diag(spread))
+        errors = np.hypot(np.sqrt(np.diag(spread)), APART)
     return FreeRuns(denied, drifting, len(parts) == len(measured.runs), x, errors)
 
 

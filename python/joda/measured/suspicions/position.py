@@ -55,8 +55,8 @@ def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[Suspicion], A
     if _fits(run, -position, context):
         told = (
             f"{visited} lie in minus {at}; turn their sign, or if only their zero is elsewhere, "
-            f"add {lo - position.min():.4g} {unit} or more, or if the joint does go so far, correct "
-            "the model's range"
+            f"add {lo - position.min():.4g} {unit} or more, or if the joint does go so far, "
+            "correct the model's range"
         )
         return [*found, suspect(run, "sign", told)], -position
     if np.ptp(position) <= hi - lo + _room(run, position, context):
