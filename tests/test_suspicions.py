@@ -342,8 +342,8 @@ def few(one, run, rng):
 def wrapped(one, run, rng):
     """The zero is in the middle of the motion, and angles count from 0 to a turn."""
     turn = rng.choice([2 * np.pi, 360.0])
-    position = run.position * turn / (2 * np.pi)
-    return replace(run, position=(position - np.median(position)) % turn, velocity=None)
+    position = (run.position - (run.position.min() + run.position.max()) / 2) * turn / (2 * np.pi)
+    return replace(run, position=position % turn, velocity=None)
 
 
 MISTAKES = {
