@@ -67,9 +67,9 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
     found = evidence(ranking)
     weighed = decide(found, strictness)
     first = ranking, weighed
+    free = None if weighed.likely else free_runs(measured, ranking.asked)
     if weighed.verdict == "missing_effect":
-        return Looked(ranking, weighed, first, (found,))
-    free = free_runs(measured, ranking.asked)
+        return Looked(ranking, weighed, first, (found,), free)
     again = _again(measured, first, bool(free and free.drifting), ranked)
     if again is None:
         return Looked(ranking, weighed, first, (found,), free)

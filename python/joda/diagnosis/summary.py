@@ -2,14 +2,12 @@
 
 from joda.diagnosis import phrases
 from joda.diagnosis.findings import Finding
-from joda.diagnosis.weighing import MUCH, Weighed
+from joda.diagnosis.weighing import EVEN, MUCH, Weighed
 from joda.measured.gauge import compared
 from joda.measured.reading import Measured
 
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
-EVEN = 0.5
-"""Probability above which an answer is more likely than not."""
 FAR, PART = 10.0, 0.1
 """Noises by which windows held out may be missed with what is said to be missing; or part of what
 they are missed by without it."""

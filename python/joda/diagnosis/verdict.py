@@ -154,7 +154,7 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     puzzling = first_ranking if puzzled else None
     if weighed.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
-    suffice = weighed.verdict != "missing_effect" and looks.free and looks.free.suffice
+    suffice = not weighed.likely and looks.free and looks.free.suffice
     if weighed.verdict == "adequate" or suffice:
         return Diagnosed(_calm(measured, ranking, looks.free))
     held = Holdout(ranking.asked, measured)
@@ -192,13 +192,13 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     sure = verdict == "missing_effect" and not doubt  # else they stand in for what is not known
     numbers = strengths(ranking.asked, guess) if sure else ()
     summary += f" But {doubt}." if doubt else off_beside(numbers)
-    likely = tuple(one for one in findings if one.probability >= WORTH_NAMING)
+    worth = tuple(one for one in findings if one.probability >= WORTH_NAMING)
     said = replace(
-        _said(measured, verdict, summary, likely, experiment),
+        _said(measured, verdict, summary, worth, experiment),
         corrections=corrections(numbers, measured.profile.joint, FAR_OFF),
         doubt=doubt,
     )
-    return Diagnosed(said, profile if likely else None, findings, puzzling)
+    return Diagnosed(said, profile if worth else None, findings, puzzling)
 
 
 def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosis:

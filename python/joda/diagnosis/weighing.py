@@ -61,6 +61,8 @@ class Settings:
 
 
 SETTINGS = Settings()
+EVEN = 0.5
+"""Probability above which an answer is more likely than not."""
 LITTLE, LEFT, MUCH = SETTINGS.little, SETTINGS.left, SETTINGS.much
 
 
@@ -115,6 +117,11 @@ class Weighed:
     def named(self) -> tuple[tuple[str, float], ...]:
         """Effects and their probabilities."""
         return tuple(zip(self.effects, self.probabilities, strict=True))
+
+    @property
+    def likely(self) -> bool:
+        """Whether an effect is missing, and the first is more likely than not."""
+        return self.verdict == "missing_effect" and max(self.probabilities, default=0.0) > EVEN
 
     @property
     def share(self) -> float:

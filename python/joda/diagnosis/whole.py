@@ -22,6 +22,8 @@ TRAVELLED = 0.3
 """Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
 FINE, TRIES, SETTLED = 0.05, 10, 1e-3
 """Strengths fitted to whole free runs: change that tells slopes, most steps, least gain of one."""
+MOST = 0.9
+"""Part of all samples that free runs must hold, before an end, to tell of all."""
 APART = 5e-3
 """Part of a strength by which another simulator's may differ."""
 FINER, FEW = 4, 4
@@ -95,20 +97,20 @@ class FreeRuns:
     Attributes:
         denied: by them, as it is.
         drifting: by them, whatever its strengths.
-        every: whether all runs are free.
+        covered: part of all runs' samples that they hold, before they come to an end.
         factors, errors: strengths by the whole runs, and their standard errors; shape (k,).
     """
 
     denied: bool
     drifting: bool
-    every: bool
+    covered: float
     factors: Array
     errors: Array
 
     @property
     def suffice(self) -> bool:
-        """Whether other strengths are all that the runs ask for."""
-        return self.every and self.denied and not self.drifting
+        """Whether nothing but other strengths, if that, is what the runs ask for."""
+        return self.covered > MOST and not self.drifting
 
 
 def free_runs(measured: Measured, asked: Asked) -> FreeRuns | None:
@@ -145,14 +147,16 @@ def free_runs(measured: Measured, asked: Asked) -> FreeRuns | None:
             lambda strengths, finer=finer: np.concatenate(left(strengths, finer)),
             x,
             bounds=(base.unknowns.low, base.unknowns.high),
-            diff_step=FINE,
+            diff_step=FINE / finer**2,
             max_nfev=tries,
             ftol=SETTLED,
         )
         x, drifting = found.x, drifts(parts, left(found.x, finer)) < CHANCE
         spread = np.linalg.pinv(found.jac.T @ found.jac) * max(np.mean(found.fun**2), 1.0)
         errors = np.hypot(np.sqrt(np.diag(spread)), APART)
-    return FreeRuns(denied, drifting, len(parts) == len(measured.runs), x, errors)
+    samples = sum(len(run.time) for run in measured.runs)
+    covered = sum(len(run.time) for run, _ in parts) / samples
+    return FreeRuns(denied, drifting, covered, x, errors)
 
 
 def _replayer(measured: Measured, asked: Asked, strengths: Array) -> Replayer:
