@@ -79,6 +79,10 @@ def test_the_long_run_variance_of_a_moving_mean(rng):
         assert found == pytest.approx(known, rel=0.2)
 
 
+def test_without_a_free_run_nothing_drifts():
+    assert drifts([], []) == 1.0
+
+
 # --- of a joint
 def test_a_true_model_follows_its_free_runs(tmp_path, rng):
     told = []

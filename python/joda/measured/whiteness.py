@@ -47,12 +47,15 @@ def drifts(parts: Sequence[tuple[Run, float]], left: Sequence[Array]) -> float:
     Args:
         parts: of `free_parts`.
         left: what is missed of each, in noises.
+
+    Returns:
+        1 where no run is free.
     """
     pairs = zip(parts, left, strict=True)
     each = [
         drift(own, run.position, resolution(run.position) / sigma) for (run, sigma), own in pairs
     ]
-    return min(1.0, len(each) * min(each, default=1.0))
+    return min(1.0, len(each) * min(each)) if each else 1.0
 
 
 def drift(residual: Array, position: Array, step: float) -> float:
