@@ -9,8 +9,7 @@ from joda.measured.curves import FEW, TOO_LOUD, too_loud
 from joda.measured.gauge import Gauged
 from joda.measured.reading import Measured
 from joda.measured.slow import one_way, ways
-from joda.measured.smoothing import resolution
-from joda.measured.suspicions.timing import repeated
+from joda.measured.suspicions.timing import repeats
 
 WINDOWS, MOVES = 4, 8.0
 """Fewest windows with motion that tell anything; and what is motion, in noises."""
@@ -62,7 +61,7 @@ def too_little(measured: Measured) -> str:
     if not measured.runs:
         told = len(windows.position)
         return f"{told} samples are too few; record {FEW}." if told < FEW else ""
-    if any(repeated(run, run.position, resolution(run.position)) for run in measured.runs):
+    if repeats(measured.runs):
         return "Positions repeat while the joint moves, so that what was taken for noise is motion."
     if (moving := _moving(measured, windows)) < WINDOWS:
         return (

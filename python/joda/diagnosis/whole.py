@@ -127,8 +127,7 @@ def free_runs(measured: Measured, asked: Asked) -> FreeRuns | None:
     if not parts:
         return None
     count, errors = len(asked.fit.x), np.sqrt(np.diag(asked.covariance))
-    begins = [_replayer(measured, asked, np.ones(count)).start(*part) for part in parts]
-    near = [begin.best if begin else np.zeros(2) for begin in begins]
+    near: list[Array | None] = [None] * len(parts)
 
     def left(strengths: Array, finer: int) -> list[Array]:
         stepped = replace(measured, timestep=measured.timestep / finer)

@@ -17,8 +17,7 @@ from joda.measured.errors import MULTIPLE, Errors, Missed
 from joda.measured.failing import FORCE, LENGTHS
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
-from joda.measured.smoothing import resolution
-from joda.measured.suspicions.timing import repeated
+from joda.measured.suspicions.timing import repeats
 from joda.measured.whiteness import drifts, free_parts
 
 Array = NDArray[np.float64]
@@ -85,7 +84,7 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     samples = sum(len(run.time) for run in measured.runs)
     pairs = zip(measured.runs, measured.sigma, strict=True)
     loudness = max((_loudness(run, sigma) for run, sigma in pairs), default=0.0)
-    repeats = any(repeated(run, run.position, resolution(run.position)) for run in measured.runs)
+    repeating = repeats(measured.runs)
     complete = len(whole) == len(measured.runs) and bool(pieces)
     verdict: Adequate = "within_noise"
     if measured.barred:
@@ -98,13 +97,13 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
         not (complete and measured.whole)
         or max(one.multiple for one in found.missed) >= MULTIPLE
         or loudness >= LOUD
-        or repeats
+        or repeating
         or pattern is None
         or _moving(measured) < WINDOWS
     ):
         verdict = "not_enough_data"
     return Adequacy(
-        verdict, run, segment, pattern, measured.whole, loudness, repeats, measured.barred
+        verdict, run, segment, pattern, measured.whole, loudness, repeating, measured.barred
     )
 
 

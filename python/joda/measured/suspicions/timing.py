@@ -1,5 +1,7 @@
 """When the joint was measured: uneven times, gaps, repeated positions, too few of them."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,6 +72,11 @@ def repeated(run: Run, position: Array, step: float) -> str:
         f"while the joint moves, {100 * share:.0f} % of the positions repeat the one "
         "before, as of a logger faster than its sensor; record each measured value once"
     )
+
+
+def repeats(runs: Sequence[Run]) -> bool:
+    """Whether positions of a moving joint repeat in any run: what seems to be noise is motion."""
+    return any(repeated(run, run.position, smoothing.resolution(run.position)) for run in runs)
 
 
 def _pace(first: NDArray[np.intp], value: Array) -> Array:
