@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,10 +44,14 @@ py::array_t<double> Coefficients(const joda::PiecewiseCubic& channel) {
 joda::Solo MakeSolo(double lo, double hi, const Texts& texts, double inertia, double row_inertia,
                     const std::array<double, 2>& weight, bool hinge,
                     const std::array<double, 2>& solref, const std::array<double, 5>& solimp,
-                    const std::array<double, 2>& friction_row) {
+                    const std::array<double, 2>& friction_row,
+                    const std::array<double, 6>& servo) {
   const joda::Body body = {{lo, hi}, inertia, row_inertia, weight,
                            hinge,    solref,  solimp,      friction_row};
-  return joda::Solo(body, Pointers(texts).data());
+  const auto [gain, stiffness, damping, low, high, delay] = servo;
+  if (!(low < high)) throw py::value_error("a servo's limits must be two increasing numbers");
+  if (!(delay >= 0)) throw py::value_error("a servo's delay must not be negative");
+  return joda::Solo(body, {gain, stiffness, damping, {low, high}, delay}, Pointers(texts).data());
 }
 
 std::vector<joda::Solo::Start> ReadStarts(const Dense<std::int64_t>& at, const Dense<double>& start,
@@ -71,17 +77,23 @@ std::vector<joda::Solo::Start> ReadStarts(const Dense<std::int64_t>& at, const D
 std::pair<Dense<double>, Dense<double>> Replay(const joda::Solo& solo, const Dense<double>& force,
                                                const Dense<std::int64_t>& at,
                                                const Dense<double>& start, const Dense<bool>& fresh,
-                                               double h) {
+                                               double h,
+                                               const std::optional<Dense<double>>& command) {
   if (force.ndim() != 1) throw py::value_error("force must have the shape (n,)");
+  if (command && (command->ndim() != 1 || command->size() != force.size())) {
+    throw py::value_error("command must have the shape of force");
+  }
   if (!(h > 0)) throw py::value_error("h must be positive");
   const auto starts = ReadStarts(at, start, fresh, force.size());
   Dense<double> before(force.size()), after(force.size());
   const double* applied = force.data();
+  const std::vector<double> none(command ? 0 : force.size());
+  const double* wanted = command ? command->data() : none.data();
   double* first = before.mutable_data();
   double* second = after.mutable_data();
   {
     py::gil_scoped_release release;
-    solo.Replay(h, applied, force.size(), starts, first, second);
+    solo.Replay(h, applied, wanted, force.size(), starts, first, second);
   }
   return {before, after};
 }
@@ -145,14 +157,17 @@ Args:
   solref, solimp: of the range's ends.
   friction_row: of MuJoCo's own friction row: damping, 1/s, and stiffness over inertia; zeros: the
     plugin's row.
+  servo: of an actuator that exerts gain (command - stiffness q) - damping v: gain, stiffness,
+    damping, the least and the largest force, and the delay of commands, s.
 
 Raises:
   ValueError: a text cannot be read, or a number is impossible; one sentence says why.)")
       .def(py::init(&MakeSolo), py::arg("lo"), py::arg("hi"), py::arg("texts"), py::arg("inertia"),
            py::arg("row_inertia"), py::arg("weight"), py::arg("hinge"), py::arg("solref"),
-           py::arg("solimp"), py::arg("friction_row") = std::array<double, 2>{0, 0})
+           py::arg("solimp"), py::arg("friction_row") = std::array<double, 2>{0, 0},
+           py::arg("servo") = std::array<double, 6>{1, 0, 0, -HUGE_VAL, HUGE_VAL, 0})
       .def("replay", &Replay, py::arg("force"), py::arg("at"), py::arg("start"), py::arg("fresh"),
-           py::arg("h"), R"(Steps through forces, set to a start here and there.
+           py::arg("h"), py::arg("command") = py::none(), R"(Steps through forces, set to a start here and there.
 
 Args:
   force: applied at each step, shape (n,).
@@ -161,6 +176,7 @@ Args:
   fresh: whether the joint forgets its friction's force there and centres its handle or load;
     otherwise both stay, what is loose in its motion beside the part. Shape (m,).
   h: timestep, s.
+  command: of the servo at each step, N m: its force at q = 0 and v = 0; shape (n,). None: zeros.
 
 Returns:
   positions before and after each step, each of shape (n,); NaN from where a number is not finite

@@ -40,8 +40,10 @@ bool IsFinite(const Solo::State& state) {
 
 }  // namespace
 
-Solo::Solo(const Body& body, const char* const texts[kTexts])
-    : body_(body), profile_(ParseProfile("", body.range[0], body.range[1], texts)) {
+Solo::Solo(const Body& body, const Servo& servo, const char* const texts[kTexts])
+    : body_(body),
+      servo_(servo),
+      profile_(ParseProfile("", body.range[0], body.range[1], texts)) {
   if (!(body_.range[0] < body_.range[1])) {
     throw std::invalid_argument("the range must be two increasing numbers");
   }
@@ -53,36 +55,37 @@ Solo::Solo(const Body& body, const char* const texts[kTexts])
   }
 }
 
-void Solo::Advance(double h, double force, State* state) const {
+void Solo::Advance(double h, double force, double command, State* state) const {
   const Profile& p = profile_;
   const Effects* effects = p.effects.get();
   const double q = state->q, v = state->v, s = (q - p.lo) * p.per_range;
   const double inertia = body_.row_inertia, weight = Weight(q);
+  const double servo = Actuate(command, q, v), load = weight + force - state->servo;
 
   const double damping = p.damping(s).value, dry = p.friction(s).value;
   const auto resist = [&](double velocity) {
     if (!effects) return Resistance{damping, {dry, dry}};
     return Resistance{damping + ExtraDamping(*effects, s, velocity),
-                      BoundFriction(*effects, dry, s, velocity, weight + force)};
+                      BoundFriction(*effects, dry, s, velocity, load)};
   };
   const Resistance own = resist(v);
   double spring = p.conservative(s).value, pushed = force;
   if (effects) spring += OffsetForce(effects->gravity, q);
   const double stiffness = h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
 
-  Passage load;
+  Passage behind;
   const bool has_load = effects && effects->backlash.load > 0;
   if (effects && effects->backlash.handle > 0) {
     pushed = MoveHandle(effects->backlash, h, force, v, &state->loose);
   } else if (has_load) {
-    load = Meet(effects->backlash, h, body_.inertia, spring + weight + force, v, own, stiffness,
+    behind = Meet(effects->backlash, h, body_.inertia, spring + weight + force, v, own, stiffness,
                 resist(v + state->loose.velocity), state->loose);
   }
-  const FrictionBounds bounds = load.On(own).dry;
-  double drag = load.On(own).drag + load.scale * stiffness;
+  const FrictionBounds bounds = behind.On(own).dry;
+  double drag = behind.On(own).drag + behind.scale * stiffness;
 
   const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
-  const FrictionRow row = StiffenFrictionRow(effects, h, held, bound, v, inertia, load.resistance);
+  const FrictionRow row = StiffenFrictionRow(effects, h, held, bound, v, inertia, behind.resistance);
   drag += row.damping;
   Friction friction = {held - row.D * v / h, row.D, bound};
   if (const auto [per_second, stiff] = body_.friction_row; stiff > 0) {
@@ -92,7 +95,7 @@ void Solo::Advance(double h, double force, State* state) const {
 
   const double mass = body_.inertia + h * drag;
   const double drive =
-      load.scale * (spring + weight + pushed) + load.force + bounds.Shift() - drag * v;
+      behind.scale * (spring + weight + pushed) + behind.force + servo + bounds.Shift() - drag * v;
   Motion motion = Solve(mass, drive, friction);
   if (q < body_.range[0] || q > body_.range[1]) {
     const Limit limit = EndAt(h, q, v);
@@ -100,10 +103,14 @@ void Solo::Advance(double h, double force, State* state) const {
       motion = Solve(mass + limit.D, drive + limit.D * limit.sign * limit.reference, friction);
     }
   }
-  state->v = v + h * motion.acceleration;
+  // the engine's implicit integration of an actuator's damping, after all rows
+  const bool free = servo_.limits[0] < servo && servo < servo_.limits[1];
+  const double slowed = free ? body_.inertia / (body_.inertia + h * servo_.damping) : 1;
+  state->v = v + h * slowed * motion.acceleration;
   state->q = q + h * state->v;
   state->held = motion.held;
-  if (has_load) state->loose = Settle(effects->backlash, h, load, state->v);
+  state->servo = servo;
+  if (has_load) state->loose = Settle(effects->backlash, h, behind, state->v);
 }
 
 void Solo::Restart(const Start& start, bool fresh, State* state) const {
@@ -116,11 +123,11 @@ void Solo::Restart(const Start& start, bool fresh, State* state) const {
 }
 
 // Runs do not depend on one another: side by side, a step of one hides the latency of another's.
-void Solo::Replay(double h, const double* force, std::int64_t n, const std::vector<Start>& starts,
-                  double* before, double* after) const {
+void Solo::Replay(double h, const double* force, const double* command, std::int64_t n,
+                  const std::vector<Start>& starts, double* before, double* after) const {
   struct Run {
     size_t start, last;  // the current one, and the first of the next run
-    std::int64_t k = 0, end = 0;
+    std::int64_t k = 0, end = 0, first = 0;  // the latter is that of its fresh start
     bool lost = true;
     State state = {};
   };
@@ -131,9 +138,19 @@ void Solo::Replay(double h, const double* force, std::int64_t n, const std::vect
     next = run.last;
     return run;
   };
+  const double late = servo_.delay / h;
+  // Commands are means over a step; what is late by a part of one is part of two of them.
+  const auto commanded = [&](const Run& run, std::int64_t k) {
+    const double at = std::max(k - late, static_cast<double>(run.first));
+    const auto i = static_cast<std::int64_t>(std::floor(at));
+    const double part = at - i;
+    return part > 0 ? (1 - part) * command[i] + part * command[i + 1] : command[i];
+  };
   const auto restart = [&](Run* run) {
     const Start& start = starts[run->start++];
+    if (start.fresh) run->first = start.step;
     Restart(start, start.fresh || run->lost, &run->state);
+    run->state.servo = Actuate(commanded(*run, start.step), start.q, start.v);
     run->lost = false;
     run->k = start.step;
     run->end = run->start < starts.size() ? starts[run->start].step : n;
@@ -166,7 +183,7 @@ void Solo::Replay(double h, const double* force, std::int64_t n, const std::vect
         restart(&run);
       }
       before[run.k] = run.state.q;
-      Advance(h, force[run.k], &run.state);
+      Advance(h, force[run.k], commanded(run, run.k), &run.state);
       after[run.k++] = run.state.q;
       if (!IsFinite(run.state)) lose(&run);
     }
@@ -177,6 +194,11 @@ double Solo::Weight(double q) const {
   const auto [first, second] = body_.weight;
   if (!body_.hinge || (first == 0 && second == 0)) return first;
   return first * std::cos(q) + second * std::sin(q);
+}
+
+double Solo::Actuate(double command, double q, double v) const {
+  const double wanted = servo_.gain * (command - servo_.stiffness * q) - servo_.damping * v;
+  return std::clamp(wanted, servo_.limits[0], servo_.limits[1]);
 }
 
 // MuJoCo's solver parameters, as in "Solver parameters" of its documentation.

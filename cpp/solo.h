@@ -8,6 +8,7 @@
 #define JODA_SOLO_H_
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -29,12 +30,21 @@ struct Body {
   std::array<double, 2> friction_row = {0, 0};
 };
 
+// An actuator on the joint: gain (command - stiffness q) - damping v, within limits.
+struct Servo {
+  double gain = 1;
+  double stiffness = 0, damping = 0;
+  std::array<double, 2> limits = {-HUGE_VAL, HUGE_VAL};
+  double delay = 0;  // of commands (s)
+};
+
 class Solo {
  public:
   // What a step begins with.
   struct State {
     double q = 0, v = 0;
-    double held = 0;  // friction force of the step before
+    double held = 0;   // friction force of the step before
+    double servo = 0;  // the actuator's
     Loose loose;
   };
 
@@ -46,17 +56,18 @@ class Solo {
   };
 
   // Throws std::invalid_argument, one sentence; the texts are as in ParseProfile.
-  Solo(const Body& body, const char* const texts[kTexts]);
+  Solo(const Body& body, const Servo& servo, const char* const texts[kTexts]);
 
-  // One step of h under the applied force.
-  void Advance(double h, double force, State* state) const;
+  // One step of h under the applied force and the actuator's command.
+  void Advance(double h, double force, double command, State* state) const;
 
-  // Steps through n forces; before[k] and after[k] are the positions at both ends of step k. At
+  // Steps through n forces and as many commands, which come later by the delay; what was before a
+  // fresh start is its first command. before[k] and after[k] are the positions at both ends of step k. At
   // each start position and velocity are set; unless fresh, friction's memory stays and the handle
   // or the load as it is beside the part. What follows a number that is not finite is NaN until the
   // next start, which then is fresh. Starts are in increasing order, the first one at step 0.
-  void Replay(double h, const double* force, std::int64_t n, const std::vector<Start>& starts,
-              double* before, double* after) const;
+  void Replay(double h, const double* force, const double* command, std::int64_t n,
+              const std::vector<Start>& starts, double* before, double* after) const;
 
  private:
   // The row of the end that is overstepped: direction, D (0: none) and reference acceleration.
@@ -66,10 +77,12 @@ class Solo {
 
   void Restart(const Start& start, bool fresh, State* state) const;
   double Weight(double q) const;
+  double Actuate(double command, double q, double v) const;
   Limit EndAt(double h, double q, double v) const;
   double Impedance(double depth) const;
 
   Body body_;
+  Servo servo_;
   Profile profile_;
 };
 

@@ -1,6 +1,7 @@
 """Types of the C++ core; see cpp/bindings.cc."""
 
 from collections.abc import Sequence
+from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +37,14 @@ class Solo:
         solref: Sequence[float] | NDArray[np.float64],
         solimp: Sequence[float] | NDArray[np.float64],
         friction_row: Sequence[float] = (0.0, 0.0),
+        servo: Sequence[float] = (1.0, 0.0, 0.0, -inf, inf, 0.0),
     ) -> None: ...
     def replay(
-        self, force: ArrayLike, at: ArrayLike, start: ArrayLike, fresh: ArrayLike, h: float
+        self,
+        force: ArrayLike,
+        at: ArrayLike,
+        start: ArrayLike,
+        fresh: ArrayLike,
+        h: float,
+        command: ArrayLike | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...

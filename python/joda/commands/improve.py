@@ -101,7 +101,7 @@ def improve(
     files: dict[Path, bytes | str] = {}
     notes: list[str] = []
     if there:
-        files, notes = scene_files(Path(model), last, target, composed)
+        files, notes = scene_files(Path(model), last, target, composed, steps[-1].servo)
     result = Improved(
         scene=target if there else None,
         composed=composed if there else None,
@@ -156,7 +156,7 @@ def _ending(result: Improved) -> list[str]:
     unchanged = len(result.steps) == 1
     return [
         *_explanations(result),
-        *["No effect was added, and no scene was written."] * unchanged,
+        *["Nothing was added or corrected, and no scene was written."] * unchanged,
         result.why,
         *[f"Next experiment: {told}"] * bool(told),
         *result.departures,
@@ -185,26 +185,31 @@ def _errors(result: Improved) -> dict[str, list[float]]:
 
 
 def _step(step: Step) -> str:
-    return f"+ {step.effect}" if step.effect else "as it was"
+    return f"+ {step.effect}" if step.effect else "corrected" if step.corrections else "as it was"
 
 
 def _explanations(result: Improved) -> list[str]:
-    """Why each effect was added."""
-    return [step.added.explanation for step in result.steps if step.added]
+    """Why each effect was added, and each number corrected."""
+    out = []
+    for step in result.steps:
+        out += [step.added.explanation] if step.added else []
+        out += [one.explanation for one in step.corrections]
+    return out
 
 
 def _page(result: Improved, drawn: bytes) -> str:
     head, *rows = _rows(result)
-    count = len(rows) - 1
+    count = sum(step.effect is not None for step in result.steps)
     first, last = result.steps[0].error.window, result.steps[-1].error.window
     added = ", ".join(named(step.effect) for step in result.steps if step.effect)
     what = nearby(result.steps[0].error, result.blocks)
     noise = f"the measurement's noise is {result.noise_floor:.2g} {result.unit}."
+    done = ["The model's own numbers corrected"] if len(rows) - 1 > count else []
+    done += [f"{count} effect{'s' * (count > 1)} added: {added}"] if count else []
     story = (
-        f"{count} effect{'s' * (count > 1)} added: {added}. On what was held out of all fits "
-        f"({result.held_out}) the error, {what}, is {last:.3g} instead of {first:.3g} "
-        f"{result.unit}; {noise}"
-        if count
+        f"{'. '.join(done)}. On what was held out of all fits ({result.held_out}) the error, "
+        f"{what}, is {last:.3g} instead of {first:.3g} {result.unit}; {noise}"
+        if done
         else f"The error, {what}, is {first:.3g} {result.unit}; {noise}"
     )
     return page(

@@ -137,9 +137,8 @@ def refine(
         raise JodaError("no runs; give at least one CSV file with time and position.")
     compiled = load_model(source)
     number = find_joint(compiled, joint)
-    (measured, unused), (held_out, more) = (
-        read_logs(compiled, number, paths, passive) for paths in (runs, check)
-    )
+    fitted, kept = (read_logs(compiled, number, paths, passive) for paths in (runs, check))
+    measured, held_out, servo = fitted.read, kept.read, fitted.servo or kept.servo
     if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
         raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
     name = joint_name(compiled, number)
@@ -150,7 +149,8 @@ def refine(
             "one with joda attach."
         )
     before, found = profiles[name], context(source, name)
-    notes = [*checked([*measured, *held_out], found, float(compiled.opt.timestep)), *unused, *more]
+    notes = checked([*measured, *held_out], found, float(compiled.opt.timestep))
+    notes += [*fitted.notes, *kept.notes]
     whole = whole_profile(compiled, number, before)
     clear = clear_of_contacts(compiled, number, found, whole, measured)
     other = clear_of_contacts(compiled, number, found, whole, held_out) if held_out else None
@@ -167,7 +167,8 @@ def refine(
     parameters = Parameters(begin, fit, keep_shape=keep_shape, gravity=unit)
     if not len(parameters.start):
         raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
-    at_first = taken(compiled, number, found, whole, replace(clear, measured=[*parts, *still]))
+    fitting = replace(clear, measured=[*parts, *still])
+    at_first = taken(compiled, number, found, whole, fitting, servo=servo)
     if why := hardly_moved(at_first):
         raise JodaError(f"{', '.join(one.name for one in clear.measured)}: {why}")
     if times := at_first.doubtful_unit:
@@ -195,7 +196,7 @@ def refine(
         return error(one), error(one.changed(mended, single=body))
 
     errors = beside(at_first)
-    apart = beside(taken(compiled, number, found, whole, other)) if other else None
+    apart = beside(taken(compiled, number, found, whole, other, servo=servo)) if other else None
     if reason := refused(errors, apart, problem.sigma, (whole, mended), Needs(at_first)):
         noted = "".join(f" {note}" for note in clear.notes)
         raise JodaError(f"{target}: not written, as {reason}.{noted}")

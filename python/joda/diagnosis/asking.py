@@ -144,9 +144,9 @@ class Rough:
 
 def _fitted(judge: Judge, base: Base, near: Array | None) -> tuple[Fit, Fit]:
     """A model's strengths fitted, and as they are given."""
-    ones = np.ones(len(base.places))
-    given = replace(judge.started(base.solo(ones)), x=ones)
-    tried = [(ones, judge.windows.start), (ones, given.start)]
+    as_it_is = base.unknowns.mean
+    given = replace(judge.started(base.solo(as_it_is)), x=as_it_is)
+    tried = [(as_it_is, judge.windows.start), (as_it_is, given.start)]
     if near is not None:
         tried.append((near, judge.started(base.solo(near)).start))
     fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in tried]

@@ -67,5 +67,9 @@ def _missing(windows: Windows, base: Base) -> tuple[Array, Array, Array]:
     single, profile = base.single, base.profile
     up, down = friction_bounds(profile, s)
     resisted = np.where(v > 0, up, -down) + merge(profile.channels.damping)(s)[0] * v
+    if single.servo is not None and windows.command is not None:
+        total = np.append(0.0, np.cumsum(windows.command))
+        command = (total[at[pairs + 1]] - total[at[pairs]]) / steps
+        pushed = pushed + single.servo.force(command, q, v)
     known = pushed + single.weight_at(q) + exerted(profile, s, q) - resisted
     return s, single.inertia * acceleration - known, q

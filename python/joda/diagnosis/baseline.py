@@ -14,11 +14,16 @@ from joda.diagnosis.windows import GRID, Windows
 from joda.joints.single import Single
 from joda.measured.reading import Measured
 from joda.profile import CHANNELS, Profile
+from joda.scenes.actuators import Servo
 
 Array = NDArray[np.float64]
 
 BASE_DOUBT = 0.15
 """How far off (one standard deviation, relative) the model's own strengths may be."""
+GAIN_AT_MOST, GAIN_DOUBT = 7.0, 0.7
+"""Largest logarithm of the factor by which an actuator's gain may be off, and its doubt."""
+DELAY_AT_MOST, DELAY_DOUBT = 0.1, 0.02
+"""Longest delay of commands, and its doubt, s."""
 SOFT = (0.02, 1.0)
 """MuJoCo's own `solreflimit`: time constant (s) and damping ratio of the ends of a range."""
 BEYOND, STRAYS = 4.0, 3
@@ -33,14 +38,15 @@ AT_END = 0.02
 
 @dataclass(frozen=True)
 class Base:
-    """The model as it is, with a factor for each of its components' strengths.
+    """The model as it is, with numbers: a factor for each of its components' strengths, and of an
+    actuator the logarithm of its gain's factor and its delay (s).
 
     Attributes:
         profile: of the joint.
         single: the joint.
         h: step, s.
         places: channel and number of each component that has a factor.
-        unknowns: the factors.
+        unknowns: the numbers, the factors first.
     """
 
     profile: Profile
@@ -49,13 +55,26 @@ class Base:
     places: tuple[tuple[str, int], ...]
     unknowns: Unknowns
 
+    @property
+    def count(self) -> int:
+        """Of the numbers."""
+        return len(self.unknowns.mean)
+
+    def own(self, x: Array) -> Single:
+        """The joint but for its profile, with its actuator's numbers."""
+        if (servo := self.single.servo) is None:
+            return self.single
+        gain, delay = x[len(self.places) : self.count]
+        changed = replace(servo, gain=servo.gain * float(np.exp(gain)), delay=float(delay))
+        return replace(self.single, servo=changed)
+
     def written(self, x: Array) -> Profile:
         """The profile with its factors."""
         channels = {}
         for name in CHANNELS:
             channel = getattr(self.profile.channels, name)
             parts = list(channel.components)
-            for (where, number), factor in zip(self.places, x, strict=True):
+            for (where, number), factor in zip(self.places, x, strict=False):
                 if where == name:
                     old = parts[number]
                     y = tuple(float(factor) * value for value in old.y)
@@ -70,8 +89,12 @@ class Base:
         return replace(self, h=GRID * self.h)
 
     def solo(self, x: Array) -> Solo:
-        """The joint with its factors."""
-        return self.single.solo(self.written(x), self.h)
+        """The joint with its numbers."""
+        return self.with_profile(self.written(x), x)
+
+    def with_profile(self, profile: Profile, x: Array) -> Solo:
+        """The joint with its numbers but another profile."""
+        return self.own(x).stepped(self.h).solo(profile, self.h)
 
 
 def base_of(profile: Profile, single: Single, h: float) -> Base:
@@ -86,15 +109,28 @@ def base_of(profile: Profile, single: Single, h: float) -> Base:
     unknowns = Unknowns(
         np.zeros(k), np.full(k, 20.0), np.full(k, 0.01), np.ones(k), np.full(k, BASE_DOUBT)
     )
+    if single.servo is not None:
+        unknowns = unknowns.and_(_of_servo(single.servo))
     return Base(profile, single, h, places, unknowns)
+
+
+def _of_servo(servo: Servo) -> Unknowns:
+    """Gain and delay of an actuator, of which a model's are rarely right."""
+    return Unknowns(
+        low=np.array([-GAIN_AT_MOST, 0.0]),
+        high=np.array([GAIN_AT_MOST, DELAY_AT_MOST]),
+        step=np.array([0.01, 2e-4]),
+        mean=np.array([0.0, servo.delay]),
+        doubt=np.array([GAIN_DOUBT, DELAY_DOUBT]),
+    )
 
 
 def joined(base: Base, hypothesis: Hypothesis) -> tuple[Make, Unknowns]:
     """The model's factors and the hypothesis' numbers as one vector."""
-    n = len(base.places)
+    n = base.count
 
     def make(x: Array) -> Solo:
-        return base.single.solo(hypothesis.write(base.written(x[:n]), x[n:]), base.h)
+        return base.with_profile(hypothesis.write(base.written(x), x[n:]), x)
 
     return make, base.unknowns.and_(hypothesis.unknowns)
 
@@ -109,7 +145,8 @@ def units_of(windows: Windows, measured: Measured) -> Units:
     longest = max((float(np.ptp(run.time)) for run in measured.runs), default=np.inf)
     slowest = SLOWEST * float(np.ptp(profile.joint.range)) / longest
     speed = max(float(np.sqrt(np.mean(velocity**2))), slowest)
-    pushed = float(np.sqrt(np.mean(windows.force**2)))
+    exerted = [float(np.mean(measured.exerted(run) ** 2)) for run in measured.runs]
+    pushed = float(np.sqrt(np.mean(windows.force**2) + max(exerted, default=0.0)))
     force = max(pushed, inertia * float(np.sqrt(np.mean(acceleration**2))) if len(pace) else 0.0)
     friction = max((max(c.y) for c in profile.channels.friction.components), default=0.0)
     return Units(
@@ -119,7 +156,7 @@ def units_of(windows: Windows, measured: Measured) -> Units:
         span=float(np.ptp(profile.joint.range)),
         visited=_visited(windows, measured),
         friction=friction,
-        forced=not measured.runs or any(run.forced for run in measured.runs),
+        forced=not measured.runs or any(run.pushed for run in measured.runs),
         weight=max(map(abs, measured.context.gravity_force)),
         hinge=measured.single.hinge,
     )

@@ -11,7 +11,8 @@ from joda.component import Component
 from joda.diagnosis.asking import Asked
 from joda.diagnosis.baseline import Base, joined
 from joda.diagnosis.guessing import Guess
-from joda.profile import Joint
+from joda.profile import Joint, Profile
+from joda.scenes.actuators import Servo
 from joda.scenes.native import DAMPING, FRICTION, SPRING
 
 Array = NDArray[np.float64]
@@ -22,10 +23,15 @@ CLEARLY = 3.0
 """And by so many of its standard errors."""
 ANYTHING = 10.0
 """How far off a number may be of which the data tell nothing, in its own unit."""
+GAIN, DELAY = "gain of the actuator", "delay of commands"
+"""What the numbers of an actuator are called."""
 ALIKE = 0.12
 """By how much factors may differ that are one."""
 
-Parameter = Literal["damping", "frictionloss", "stiffness"]
+SLOW = 0.02
+"""A delay of commands (s) of which a part counts as the same part of another number does."""
+
+Parameter = Literal["damping", "frictionloss", "stiffness", "actuator_gain", "time_delay"]
 NATIVE: dict[str, Parameter] = {
     DAMPING: "damping",
     FRICTION: "frictionloss",
@@ -39,9 +45,9 @@ class Correction:
     """A number of the model that the measurements contradict.
 
     Attributes:
-        parameter: the joint's attribute in MJCF.
+        parameter: the joint's attribute in MJCF, or what of its actuator it is.
         joint: its name.
-        factor: the right value over the model's.
+        factor: the right value over the model's; None where that is zero.
         value: the right one.
         error: its standard error.
         unit: of both.
@@ -50,7 +56,7 @@ class Correction:
 
     parameter: Parameter
     joint: str
-    factor: float
+    factor: float | None
     value: float
     error: float
     unit: str
@@ -58,41 +64,150 @@ class Correction:
 
 
 @dataclass(frozen=True)
-class Strength:
-    """What a component's strength is found to be, in units of the model's.
+class Number:
+    """What a number of the model is found to be.
 
     Attributes:
-        label: of the component, or its channel.
-        component: as the model has it.
-        factor: the right strength over the model's.
+        label: of a component or its channel, or what of the actuator it is.
+        parameter: what it is in the model; None where that is a component of a profile.
+        given: the model's; 1 where only a factor tells it.
+        value: the right one.
         error: its standard error.
+        unit: of all three.
+        scale: of which a part is much or little.
     """
 
     label: str
-    component: Component
-    factor: float
+    parameter: Parameter | None
+    given: float
+    value: float
     error: float
+    unit: str
+    scale: float
 
     def off(self, least: float) -> bool:
         """Whether it is off, by some part at the least and by several of its errors."""
-        return abs(self.factor - 1) > max(least, CLEARLY * self.error)
+        return abs(self.value - self.given) > max(least * self.scale, CLEARLY * self.error)
+
+    @property
+    def factor(self) -> float:
+        """The right one over the model's; NaN of a delay."""
+        return float("nan") if self.parameter == "time_delay" else self.value / self.given
 
     @property
     def told(self) -> str:
-        """Its factor."""
-        return f"{self.label} \N{MULTIPLICATION SIGN} {self.factor:.3g} ± {self.error:.2g}"
+        """How it is off."""
+        if self.parameter == "time_delay":
+            late, error, given = (1e3 * x for x in (self.value, self.error, self.given))
+            return f"{self.label} {late:.3g} ± {error:.2g} ms instead of {given:.3g} ms"
+        error = self.error / abs(self.given)
+        return f"{self.label} \N{MULTIPLICATION SIGN} {self.factor:.3g} ± {error:.2g}"
+
+    def correction(self, joint: Joint) -> Correction:
+        """The number as a correction of the model."""
+        assert self.parameter is not None
+        name = self.parameter if self.parameter in NATIVE.values() else self.label
+        return Correction(
+            parameter=self.parameter,
+            joint=joint.name,
+            factor=None if np.isnan(self.factor) else self.factor,
+            value=self.value,
+            error=self.error,
+            unit=self.unit,
+            explanation=(
+                f"The model's {name} is {self.given:.3g} {self.unit}, the runs show "
+                f"{self.value:.3g} ± {self.error:.1g} {self.unit}."
+            ),
+        )
 
 
-def strengths(asked: Asked, guess: Guess | None = None) -> tuple[Strength, ...]:
-    """Of the model's components, as fitted alone or together with an effect."""
-    base, fit = asked.base, guess.fit if guess else asked.fit
-    n = len(base.places)
-    errors = _errors(asked, guess)[:n]
+def numbers(
+    asked: Asked, guess: Guess | None = None, found: tuple[Array, Array] | None = None
+) -> tuple[Number, ...]:
+    """Of the model: strengths of its components, gain and delay of its actuator.
+
+    Args:
+        asked: the model fitted alone.
+        guess: an effect fitted with them.
+        found: other values and standard errors than those of the fit, shape (k,) each.
+    """
+    base = asked.base
+    x, errors = found or ((guess.fit if guess else asked.fit).x, _errors(asked, guess))
+    joint = base.profile.joint
     parts = (getattr(base.profile.channels, name).components[k] for name, k in base.places)
-    return tuple(
-        Strength(part.label or place[0], part, float(factor), float(error))
-        for place, part, factor, error in zip(base.places, parts, fit.x[:n], errors, strict=True)
-    )
+    servo = base.single.servo
+    out = [
+        _strength(part.label or place[0], part, joint, float(factor), float(error), servo)
+        for place, part, factor, error in zip(base.places, parts, x, errors, strict=False)
+    ]
+    if servo is not None:
+        (gain, late), (doubt, uneven) = (own[len(out) : base.count] for own in (x, errors))
+        factor, stiff = float(np.exp(gain)), servo.stiffness
+        given, unit = (stiff, f"{joint.force_unit}/{joint.unit}") if stiff > 0 else (1.0, "")
+        error = factor * float(doubt)
+        out += [
+            Number(GAIN, "actuator_gain", given, factor * given, error * given, unit, scale=given),
+            Number(DELAY, "time_delay", servo.delay, float(late), float(uneven), "s", scale=SLOW),
+        ]
+    return tuple(out)
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A joint with numbers of its own as the runs show them.
+
+    Attributes:
+        profile: of it.
+        servo: of its actuators; None where none acted.
+    """
+
+    profile: Profile
+    servo: Servo | None
+
+
+def corrected(
+    asked: Asked, found: Sequence[Number], least: float, x: Array, driven_only: bool = False
+) -> Corrected | None:
+    """The model with those numbers set right that are off.
+
+    Args:
+        asked: the model fitted.
+        found: `numbers` of it.
+        least: part by which a number must be off.
+        x: the numbers as fitted, these first, shape (k or more,).
+        driven_only: only those of its actuator.
+
+    Returns:
+        None if none is.
+    """
+    base = asked.base
+    off = np.array([one.off(least) for one in found], bool)
+    if driven_only:
+        off[: len(base.places)] = False
+    if not off.any():
+        return None
+    mixed = np.where(off, x[: base.count], base.unknowns.mean)
+    return Corrected(base.written(mixed), base.own(mixed).servo)
+
+
+def _strength(
+    label: str,
+    component: Component,
+    joint: Joint,
+    factor: float,
+    error: float,
+    servo: Servo | None,
+) -> Number:
+    """Of a component; a servo damps too, and the data do not tell which of both does."""
+    if label not in NATIVE:
+        return Number(label, None, 1.0, factor, error, "", scale=1.0)
+    parameter, given = NATIVE[label], component.y[0]
+    if parameter == "stiffness":
+        given = (given - component.y[-1]) / float(np.ptp(joint.range))
+    per = {"damping": f"·s/{joint.unit}", "stiffness": f"/{joint.unit}", "frictionloss": ""}
+    unit = joint.force_unit + per[parameter]
+    scale = abs(given) + (servo.drag if servo and parameter == "damping" else 0.0)
+    return Number(label, parameter, given, factor * given, error * given, unit, scale)
 
 
 def _errors(asked: Asked, guess: Guess | None) -> Array:
@@ -104,60 +219,41 @@ def _errors(asked: Asked, guess: Guess | None) -> Array:
     return np.asarray(np.sqrt(np.diag(asked.judge.covariance(make, unknowns, fit, doubt))))
 
 
-def corrections(found: Sequence[Strength], joint: Joint, least: float) -> tuple[Correction, ...]:
+def corrections(found: Sequence[Number], joint: Joint, least: float) -> tuple[Correction, ...]:
     """What of the model's own numbers is off.
 
     Args:
-        found: strengths of its components.
+        found: the numbers.
         joint: of the model.
         least: part by which a number must be off.
     """
-    return tuple(
-        _correction(one, NATIVE[one.label], joint)
-        for one in found
-        if one.label in NATIVE and one.off(least)
-    )
+    return tuple(one.correction(joint) for one in found if one.parameter and one.off(least))
 
 
-def _correction(one: Strength, parameter: Parameter, joint: Joint) -> Correction:
-    given = one.component.y[0]
-    if parameter == "stiffness":
-        given = (given - one.component.y[-1]) / float(np.ptp(joint.range))
-    per = {"damping": f"·s/{joint.unit}", "stiffness": f"/{joint.unit}", "frictionloss": ""}
-    unit = joint.force_unit + per[parameter]
-    value, error = one.factor * given, one.error * given
-    return Correction(
-        parameter=parameter,
-        joint=joint.name,
-        factor=one.factor,
-        value=value,
-        error=error,
-        unit=unit,
-        explanation=(
-            f"The model's {parameter} is {given:.3g} {unit}, the runs show {value:.3g} ± "
-            f"{error:.1g} {unit}."
-        ),
-    )
-
-
-def off(found: Sequence[Strength]) -> str:
-    """Which strengths are off and by what, with their errors; empty if none is."""
+def off(found: Sequence[Number]) -> str:
+    """Which numbers are off and by what, with their errors; empty if none is."""
     return ", ".join(one.told for one in found if one.off(OFF))
 
 
-def off_beside(found: Sequence[Strength]) -> str:
-    """Which strengths are far off beside an effect, as a further sentence; empty if none is."""
+def off_beside(found: Sequence[Number]) -> str:
+    """Which numbers are far off beside an effect, as a further sentence; empty if none is."""
     told = ", ".join(one.told for one in found if one.off(FAR_OFF))
-    return f" The model's own numbers are off besides: {told}." if told else ""
+    return f" The model's own numbers that suit the runs best with it: {told}." if told else ""
 
 
-def by_one_factor(found: Sequence[Strength]) -> str:
+def by_one_factor(found: Sequence[Number]) -> str:
     """That all strengths that the data tell are off by one factor, a further sentence: then it may
-    be the force's."""
-    x = np.array([one.factor for one in found if one.error < OFF])
+    be the force's or, of an actuator too, the inertia's."""
+    told = [one for one in found if one.error < OFF * one.scale and np.isfinite(one.factor)]
+    x = np.array([one.factor for one in told])
     mean = float(x.mean()) if len(x) > 1 else 1.0
     if abs(mean - 1) < FAR_OFF or np.abs(x / mean - 1).max() > ALIKE:
         return ""
+    if any(one.parameter == "actuator_gain" for one in told):
+        return (
+            f" All by one factor, about {mean:.2g}: these numbers may be right, and the joint's "
+            f"inertia {1 / mean:.2g} times the model's."
+        )
     return (
         f" All by one factor, about {mean:.2g}: the measured force may be in another unit, or its "
         "lever arm another."

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from joda.diagnosis.windows import GRID, LOOSE, Array, Integers, Windows, rows_of
 from joda.measured import smoothing
 from joda.measured.failing import STOP
-from joda.measured.runs import Run, known
+from joda.measured.runs import Run, held, known
 
 SHORTEST, LONGEST = 0.1, 0.5
 """Of windows, s, unless the joint goes through its range in less than `QUICK` of the shortest."""
@@ -86,12 +86,17 @@ def windows_of(
             start = np.stack([begun.position, velocity], axis=1)
             doubts = np.stack([begun.position_error, doubt], axis=1)
             same = np.full(many, number)
-            parts.append((force, step + begins, fresh, start, doubts, same))
+            edges = time[0] + h * np.arange(steps + 1)
+            given = np.zeros(len(time)) if run.command is None else run.command[piece]
+            command = held(time, given, edges)
+            parts.append((force, command, step + begins, fresh, start, doubts, same))
             window = np.where(enough[window] & _thinned(window), window + count, -1)
             noise = spread, smoothing.force_error(time, run.force[piece], run.forced)
             samples.append((step + index, place - index, position, time, window, hits, *noise))
             step, count = step + steps, count + many
-    force, at, fresh, start, doubts, run_of = (np.concatenate(x) for x in zip(*parts, strict=True))
+    force, command, at, fresh, start, doubts, run_of = (
+        np.concatenate(x) for x in zip(*parts, strict=True)
+    )
     index, share, position, time, window, hits, spread, push = (
         np.concatenate(x) for x in zip(*samples, strict=True)
     )
@@ -113,6 +118,7 @@ def windows_of(
         shared=_shared(rows, time, spread, push / inertia),
         knocks=_knocks(rows, (position - lo) / span, spread / span, hits),
         rests=_rests(rows, (position - lo) / span, spread / span),
+        command=command if any(run.command is not None for run in runs) else None,
     )
 
 

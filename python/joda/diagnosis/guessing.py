@@ -76,7 +76,7 @@ class Guess:
 
     def written(self, base: Base) -> Profile:
         """The model's profile with the effect."""
-        return self.hypothesis.write(base.written(self.fit.x[: len(base.places)]), self.x)
+        return self.hypothesis.write(base.written(self.fit.x), self.x)
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def screened(judge: Judge, base: Base, begin: Begin, hypothesis: Hypothesis) -> 
     H = H + np.diag(base.unknowns.doubt**-2.0)
     gains, out = [], []
     for trial in hypothesis.trials:
-        solo = base.single.solo(hypothesis.write(profile, trial), base.h)
+        solo = base.with_profile(hypothesis.write(profile, trial), fit.x)
         d = (windows.residuals(windows.misfit(solo, fit.start)) - about.r)[:, :, None]
         across = about.products(d, about.J)[0]
         taken = (
@@ -172,8 +172,8 @@ def rough(
         for fit in best(begin, screened(judge, base, begin, hypothesis), hypothesis.kept)
     ]
     windows, first = judge.windows, begun[0]
-    if usual(judge, first.fit) >= LOST and windows.force.any():
-        given = replace(first.fit, x=np.ones(len(base.places)), start=windows.start)
+    if usual(judge, first.fit) >= LOST and windows.pushed:
+        given = replace(first.fit, x=base.unknowns.mean, start=windows.start)
         found += best(replace(first, fit=given), balanced(windows, base, hypothesis), 1)
     return tuple(found)
 
@@ -214,7 +214,7 @@ def moved(judge: Judge, base: Base, found: Guess) -> Guess:
     make, unknowns = joined(base, found.hypothesis)
     best = found.fit
     n = len(best.x)
-    first = len(base.places)
+    first = base.count
     places = [(k, by) for by in MOVES for k in range(n - found.hypothesis.ends, n)]
     shapes = [(k, FAR * unknowns.step[k]) for k in range(first, n - found.hypothesis.ends)]
     for k, by in places + shapes:

@@ -3,15 +3,22 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from threadpoolctl import threadpool_limits
+
 from joda.diagnosis.ahead import pairs
+from joda.diagnosis.baseline import windows_for
+from joda.diagnosis.corrections import Correction
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.given import FAITHFUL, Departures
+from joda.diagnosis.judge import BLAS
 from joda.diagnosis.mending import Error, error, mend
+from joda.diagnosis.reshaping import refitted
 from joda.diagnosis.share import divided
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
 from joda.measured.reading import Measured
 from joda.profile import Profile
+from joda.scenes.actuators import Servo
 
 MOST = 5
 """Effects that are added at most."""
@@ -36,8 +43,10 @@ class Step:
     """A stair of the falling error.
 
     Attributes:
-        added: what was found missing and added; None at the beginning.
+        added: what was found missing and added; None at the beginning, and for corrections.
         profile: with all effects so far.
+        corrections: of the model's own numbers, that were made instead.
+        servo: of the joint's actuators, with all corrections so far; None where none was made.
         error: on runs held out of every fit.
         diagnosis: of the model with this profile; None if it was not made.
         departs: by what the profile is not what was given and diagnosed.
@@ -48,6 +57,8 @@ class Step:
     error: Error
     diagnosis: Diagnosis | None = None
     departs: Departures = FAITHFUL
+    corrections: tuple[Correction, ...] = ()
+    servo: Servo | None = None
 
     @property
     def effect(self) -> str | None:
@@ -76,15 +87,45 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
             if asked.diagnosis.doubt:
                 why = asked.diagnosis.summary
                 break
+            once = not any(step.corrections for step in steps)
+            if once and asked.corrected and (right := _set_right(parts, asked, told)):
+                parts = _driven(parts, right.servo)
+                steps.append(right)
+                continue
             if not (more := _next(parts, steps[-1], asked, told)):
                 known = asked.diagnosis.verdict == "missing_effect"
                 why = NOTHING_HELPS if known else asked.diagnosis.summary
                 break
-            steps += more
+            steps += [replace(step, servo=steps[-1].servo) for step in more]
             steps = _named_anew(parts, steps, told)
     except KeyboardInterrupt:
         why = "Interrupted; what was found until then is kept."
     return tuple(steps), why
+
+
+def _set_right(parts: Parts, asked: Diagnosed, told: Told) -> Step | None:
+    """The model with its own numbers set right, at the scene's own step, if that lowers the error
+    held out, also as whole runs."""
+    right = asked.corrected
+    assert right is not None
+    told("the model's own numbers")
+    before, (train, held) = error(parts[1]), _driven(parts, right.servo)
+    train = train.changed(right.profile)
+    with threadpool_limits(1, BLAS):
+        profile = refitted(train, right.profile, windows_for(train).length)
+    after = error(held.changed(profile))
+    rises = before.whole is not None and (after.whole or 0.0) > before.whole
+    if after.window > WORTH * before.window or rises:
+        return None
+    return Step(None, profile, after, corrections=asked.diagnosis.corrections, servo=right.servo)
+
+
+def _driven(parts: Parts, servo: Servo | None) -> Parts:
+    """The runs with other numbers of the actuator."""
+    if servo is None:
+        return parts
+    train, held = (part.changed(single=replace(part.single, servo=servo)) for part in parts)
+    return train, held
 
 
 def _next(parts: Parts, last: Step, asked: Diagnosed, told: Told) -> list[Step]:
@@ -126,7 +167,10 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
     Each was named while others were missing, or not yet fitted beside it. Beside them as they are
     now it is asked for again.
     """
-    begin, *added = steps
+    first = next((k for k, step in enumerate(steps) if step.added), len(steps))
+    before, begin, added = steps[: first - 1], steps[first - 1], steps[first:]
+    if any(step.corrections for step in added):
+        return steps
     for k, step in enumerate(added if len(added) > 1 else ()):
         told(f"asking again what {step.effect} is")
         others = [one.added for one in added if one is not step]
@@ -140,7 +184,7 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
         for place in sorted({k, len(others)}):  # where it was, and last
             stairs = _stairs(parts, begin, [*others[:place], instead, *others[place:]], told)
             if stairs and stairs[-1].error.window < AS_GOOD * added[-1].error.window:
-                return stairs
+                return [*before, begin, *(replace(one, servo=begin.servo) for one in stairs[1:])]
     return steps
 
 

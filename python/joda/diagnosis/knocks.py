@@ -70,7 +70,7 @@ def best_ratio(
     if len(seen) < KNOCKS:
         return whole.ratio, whole.error
     speeds = mean_of(seen)[0]
-    ratio = whole.ratio if windows.force.any() else (whole.ratio + speeds) / 2
+    ratio = whole.ratio if windows.pushed else (whole.ratio + speeds) / 2
     return ratio, float(np.hypot(whole.error, (whole.ratio - speeds) / 2))
 
 
@@ -279,6 +279,6 @@ def rebound(base: Base, given: Single) -> float:
     steps, speed = round(KNOCK_TIME / base.h), (hi - lo) / KNOCK_TIME
     start = np.array([[hi - 0.2 * (hi - lo), speed]])
     begin = np.zeros(1, np.int64)
-    solo = given.without_weight().solo(profile, base.h)
+    solo = replace(given, weight=(0.0, 0.0), servo=None).solo(profile, base.h)
     before, after = solo.replay(np.zeros(steps), begin, start, np.ones(1, bool), base.h)
     return float((before[-1] - after[-1]) / base.h / speed)

@@ -18,6 +18,7 @@ from joda.measured.visited import unvisited
 from joda.pictures.changes import draw_channels
 from joda.pictures.style import house_style
 from joda.profile import Profile
+from joda.scenes.actuators import Servo
 from joda.scenes.attaching import attached
 
 if TYPE_CHECKING:
@@ -63,14 +64,20 @@ def beside(
 
 
 def scene_files(
-    model: Path, profile: Profile, scene: Path, composed: Path
+    model: Path, profile: Profile, scene: Path, composed: Path, servo: Servo | None = None
 ) -> tuple[dict[Path, bytes | str], list[str]]:
     """What a scene with a whole profile (`joda.scenes.native`) and the profile's file hold.
+
+    Args:
+        model: the scene as it was.
+        profile: of its joint.
+        scene, composed: to be written.
+        servo: of the joint's actuators, with another gain or delay; None: as they are.
 
     Returns:
         contents by path, and what is done there, a sentence each.
     """
-    content, notes = attached(model, profile, scene, joint=profile.joint.name)
+    content, notes = attached(model, profile, scene, joint=profile.joint.name, servo=servo)
     return {scene: content, composed: profile.to_json()}, notes
 
 

@@ -96,11 +96,13 @@ class Needs:
         self.speed = max((_speed(run.time, run.position) for run in measured.runs), default=0.0)
         self.acceleration = _acceleration(measured, self.speed) if measured.runs else 0.0
         applied = max(float(np.nanmax(np.abs(log.force), initial=0.0)) for log in logs)
+        for run in measured.runs:
+            applied = max(applied, float(np.abs(measured.exerted(run)).max()))
         gravity = max(map(abs, measured.context.gravity_force))
         inertia = measured.single.inertia * self.acceleration
         self.force = inertia + applied + gravity + self.exerted(measured.profile)
         self.resistance = self._resisted(measured.profile)
-        self.forced = not measured.runs or any(run.forced for run in measured.runs)
+        self.forced = not measured.runs or any(run.pushed for run in measured.runs)
 
     def exerted(self, profile: Profile, effect: str | None = None) -> float:
         """Largest force of a profile, or of one effect of it, where and as fast as runs went; N·m

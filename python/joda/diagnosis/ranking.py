@@ -169,7 +169,7 @@ def _unstuck(begun: Asked, guesses: Sequence[Guess]) -> Asked:
     if not guesses:
         return begun
     best = min(guesses, key=lambda one: one.fit.loss).fit
-    fit = judge.fit(base.solo, base.unknowns, best.x[: len(base.places)], best.start)
+    fit = judge.fit(base.solo, base.unknowns, best.x[: base.count], best.start)
     fit = judge.refit(base.solo, base.unknowns, fit)
     return replace(begun, fit=min(begun.fit, fit, key=lambda one: one.loss))
 

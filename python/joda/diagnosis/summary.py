@@ -87,9 +87,7 @@ def _unexplained(what: str, weighed: Weighed, one_way: bool, bouncy: bool) -> st
     share = 100 * min(weighed.share, 1.0)
     same = SAME if one_way and " or " in what else ""
     if share <= 1:
-        return (
-            f"Best guess: {what}{same}; it leaves less than 1 % of the misfit, as others may too."
-        )
+        return f"Best guess: {what}{same}; others may explain as much."
     part = f"{share:.0f} %"
     if share < MOST:
         return (

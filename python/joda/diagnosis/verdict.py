@@ -10,12 +10,14 @@ from joda.diagnosis.baseline import joined, usable, windows_for
 from joda.diagnosis.corrections import (
     FAR_OFF,
     OFF,
+    Corrected,
     by_one_factor,
+    corrected,
     corrections,
+    numbers,
     off,
     off_beside,
     one_factor,
-    strengths,
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
 from joda.diagnosis.findings import Diagnosis, Finding
@@ -29,12 +31,13 @@ from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import BOUNCY, SAME, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.weighing import LITTLE, MUCH, Evidence, Verdict, Weighed, weigh
-from joda.diagnosis.whole import BEYOND, FreeRuns, worst
+from joda.diagnosis.whole import BEYOND, CHANCE, FreeRuns, worst
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part
+from joda.measured.whiteness import strays
 from joda.profile import Profile
 
 FALLEN = 0.95
@@ -88,6 +91,12 @@ WITHOUT = (
     " Whole runs are missed by up to {:.0f} times the noise all the same, which is up to {:.1f} "
     "times what noise, start and force explain; joda compare says where."
 )
+SOME = 2.0
+"""How many times what errors explain a whole run is missed by, where windows alone are adequate."""
+ADRIFT = (
+    " But more is left of whole runs than noise of position and force makes: a small fault of the "
+    "model, or what the force did between its samples."
+)
 AT_ENDS = (
     " That holds within the range. From where the joint comes to an end of it, whole runs are "
     "missed by up to {:.0f} times what noise, start and force explain: there the model's stop "
@@ -113,6 +122,7 @@ class Diagnosed:
         candidates: what may be tried, the likeliest first, also what is too unlikely to be named.
         puzzling: the first look's ranking, where no effect explained the runs; else None.
         looks: the evidence of each look.
+        corrected: the joint with its own numbers as the runs show them; None if none is off.
     """
 
     diagnosis: Diagnosis
@@ -120,6 +130,7 @@ class Diagnosed:
     candidates: tuple[Finding, ...] = ()
     puzzling: Ranking | None = None
     looks: tuple[Evidence, ...] = ()
+    corrected: Corrected | None = None
 
 
 def diagnosed(
@@ -156,7 +167,7 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     suffice = not weighed.likely and looks.free and looks.free.suffice
     if weighed.verdict == "adequate" or suffice:
-        return Diagnosed(_calm(measured, ranking, looks.free))
+        return _calm(measured, ranking, looks.free)
     held = Holdout(ranking.asked, measured)
     named = range(min(NAMED, len(ranking.guesses)))
     every = {
@@ -182,50 +193,50 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     helps = first.held_out_error_after < first.held_out_error_before
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
     if first_weighed.verdict == "adequate" and hardly and weighed.excess[0] < MUCH:
-        return Diagnosed(
-            _calm(measured, first_ranking, looks.free)
-        )  # nor do windows held out know of anything
+        # nor do windows held out know of anything
+        return _calm(measured, first_ranking, looks.free)
     verdict = weighed.verdict if helps else "unexplained"
     base, guess = ranking.asked.base, ranking.guesses[sized[0]]
     doubt = one_factor(base, guess) or other_unit(measured)
     summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy, doubt)
     sure = verdict == "missing_effect" and not doubt  # else they stand in for what is not known
-    numbers = strengths(ranking.asked, guess) if sure else ()
-    summary += f" But {doubt}." if doubt else off_beside(numbers)
+    own = numbers(ranking.asked, guess) if sure else ()
+    summary += f" But {doubt}." if doubt else off_beside(own)
     worth = tuple(one for one in findings if one.probability >= WORTH_NAMING)
     said = replace(
         _said(measured, verdict, summary, worth, experiment),
-        corrections=corrections(numbers, measured.profile.joint, FAR_OFF),
+        corrections=corrections(own, measured.profile.joint, FAR_OFF),
         doubt=doubt,
     )
-    return Diagnosed(said, profile if worth else None, findings, puzzling)
+    servo = corrected(ranking.asked, own, FAR_OFF, guess.fit.x, driven_only=True) if sure else None
+    return Diagnosed(said, profile if worth else None, findings, puzzling, corrected=servo)
 
 
-def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosis:
+def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosed:
     """No effect shows in windows: the model is adequate, unless whole runs or curves deny it."""
+
+    def unexplained(summary: str, experiment: str | None) -> Diagnosed:
+        return Diagnosed(_said(measured, "unexplained", summary, (), experiment))
+
     if not measured.runs and _uneven(measured, ranking.asked):
-        return _said(measured, "unexplained", _said_uneven(measured), (), GAUGE_AGAIN)
+        return unexplained(_said_uneven(measured), GAUGE_AGAIN)
     left = worst(measured, ranking.asked)
     if left.free > BEYOND:
-        return _said(measured, "unexplained", DRIFTING.format(left.free), (), AGAIN)
+        return unexplained(DRIFTING.format(left.free), AGAIN)
     if free and free.drifting:
-        return _said(measured, "unexplained", SLOWLY, (), AGAIN)
-    numbers, worst_run = strengths(ranking.asked), worst_missed(measured)
-    if free and free.denied:
-        numbers = tuple(
-            replace(one, factor=float(factor), error=float(error))
-            for one, factor, error in zip(numbers, free.factors, free.errors, strict=False)
-        )
-    told = off(numbers)
+        return unexplained(SLOWLY, AGAIN)
+    told_by = (free.numbers, free.errors) if free and free.denied else None
+    own, worst_run = numbers(ranking.asked, found=told_by), worst_missed(measured)
+    told = off(own)
     if free and free.denied and not told:
-        return _said(measured, "unexplained", TOGETHER, (), AGAIN)
+        return unexplained(TOGETHER, AGAIN)
     if told and moved_one_way(measured):
         experiment = _next(measured, ranking, weigh(ranking), one_way=True)
         summary = EITHER.format(told) + SAME + "."
         summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
-        return _said(measured, "unexplained", summary, (), experiment)
+        return unexplained(summary, experiment)
     if told:
-        told = f" Its own numbers are off: {told}.{by_one_factor(numbers)}"
+        told = f" Its own numbers are off: {told}.{by_one_factor(own)}"
     missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
     if told and worst_run and worst_run.fault:
@@ -233,14 +244,21 @@ def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagno
     elif told and free and free.denied:
         summary = WITH_THESE.format(FREELY, told, noise)
     else:
-        summary = f"The model is adequate: {noise} that an effect would explain.{told}"
-        if missed > MULTIPLE and left.whole <= BEYOND:
-            summary += WITHOUT.format(missed, left.whole)
+        loose = missed > MULTIPLE and left.whole <= BEYOND
+        adrift = not told and strays(measured) < CHANCE
+        where = "In windows the model" if adrift or (loose and left.whole > SOME) else "The model"
+        summary = f"{where} is adequate: {noise} that an effect would explain.{told}"
+        summary += WITHOUT.format(missed, left.whole) if loose else ADRIFT if adrift else ""
     summary += AT_ENDS.format(left.whole) if left.whole > BEYOND else ""
     if doubt := other_unit(measured):
         summary += f" But {doubt}."
     calm = _said(measured, "adequate", summary, (), None)
-    return replace(calm, corrections=corrections(numbers, measured.profile.joint, OFF))
+    calm = replace(calm, corrections=corrections(own, measured.profile.joint, OFF))
+    driven = ranking.asked.base.single.servo is not None
+    if doubt or (by_one_factor(own) and not driven):
+        return Diagnosed(calm)
+    x = free.numbers if free and free.denied else ranking.asked.fit.x
+    return Diagnosed(calm, corrected=corrected(ranking.asked, own, OFF, x))
 
 
 def _said_uneven(measured: Measured) -> str:
@@ -346,7 +364,7 @@ def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool)
         speed=max(float(np.sqrt(np.mean(velocity**2))), least),
         h=ranking.asked.base.h,
         sigma=measured.floor,
-        forced=any(run.forced for run in measured.runs),
+        forced=any(run.pushed for run in measured.runs),
     )
     if one_way:
         return there_and_back(means).sentence

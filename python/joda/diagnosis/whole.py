@@ -24,6 +24,8 @@ FINE, TRIES, SETTLED = 0.05, 10, 1e-3
 """Strengths fitted to whole free runs: change that tells slopes, most steps, least gain of one."""
 MOST = 0.9
 """Part of all samples that free runs must hold, before an end, to tell of all."""
+STEP = 0.01
+"""A change of a factor; that of another number is its own step of differences."""
 APART = 5e-3
 """Part of a strength by which another simulator's may differ."""
 FINER, FEW = 4, 4
@@ -63,9 +65,10 @@ def worst(measured: Measured, asked: Asked) -> Worst:
 
     @cache  # only a run that is missed by much asks for them
     def others() -> list[Replayer]:
-        return [_replayer(measured, asked, strengths) for strengths in _drawn(asked)]
+        return [_replayer(measured, asked, x, finer) for x in _drawn(asked)]
 
-    replayer = _replayer(measured, asked, asked.fit.x)
+    finer = FINER if measured.single.servo else 1
+    replayer = _replayer(measured, asked, asked.fit.x, finer)
 
     def times(part: Run, sigma: float) -> float:
         if not (start := replayer.start(part, sigma)):
@@ -98,13 +101,13 @@ class FreeRuns:
         denied: by them, as it is.
         drifting: by them, whatever its strengths.
         covered: part of all runs' samples that they hold, before they come to an end.
-        factors, errors: strengths by the whole runs, and their standard errors; shape (k,).
+        numbers, errors: of the model by the whole runs, and their standard errors; shape (k,).
     """
 
     denied: bool
     drifting: bool
     covered: float
-    factors: Array
+    numbers: Array
     errors: Array
 
     @property
@@ -130,38 +133,46 @@ def free_runs(measured: Measured, asked: Asked) -> FreeRuns | None:
     near: list[Array | None] = [None] * len(parts)
 
     def left(strengths: Array, finer: int) -> list[Array]:
-        stepped = replace(measured, timestep=measured.timestep / finer)
-        replayer, out = _replayer(stepped, asked, strengths), []
+        replayer, out = _replayer(measured, asked, strengths, finer), []
         for k, (run, sigma) in enumerate(parts):
             found, near[k] = replayer.followed(run, sigma, near[k])
             out.append(found / sigma)
         return out
 
-    x = np.ones(count)
-    denied = drifting = drifts(parts, left(x, 1)) < CHANCE
+    first, unit = base.unknowns.mean, base.unknowns.step / STEP
+    x = first
+    drifting = all(drifts(parts, left(x, finer)) < CHANCE for finer in (1, FINER))
+    denied, near = drifting, [None] * len(parts)
+    begin = np.where(np.arange(count) < len(base.places), first, asked.fit.x)
+    y = 1 + (begin - first) / unit
     for finer, tries in ((1, TRIES), (FINER, FEW)):
         if not drifting or not count:
             break
         found = least_squares(
-            lambda strengths, finer=finer: np.concatenate(left(strengths, finer)),
-            x,
-            bounds=(base.unknowns.low, base.unknowns.high),
+            lambda y, finer=finer: np.concatenate(left(first + unit * (y - 1), finer)),
+            y,
+            bounds=tuple(1 + (b - first) / unit for b in (base.unknowns.low, base.unknowns.high)),
             diff_step=FINE / finer**2,
             max_nfev=tries,
             ftol=SETTLED,
         )
-        x, drifting = found.x, drifts(parts, left(found.x, finer)) < CHANCE
+        y = found.x
+        x = first + unit * (y - 1)
+        drifting = drifts(parts, left(x, finer)) < CHANCE
         spread = np.linalg.pinv(found.jac.T @ found.jac) * max(np.mean(found.fun**2), 1.0)
-        errors = np.hypot(np.sqrt(np.diag(spread)), APART)
+        errors = unit * np.hypot(np.sqrt(np.diag(spread)), APART)
     samples = sum(len(run.time) for run in measured.runs)
     covered = sum(len(run.time) for run, _ in parts) / samples
     return FreeRuns(denied, drifting, covered, x, errors)
 
 
-def _replayer(measured: Measured, asked: Asked, strengths: Array) -> Replayer:
-    """Of the model with other strengths, and the friction row of its fit."""
-    single = replace(measured.single, friction_row=asked.base.single.friction_row)
-    return measured.changed(asked.base.written(strengths), single=single).replayer
+def _replayer(measured: Measured, asked: Asked, x: Array, finer: int) -> Replayer:
+    """Of the model with other numbers, and the friction row of its fit, in so many times finer
+    steps, which then stand for none."""
+    own, h = asked.base.own(x), measured.timestep / finer
+    single = replace(measured.single, friction_row=own.friction_row, servo=own.servo)
+    single = single.stepped(h) if finer > 1 else single
+    return replace(measured, timestep=h).changed(asked.base.written(x), single=single).replayer
 
 
 def _drawn(asked: Asked) -> Array:

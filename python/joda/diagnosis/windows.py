@@ -6,7 +6,7 @@ from window to window. Noise of the recorded force moves the joint too; residual
 the covariance of both noises.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ class Windows:
     Attributes:
         h: step, s.
         force: at each step, N·m or N, shape (steps,).
+        command: of an actuator there, see `Servo`; None where none acted.
         at: step at which each window begins, shape (m,).
         fresh: whether it begins a run, shape (m,).
         start: measured position and velocity there, shape (m, 2).
@@ -63,6 +64,12 @@ class Windows:
     shared: Array
     knocks: NDArray[np.bool_]
     rests: NDArray[np.bool_]
+    command: Array | None = field(default=None, kw_only=True)
+
+    @property
+    def pushed(self) -> bool:
+        """Whether a hand or an actuator moved the joint."""
+        return self.command is not None or bool(self.force.any())
 
     @property
     def length(self) -> float:
@@ -76,11 +83,13 @@ class Windows:
         return np.asarray((self.rows >= 0).sum(axis=1))
 
     def coarser(self) -> "Windows":
-        """The same in steps that are `GRID` times longer; the force is the mean over each."""
+        """The same in steps that are `GRID` times longer; forces are the mean over each."""
+        own = self.command
         return replace(
             self,
             h=GRID * self.h,
             force=self.force.reshape(-1, GRID).mean(axis=1),
+            command=None if own is None else own.reshape(-1, GRID).mean(axis=1),
             at=self.at // GRID,
             step=self.step // GRID,
             share=(self.step % GRID + self.share) / GRID,
@@ -96,9 +105,11 @@ class Windows:
         samples, of = old[there], np.nonzero(there)[0]
         rows = np.full(old.shape, -1)
         rows[there] = np.arange(len(samples))
+        own = np.concatenate(steps)
         return replace(
             self,
-            force=self.force[np.concatenate(steps)],
+            force=self.force[own],
+            command=None if self.command is None else self.command[own],
             at=at,
             fresh=np.ones(len(at), bool),
             start=self.start[kept],
@@ -117,7 +128,8 @@ class Windows:
 
     def misfit(self, solo: Solo, start: Array) -> Array:
         """Predicted minus measured positions, rad or m, shape (n,)."""
-        before, after = solo.replay(self.force, self.at, start, self.fresh, self.h)
+        starts = self.at, start, self.fresh
+        before, after = solo.replay(self.force, *starts, self.h, self.command)
         here = before[self.step]
         return np.asarray(here + self.share * (after[self.step] - here) - self.position)
 

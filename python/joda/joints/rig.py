@@ -6,6 +6,7 @@ scene, and nothing else in the scene can get in the way.
 """
 
 import tempfile
+from math import isfinite
 from pathlib import Path
 
 import mujoco
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.profile import Profile
+from joda.scenes.actuators import Servo
 from joda.scenes.attaching import attach
 from joda.scenes.context import Context
 from joda.scenes.model import load_model
@@ -20,6 +22,8 @@ from joda.scenes.native import Row, native_attributes
 
 GRAVITY = 9.81
 TIMESTEP = 0.002
+FARTHEST = 1e30
+"""A force limit that is none, N·m or N."""
 
 XML = """
 <mujoco model="rig">
@@ -31,11 +35,21 @@ XML = """
       <inertial pos="{x} 0 {z}" mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>
     </body>
   </worldbody>
+  {servo}
 </mujoco>
 """
+SERVO = """<actuator>
+    <general name="servo" joint="joint" gainprm="{gain}" biastype="affine"
+      biasprm="0 {bias}" {limits}/>
+  </actuator>"""
 
 
-def rig(context: Context, profile: Profile, friction_row: Row | None = None) -> mujoco.MjModel:
+def rig(
+    context: Context,
+    profile: Profile,
+    friction_row: Row | None = None,
+    servo: Servo | None = None,
+) -> mujoco.MjModel:
     """The joint alone, with a profile.
 
     Args:
@@ -43,6 +57,7 @@ def rig(context: Context, profile: Profile, friction_row: Row | None = None) -> 
         profile: of that joint.
         friction_row: solref and solimp of MuJoCo's own friction row: a profile of nothing but
             native elements is then the joint's own, without the plugin.
+        servo: on the joint; its signal is the command, N·m or N.
 
     Returns:
         a model whose only joint has the same range, generalised inertia and gravity force.
@@ -57,6 +72,7 @@ def rig(context: Context, profile: Profile, friction_row: Row | None = None) -> 
         kind=context.joint.type,
         lo=lo,
         hi=hi,
+        servo=_actuator(servo) if servo else "",
         own=" ".join(f'{key}="{" ".join(map(repr, x))}"' for key, x in native.items()),
         **{"gravity": -GRAVITY, "inertia": inertia, **numbers},
     )
@@ -70,6 +86,16 @@ def rig(context: Context, profile: Profile, friction_row: Row | None = None) -> 
         bare.write_text(text)
         attach(bare, on_rig, scene)
         return load_model(scene)
+
+
+def _actuator(servo: Servo) -> str:
+    """The servo as an element, its delay left to who gives the commands."""
+    limits = ""
+    if isfinite(servo.low) or isfinite(servo.high):
+        low, high = max(servo.low, -FARTHEST), min(servo.high, FARTHEST)
+        limits = f'forcerange="{low!r} {high!r}" forcelimited="true"'
+    bias = f"{-servo.gain * servo.stiffness!r} {-servo.drag!r}"
+    return SERVO.format(gain=repr(servo.gain), bias=bias, limits=limits)
 
 
 def gravity_factors(context: Context) -> NDArray[np.float64]:

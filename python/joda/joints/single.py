@@ -10,6 +10,7 @@ from joda._core import Solo
 from joda.effects import EndStopRestitution
 from joda.joints.rig import gravity_factors
 from joda.profile import CHANNELS, Profile
+from joda.scenes.actuators import Servo
 from joda.scenes.context import Context
 from joda.scenes.limits import IMPEDANCES, limit_parameters
 from joda.scenes.native import Row
@@ -32,6 +33,7 @@ class Single:
         solref, solimp: of the ends of the range.
         friction_row: solref and solimp of MuJoCo's own friction row, which yields where the joint
             all but rests; None: the plugin's, which hardly does.
+        servo: what the joint's actuators make of commands; None where none acted.
     """
 
     inertia: float
@@ -41,6 +43,7 @@ class Single:
     solref: tuple[float, ...]
     solimp: tuple[float, ...]
     friction_row: Row | None = None
+    servo: Servo | None = None
 
     def solo(self, profile: Profile, h: float) -> Solo:
         """The joint with a profile, for steps of h (s)."""
@@ -53,12 +56,18 @@ class Single:
         lo, hi = profile.joint.range
         fixed = self.inertia, self.row_inertia, self.weight, self.hinge
         row = friction_row(*self.friction_row, h) if self.friction_row else (0.0, 0.0)
-        return Solo(lo, hi, texts, *fixed, solref, solimp, row)
+        own = self.servo or Servo()
+        servo = own.gain, own.stiffness, own.drag, own.low, own.high, own.delay
+        return Solo(lo, hi, texts, *fixed, solref, solimp, row, servo)
 
     @property
     def with_plugin(self) -> "Single":
         """The same with the plugin's friction row."""
         return replace(self, friction_row=None)
+
+    def stepped(self, h: float) -> "Single":
+        """The same for steps of h (s) that stand for no steps, see `Servo.stepped`."""
+        return replace(self, servo=self.servo.stepped(h)) if self.servo else self
 
     def weight_at(self, position: Array) -> Array:
         """Gravity's force at positions (rad or m), N·m or N; shape (n,)."""
@@ -66,10 +75,6 @@ class Single:
         if not self.hinge:
             return np.full(len(position), a)
         return np.asarray(a * np.cos(position) + b * np.sin(position))
-
-    def without_weight(self) -> "Single":
-        """The same joint where there is no gravity."""
-        return replace(self, weight=(0.0, 0.0))
 
     def limits(self, profile: Profile, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Solver parameters of the ends of the range, solref and solimp, for steps of h (s).

@@ -18,7 +18,7 @@ from joda.measured.failing import FORCE, LENGTHS
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.measured.suspicions.timing import repeats
-from joda.measured.whiteness import drifts, free_parts
+from joda.measured.whiteness import drifts, free_parts, strays
 
 Array = NDArray[np.float64]
 Adequate = Literal["within_noise", "beyond_noise", "not_enough_data"]
@@ -49,6 +49,7 @@ class Adequacy:
         whole: whether all that acts on the joint in its scene is replayed, and all of the runs.
         loudness: the largest share of the noise in a run's motion, both RMS: from 0.3 on the noise
             may be motion between two samples.
+        adrift: whether more is left of whole forced runs than noise of position and force makes.
         repeats: whether positions of a moving joint repeat, as of a sensor that is slower than its
             logger: what was taken for noise is motion.
         barred: where the scene would not have let the joint, a sentence; empty if nowhere: else the
@@ -61,6 +62,7 @@ class Adequacy:
     pattern: float | None
     whole: bool
     loudness: float
+    adrift: bool
     repeats: bool
     barred: str
 
@@ -102,8 +104,17 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
         or _moving(measured) < WINDOWS
     ):
         verdict = "not_enough_data"
+    adrift = verdict == "within_noise" and strays(measured) < CHANCE
     return Adequacy(
-        verdict, run, segment, pattern, measured.whole, loudness, repeating, measured.barred
+        verdict="not_enough_data" if adrift else verdict,
+        run=run,
+        segment=segment,
+        pattern=pattern,
+        whole=measured.whole,
+        loudness=loudness,
+        adrift=adrift,
+        repeats=repeating,
+        barred=measured.barred,
     )
 
 

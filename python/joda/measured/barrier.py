@@ -67,10 +67,11 @@ class Barrier:
         """Which samples lie where neither speed nor force of the measurement can have brought it.
 
         Args:
-            one: a run or a curve; of a run whose force is not known everywhere nothing is said.
+            one: a run or a curve; of a run whose force is not known everywhere, or that an
+                actuator drove, nothing is said.
             room: error of its positions, rad or m.
         """
-        if np.isnan(one.force).any():
+        if np.isnan(one.force).any() or (isinstance(one, Run) and one.command is not None):
             return np.zeros(len(one.position), bool)
         push = EXCESS * (float(np.abs(one.force).max()) + self.own)
         energy = EXCESS * self.inertia * _speed(one) ** 2 / 2

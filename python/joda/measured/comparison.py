@@ -110,7 +110,14 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
     elif found.verdict == "not_enough_data" and not found.whole:
         yield (
             "Not enough to tell whether the model is right: nothing in what is replayed is beyond "
-            "the noise, but not all is replayed (below)."
+            "the noise, but not all is replayed (see the notes)."
+        )
+    elif found.verdict == "not_enough_data" and found.adrift:
+        yield (
+            "Not enough to tell whether the model is right: every run and every window is missed "
+            f"by less than {MULTIPLE:g} times the noise, but more is left of whole runs than noise "
+            "of position and force makes: a small fault of the model, or what the force did "
+            "between its samples."
         )
     elif found.verdict == "not_enough_data" and comparison.failing:
         yield (
@@ -131,6 +138,8 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
         )
     elif found.verdict == "beyond_noise" and worst:
         yield f"Beyond the noise: {', and '.join(map(_worst, worst))}."
+        if not found.whole:
+            yield "Not all that acts is replayed (see the notes): that may be what is missed."
     elif found.verdict == "beyond_noise" and not found.barred and found.pattern is not None:
         every = "every run and window" if found.segment else "every run"
         small = "Beyond noise" if found.loudness >= LOUD else "Small, but not noise"

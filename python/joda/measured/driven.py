@@ -1,6 +1,7 @@
 """Runs of a joint that an actuator acts on, and columns of logs that are not read yet."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -9,15 +10,30 @@ import numpy as np
 from joda.errors import JodaError
 from joda.measured.runs import QuasiStatic, Run, evened, read_measurement
 from joda.measured.table import header
-from joda.scenes.actuators import actuators_on
+from joda.scenes.actuators import Servo, actuators_on, drive_of
 from joda.scenes.model import joint_name
 
 OF_JOINTS = ("position", "velocity", "force")
 
 
+@dataclass(frozen=True)
+class Logs:
+    """Measurements of a joint as they were read.
+
+    Attributes:
+        read: timed runs and quasi-static curves.
+        servo: what the joint's actuators made of the runs' commands; None where none acted.
+        notes: which columns are not used, a sentence each.
+    """
+
+    read: tuple[Run | QuasiStatic, ...]
+    servo: Servo | None
+    notes: tuple[str, ...]
+
+
 def read_logs(
     model: mujoco.MjModel, joint: int, paths: Sequence[str | Path], passive: bool
-) -> tuple[list[Run | QuasiStatic], list[str]]:
+) -> Logs:
     """Reads measurements of a joint, and notes which of their columns are not used.
 
     Args:
@@ -27,22 +43,31 @@ def read_logs(
         passive: whether the actuators on the joint were off while it was measured.
 
     Raises:
-        JodaError: a file cannot be read; or an actuator acts on the joint, and what it did is in
-            a column that is not supported yet, or in none.
+        JodaError: a file cannot be read; or an actuator acts on the joint, and what it did is not
+            known, in none of the files or only in some.
     """
-    acting = actuators_on(model, joint)
+    acting = () if passive else actuators_on(model, joint)
+    files = [Path(path) for path in paths]
+    told = [_commands(path, acting) for path in files]
+    drive = drive_of(model, joint) if any(told) else None
     read: list[Run | QuasiStatic] = []
     notes: list[str] = []
-    for path in map(Path, paths):
-        notes += _unused(model, joint, path, acting, passive)
-        one = read_measurement(path)
+    for path, commanded in zip(files, told, strict=True):
+        notes += _unused(model, joint, path, acting if commanded else ())
+        one = read_measurement(path, drive if commanded else None)
         if isinstance(one, Run):
             one, note = evened(one)
             notes += [note] if note else []
-        if acting and not passive and isinstance(one, Run) and not one.forced:
+            if drive and not commanded:
+                raise JodaError(
+                    f"{path}: no column '{drive.columns[0]}', which other runs have; give runs in "
+                    "which the actuator acted apart from those in which it was off."
+                )
+        if acting and not commanded and isinstance(one, Run) and not one.forced:
             raise JodaError(
-                f"{path}: {_driven(model, joint, acting)}, and the run has no column 'force'; "
-                "record the force on the joint, or say with --passive that the actuator was off."
+                f"{path}: {_driven(model, joint, acting)}, and the run has neither a column "
+                f"'ctrl:{acting[0]}' nor 'force'; record its signal or the whole force on the "
+                "joint, or say with --passive that the actuator was off."
             )
         if first := next((other for other in read if _copies(one, other)), None):
             notes.append(
@@ -51,7 +76,19 @@ def read_logs(
             )
             continue
         read.append(one)
-    return read, notes
+    return Logs(tuple(read), drive.servo if drive else None, tuple(notes))
+
+
+def _commands(path: Path, acting: Sequence[str]) -> bool:
+    """Whether a file has the signals of all that acts on the joint; raises JodaError if of some."""
+    names = {name.lower() for name in header(path)}
+    missing = [name for name in acting if f"ctrl:{name}".lower() not in names]
+    if missing and len(missing) < len(acting):
+        raise JodaError(
+            f"{path}: no column 'ctrl:{missing[0]}', and the actuators on the joint act together; "
+            "give all of their signals, held at what they were."
+        )
+    return bool(acting) and not missing
 
 
 def _copies(one: Run | QuasiStatic, other: Run | QuasiStatic) -> bool:
@@ -62,37 +99,37 @@ def _copies(one: Run | QuasiStatic, other: Run | QuasiStatic) -> bool:
         type(one) is type(other)
         and np.array_equal(one.position, other.position)
         and np.array_equal(one.force, other.force, equal_nan=True)
+        and _commanded_alike(one, other)
     )
 
 
-def _unused(
-    model: mujoco.MjModel, joint: int, path: Path, acting: Sequence[str], passive: bool
-) -> list[str]:
-    """Notes on columns that belong to logs of driven or several joints; raises JodaError."""
+def _commanded_alike(one: Run | QuasiStatic, other: Run | QuasiStatic) -> bool:
+    """Whether the actuators got the same commands, or none."""
+    first, second = (getattr(run, "command", None) for run in (one, other))
+    return first is second or (
+        first is not None and second is not None and np.array_equal(first, second)
+    )
+
+
+def _unused(model: mujoco.MjModel, joint: int, path: Path, commanded: Sequence[str]) -> list[str]:
+    """Notes on columns of other actuators and joints; raises JodaError."""
     names = header(path)
     pairs = [name.split(":", 1) for name in names if ":" in name]
     kinds = [(kind.strip().lower(), of.strip()) for kind, of in pairs]
-    commands = [f"ctrl:{of}" for kind, of in kinds if kind == "ctrl"]
+    read = {name.lower() for name in commanded}
+    commands = [f"ctrl:{of}" for kind, of in kinds if kind == "ctrl" and of.lower() not in read]
     others = [f"{kind}:{of}" for kind, of in kinds if kind in OF_JOINTS]
-    for column in commands:
-        if column.removeprefix("ctrl:") in acting and not passive:
-            raise JodaError(
-                f"{path}: column '{column}' is the command of an actuator on joint "
-                f"'{joint_name(model, joint)}', and logs of driven joints are not supported yet; "
-                "record the whole force on the joint as 'force' and leave the column out, or say "
-                "with --passive that the actuator was off."
-            )
     if others and "position" not in {name.lower() for name in names}:
         raise JodaError(
             f"{path}: logs of several joints are not supported yet ({_listed(others)}); give "
             f"joint '{joint_name(model, joint)}' a file of its own, with the columns time, "
-            "position and perhaps velocity and force."
+            "position and perhaps velocity, force and the signals of its actuators."
         )
     if not commands + others:
         return []
     return [
-        f"{path.name}: not used: {_listed([*commands, *others])}; logs of driven joints and of "
-        "several joints are not supported yet."
+        f"{path.name}: not used: {_listed([*commands, *others])}, which are of other actuators "
+        "and joints, or of actuators that were off."
     ]
 
 

@@ -179,21 +179,18 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
 
 def _usual_force(measured: Measured, run: Run) -> float:
     """RMS of what acts on the joint in a run, by load or, where there is none, by its speed."""
-    gravity = np.interp(run.position, measured.context.positions, measured.context.gravity_force)
-    load = float(np.sqrt(np.mean((run.force + gravity) ** 2)))
+    load = float(np.sqrt(np.mean(measured.load(run) ** 2)))
     pace = float(np.ptp(run.position)) / float(np.ptp(run.time)) ** 2
     return max(load, measured.single.inertia * pace)
 
 
 def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[float]:
     lo, hi = measured.profile.joint.range
-    found = measured.context
     ends = window.samples[[0, -1]]
     middle = float(run.position[window.samples].mean())
     speed, doubt = _speed(run.time[window.samples], run.position[window.samples], sigma)
     direction = 0.5 * float(np.sign(speed)) if abs(speed) > SURE * doubt else 0.0
-    gravity = float(np.interp(middle, found.positions, found.gravity_force))
-    load = float(run.force[window.samples].mean()) + gravity
+    load = float(measured.load(run.part(window.samples)).mean())
     square = float(np.sum(window.misfit**2) / (sigma**2 + window.pushed**2))
     place = (middle - lo) / (hi - lo)
     row = [place, speed, direction, float(run.time[ends].mean()), load]

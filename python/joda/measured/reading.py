@@ -20,6 +20,7 @@ from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow import as_curve
 from joda.measured.suspicions import suspicions
 from joda.profile import Profile
+from joda.scenes.actuators import Servo
 from joda.scenes.angles import range_doubt
 from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact
@@ -34,6 +35,8 @@ CLEARLY = 0.9
 """Part of the error in windows to which another friction row must bring it."""
 ENOUGH = 4
 """Runs that tell which row that is."""
+SURELY = 20.0
+"""Squared misfits, in noises, by which MuJoCo's own row must be better to be the one replayed."""
 YIELDS = (
     "MuJoCo's own friction row yields near rest (solreffriction, solimpfriction): by it windows of "
     "{0:g} s are missed by {2:.2g} {3}, by the same friction in a profile, which is what is "
@@ -127,6 +130,25 @@ class Measured:
         not used."""
         return next((c.doubtful for c in self.curves if c.doubtful and not self.runs), 0.0)
 
+    def load(self, run: Run) -> Array:
+        """What loads the joint at a run's samples, N·m or N, shape (n,): gravity and what is
+        applied, and with an actuator how far its force is beyond these: what its gear transmits."""
+        gravity = np.interp(run.position, self.context.positions, self.context.gravity_force)
+        return self.exerted(run) - run.force - gravity if self._driven(run) else run.force + gravity
+
+    def exerted(self, run: Run) -> Array:
+        """By the actuators on the joint, N·m or N, shape (n,)."""
+        servo = self.single.servo
+        if servo is None or run.command is None:
+            return np.zeros(len(run.time))
+        at = run.time - servo.delay
+        command = run.command[np.maximum(np.searchsorted(run.time, at, side="right") - 1, 0)]
+        velocity = np.gradient(run.position, run.time)
+        return servo.force(command, run.position, velocity)
+
+    def _driven(self, run: Run) -> bool:
+        return self.single.servo is not None and run.command is not None
+
     def paths(self) -> list[Array]:
         """Predicted positions of all runs, rad or m; NaN from where the force is not known."""
         replayer, pairs = self.replayer, zip(self.runs, self.sigma, strict=True)
@@ -181,16 +203,18 @@ def read_measured(
     found = context(source, name)
     bare = Profile(joint=describe_joint(compiled, number))
     profile = whole_profile(compiled, number, profiles_of(compiled).get(name, bare))
-    read, unused = read_logs(compiled, number, runs, passive)
-    notes = [*checked(read, found, float(compiled.opt.timestep)), *unused]
-    clear = clear_of_contacts(compiled, number, found, profile, read)
+    logs = read_logs(compiled, number, runs, passive)
+    notes = [*checked(logs.read, found, float(compiled.opt.timestep)), *logs.notes]
+    clear = clear_of_contacts(compiled, number, found, profile, logs.read)
     notes += clear.notes
     if besides := acting_besides(compiled, number):
         notes.append(
             f"In the scene more acts on joint '{name}' than itself, gravity and contacts: "
             f"{', '.join(besides)}; a replay of the joint by itself leaves that out."
         )
-    return taken(compiled, number, found, profile, clear, notes, whole=not besides)
+    return taken(
+        compiled, number, found, profile, clear, notes, whole=not besides, servo=logs.servo
+    )
 
 
 def taken(
@@ -201,6 +225,7 @@ def taken(
     clear: Clear,
     notes: Sequence[str] = (),
     whole: bool = True,
+    servo: Servo | None = None,
 ) -> Measured:
     """A joint with measurements that are read, checked, and clear of contacts; raises JodaError.
 
@@ -212,19 +237,23 @@ def taken(
         clear: the measurements.
         notes: what is suspicious about them.
         whole: whether all that acts on the joint, but for contacts, is replayed.
+        servo: what the joint's actuators make of the runs' commands.
     """
     notes, step = list(notes), float(model.opt.timestep)
     timed = tuple(run for run in clear.measured if isinstance(run, Run))
     usual = smoothing.pooled_noise([(run.time, run.position) for run in timed])
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     sigma = tuple(max(smoothing.noise(run.time, run.position), least) for run in timed)
-    own, row = single(found, profile, model, joint), own_friction_row(model, joint)
+    row = own_friction_row(model, joint)
+    own = replace(single(found, profile, model, joint), servo=servo)
     replayer = Replayer(found, profile, own, step)
     if row and timed:
         yielding = replace(own, friction_row=row)
         other = Replayer(found, profile, yielding, step)
         errors = [missed(one, timed[:ENOUGH], sigma[:ENOUGH]) for one in (replayer, other)]
-        if errors[1] < CLEARLY * errors[0]:
+        samples = sum(len(run.time) for run in timed[:ENOUGH])
+        gain = samples * (errors[0] ** 2 - errors[1] ** 2) / float(np.mean(np.square(sigma)))
+        if errors[1] < CLEARLY * errors[0] or gain > SURELY:
             own, replayer = yielding, other
         elif errors[0] < CLEARLY * errors[1]:
             notes.append(YIELDS.format(WINDOW, *errors, found.joint.unit))

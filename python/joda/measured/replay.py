@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from joda.joints.rig import rig
 from joda.joints.single import Single
 from joda.measured import smoothing
-from joda.measured.runs import Run
+from joda.measured.runs import Run, held
 from joda.profile import Profile
 from joda.scenes.context import Context
 
@@ -49,6 +49,7 @@ START = 3.0
 """How far a start may be from the measured one, in its standard deviations."""
 FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 APPLIED = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+COMMANDED = int(mujoco.mjtState.mjSTATE_CTRL)
 
 
 def left_out(runs: Sequence[Run], shortest: float) -> list[str]:
@@ -119,7 +120,8 @@ class Replayer:
     def __init__(self, context: Context, profile: Profile, single: Single, timestep: float) -> None:
         """Args: the joint in its scene; its whole profile (`scenes.native`); the rest; step, s."""
         alone = context.model_copy(update={"equivalent_inertia": single.inertia})
-        self.model = rig(alone, profile, single.friction_row)
+        self.servo = single.servo
+        self.model = rig(alone, profile, single.friction_row, self.servo)
         self.model.opt.timestep = self.h = timestep
         solref, solimp = single.limits(profile, timestep)
         self.model.jnt_solref[0], self.model.jnt_solimp[0] = solref, solimp
@@ -131,7 +133,8 @@ class Replayer:
         out = np.full(len(run.time), np.nan)
         if start:
             time, force = _known(run)
-            out[: len(time)] = self._replay(time, start.best[None], force[None])[0]
+            command = _command(run, len(time))
+            out[: len(time)] = self._replay(time, start.best[None], force[None], command)[0]
         return out
 
     def scatter(self, run: Run, start: Start | None) -> float:
@@ -145,11 +148,13 @@ class Replayer:
         time, force = _known(run)
         every = slice(None, None, len(time) // DENSEST + 1)
         off = smoothing.force_error(time, force, run.forced)[every] / np.sqrt(every.step)
+        command = _command(run, len(time), every)
         time, force = time[every], force[every]
         rng = np.random.default_rng(0)
         starts = start.best + rng.standard_normal((ENSEMBLE, 2)) @ start.spread.T
         forces = force + off * rng.standard_normal((ENSEMBLE, len(time)))
-        paths = self._replay(time, np.vstack([start.best, starts]), np.vstack([force, forces]))
+        begins, pushes = np.vstack([start.best, starts]), np.vstack([force, forces])
+        paths = self._replay(time, begins, pushes, command)
         return float(np.sqrt(np.mean((paths[1:] - paths[0]) ** 2)))
 
     def followed(self, run: Run, sigma: float, near: Array | None = None) -> tuple[Array, Array]:
@@ -164,6 +169,7 @@ class Replayer:
             rad or m, shape (n,); and that start.
         """
         time, force = run.time - run.time[0], np.tile(run.force, (3, 1))
+        command = _command(run, len(time))
         offsets = np.diag(NEAR_BY * sigma / np.array([1, time[-1]]))
         tries = np.vstack([np.zeros(2), offsets])
         if near is None and (start := self.start(run, sigma)):
@@ -171,7 +177,7 @@ class Replayer:
         at, step, least = np.asarray(near), np.zeros(2), np.inf
         best = np.full(len(time), ASTRAY * sigma)
         for _ in range(TRIES):
-            paths = self._replay(time, at + step + tries, force)
+            paths = self._replay(time, at + step + tries, force, command)
             misfit = paths[0] - run.position
             square = float(misfit @ misfit) if np.isfinite(paths).all() else np.inf
             gain = least - square
@@ -202,41 +208,58 @@ class Replayer:
             np.array([begun.position[0], begun.velocity[0]]),
             np.array([begun.position_error[0], begun.velocity_error[0]]),
         )
-        least, best, covariance = self._fitted_start(time, position, force, sigma, prior, False)
+        known = time, position, force, _command(run, len(time)), sigma, prior
+        least, best, covariance = self._fitted_start(*known, False)
         if smoothing.begins_at_rest(time, position, sigma):
-            still = self._fitted_start(time, position, force, sigma, prior, True)
+            still = self._fitted_start(*known, True)
             if still[0] < AT_REST * least:
                 _, best, covariance = still
         factor = prior.deviation[:, None] * np.linalg.cholesky(covariance)
         return Start(prior.mean + prior.deviation * best, factor)
 
-    def _replay(self, time: Array, starts: Array, forces: Array) -> Array:
+    def _replay(
+        self, time: Array, starts: Array, forces: Array, command: tuple[Array, Array] | None
+    ) -> Array:
         """Positions at some times from starts (k, 2), under forces (k, n); shape (k, n).
 
         Args:
             time: s, from 0 on, shape (n,).
             starts: position and velocity.
             forces: at these times.
+            command: of the servo, and its times.
         """
         out = np.empty(forces.shape)
         steps = int(np.ceil(time[-1] / self.h)) + 1
         mujoco.mj_resetData(self.model, self.data)
         states = self._placed(starts)
         for first in range(0, steps, AT_ONCE):
-            at = self.h * np.arange(first, min(first + AT_ONCE, steps) + 1)
+            at = np.array(self.h * np.arange(first, min(first + AT_ONCE, steps) + 1))
             applied = np.stack([np.interp(at[:-1], time, force) for force in forces])
-            paths, states = self._roll(states, applied)
+            paths, states = self._roll(states, applied, self._commanded(command, at))
             own = slice(*np.searchsorted(time, (at[0], at[-1])))
             out[:, own] = np.stack([np.interp(time[own], at, path) for path in paths])
         return out
 
+    def _commanded(self, command: tuple[Array, Array] | None, edges: Array) -> Array | None:
+        """The servo's command over steps between edges (m + 1,), s; shape (m,)."""
+        if self.servo is None or command is None:
+            return None
+        return held(*command, edges - self.servo.delay)
+
     def _fitted_start(
-        self, time: Array, position: Array, force: Array, sigma: float, prior: "_Prior", rests: bool
+        self,
+        time: Array,
+        position: Array,
+        force: Array,
+        command: tuple[Array, Array] | None,
+        sigma: float,
+        prior: "_Prior",
+        rests: bool,
     ) -> tuple[float, Array, Array]:
         """Gauss-Newton over longer and longer horizons.
 
         Args:
-            time, position, force, sigma: of the run.
+            time, position, force, command, sigma: of the run.
             prior: of the start.
             rests: whether the velocity is zero there, and not fitted.
 
@@ -258,7 +281,7 @@ class Replayer:
             for _ in range(TRIES):
                 tried = np.clip(z + step, low, high)
                 starts = prior.mean + prior.deviation * (tried + off)
-                found = self._replay(time[early], starts, forces) / sigma
+                found = self._replay(time[early], starts, forces, command) / sigma
                 misfit = found[0] - position[early] / sigma
                 square = float(misfit @ misfit + tried @ tried)
                 if square >= least - SETTLED or not np.isfinite(found).all():
@@ -304,13 +327,15 @@ class Replayer:
         near_by = np.minimum(doubts, NEAR_BY * sigma * np.array([1, 1 / length]))
         force = np.where(np.isnan(run.force), 0.0, run.force)
         forces = np.interp(at[:, None] + self.h * np.arange(steps), run.time, force)
+        command, edges = _command(run, len(run.time)), at[:, None] + self.h * np.arange(steps + 1)
+        own = [self._commanded(command, row - run.time[0]) for row in edges]
         push = 6 * self.inertia * sigma / length**2  # moves the joint by three times the noise
         near, step = np.zeros_like(starts), np.zeros_like(starts)
         at_rest = np.stack([np.zeros(len(kept)), -starts[:, 1] / doubts[:, 1]], axis=1)
         least, best = np.full(len(kept), np.inf), dict[int, Window]()
         for number in range(TRIES + 1):
             tried = np.clip(at_rest if number == 1 else near + step, -START, START)
-            nearby = self._nearby(starts + doubts * tried, near_by, forces, push)
+            nearby = self._nearby(starts + doubts * tried, near_by, forces, own, push)
             for k, (samples, paths) in enumerate(zip(pieces, nearby, strict=True)):
                 place = (run.time[samples] - at[k]) / self.h
                 path = np.stack([np.interp(place, np.arange(steps + 1), p) for p in paths])
@@ -327,7 +352,14 @@ class Replayer:
             return [best[k] for k in range(len(kept))]
         return [_with_force(best[k], run, self.inertia) for k in range(len(kept))]
 
-    def _nearby(self, starts: Array, offsets: Array, forces: Array, push: float) -> Iterator[Array]:
+    def _nearby(
+        self,
+        starts: Array,
+        offsets: Array,
+        forces: Array,
+        commands: Sequence[Array | None],
+        push: float,
+    ) -> Iterator[Array]:
         """Paths from the starts, from starts nearby, and under another constant force.
 
         What has a memory (friction, play) keeps it from one window to the next.
@@ -338,9 +370,9 @@ class Replayer:
         off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
         pushed = np.array([0.0, 0.0, 0.0, push])
         mujoco.mj_resetData(self.model, self.data)
-        for start, offset, force in zip(starts, offsets, forces, strict=True):
+        for start, offset, force, command in zip(starts, offsets, forces, commands, strict=True):
             states = self._placed(start + offset * off)
-            paths, last = self._roll(states, force + pushed[:, None])
+            paths, last = self._roll(states, force + pushed[:, None], command)
             mujoco.mj_setState(self.model, self.data, last[0], FULL)
             yield paths
 
@@ -352,15 +384,18 @@ class Replayer:
             mujoco.mj_getState(self.model, self.data, row, FULL)
         return out
 
-    def _roll(self, initial: Array, forces: Array) -> tuple[Array, Array]:
-        """Positions from full states under forces (k, steps).
+    def _roll(self, initial: Array, forces: Array, command: Array | None) -> tuple[Array, Array]:
+        """Positions from full states under forces (k, steps), and a command (steps,) for all.
 
         Returns:
             positions, shape (k, steps + 1), and the last full states.
         """
-        states, _ = rollout.rollout(
-            self.model, self.data, initial, forces[:, :, None], control_spec=APPLIED
-        )
+        inputs, spec = forces[:, :, None], APPLIED
+        if self.servo:
+            own = np.zeros(forces.shape[1]) if command is None else command
+            own = np.broadcast_to(own, forces.shape)
+            inputs, spec = np.stack([own, forces], axis=2), COMMANDED | APPLIED
+        states, _ = rollout.rollout(self.model, self.data, initial, inputs, control_spec=spec)
         return np.hstack([initial[:, 1:2], states[:, :, 1]]), states[:, -1]
 
 
@@ -370,6 +405,13 @@ def _known(run: Run) -> tuple[Array, Array]:
     end = int(unknown[0]) if len(unknown) else len(run.time)
     known = slice(0, end if end >= smoothing.LEAST else 0)
     return run.time[known] - run.time[0], run.force[known]
+
+
+def _command(run: Run, count: int, every: slice = slice(None)) -> tuple[Array, Array] | None:
+    """Times from 0 on (s) and commands of a run's first samples; None where nothing acted."""
+    if run.command is None:
+        return None
+    return run.time[:count][every] - run.time[0], run.command[:count][every]
 
 
 def _spread(count: int) -> Array:

@@ -12,6 +12,7 @@ from joda.errors import JodaError
 from joda.files import write_text
 from joda.measured import smoothing
 from joda.measured.table import Table, check_filled, check_increasing, read_table
+from joda.scenes.actuators import Drive
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,8 @@ class Run:
         force: applied to the joint from outside, N·m or N; NaN where it is not known, zero where
             the file has no such column.
         forced: whether the file has the column.
+        command: of the actuators on the joint (`joda.scenes.actuators.Drive`), held from its sample
+            to the next, N·m or N; None where none acted.
         origin: what was subtracted from the file's times, s.
         unread: names of the file's other columns.
     """
@@ -46,6 +49,7 @@ class Run:
     velocity: Array | None
     force: Array
     forced: bool
+    command: Array | None = None
     origin: float = 0.0
     unread: tuple[str, ...] = ()
 
@@ -57,7 +61,13 @@ class Run:
             position=self.position[samples],
             velocity=None if self.velocity is None else self.velocity[samples],
             force=self.force[samples],
+            command=None if self.command is None else self.command[samples],
         )
+
+    @property
+    def pushed(self) -> bool:
+        """Whether anything that is known pushed the joint: a hand, or an actuator."""
+        return self.forced or self.command is not None
 
 
 @dataclass(frozen=True)
@@ -77,12 +87,13 @@ class QuasiStatic:
     unread: tuple[str, ...] = ()
 
 
-def read_measurement(path: str | Path) -> Run | QuasiStatic:
+def read_measurement(path: str | Path, drive: Drive | None = None) -> Run | QuasiStatic:
     """Reads a timed run or, where there is no column `time`, a quasi-static curve.
 
     Args:
         path: CSV with a header row: `time` and `position`, optionally `velocity` and `force`; or
             `position` and `force`. Other columns are ignored, lines beginning with # are comments.
+        drive: of actuators whose signals are columns too, `ctrl:` and their names.
 
     Returns:
         the run or the curve.
@@ -90,20 +101,20 @@ def read_measurement(path: str | Path) -> Run | QuasiStatic:
     Raises:
         JodaError: it cannot be read; file, line and column are named.
     """
-    table = _table(Path(path))
-    return _run(table) if "time" in table.columns else _curve(table)
+    table = _table(Path(path), [] if drive is None else drive.columns)
+    return _run(table, drive) if "time" in table.columns else _curve(table)
 
 
 def read_run(path: str | Path) -> Run:
     """Reads a timed run, as `read_measurement` does; a file without time is refused."""
-    return _run(_table(Path(path)))
+    return _run(_table(Path(path)), None)
 
 
-def _table(path: Path) -> Table:
-    return read_table(path, COLUMNS, "time and position (or position and force)")
+def _table(path: Path, more: Sequence[str] = ()) -> Table:
+    return read_table(path, (*COLUMNS, *more), "time and position (or position and force)")
 
 
-def _run(table: Table) -> Run:
+def _run(table: Table, drive: Drive | None) -> Run:
     needs = "a run needs time (s) and position (rad or m)"
     _complete(table, ("time", "position"), needs)
     check_filled(table, ("time", "position", "velocity"), "only force may be")
@@ -117,9 +128,25 @@ def _run(table: Table) -> Run:
         velocity=columns.get("velocity"),
         force=columns.get("force", np.zeros(len(time))),
         forced="force" in columns,
+        command=None if drive is None else drive.command(_held(table, drive)),
         origin=origin,
         unread=table.others,
     )
+
+
+def _held(table: Table, drive: Drive) -> Array:
+    """The signals, shape (n, k): an empty cell is as the one above; raises JodaError."""
+    out = []
+    for name in drive.columns:
+        signal = table.columns[name]
+        last = np.maximum.accumulate(np.where(np.isnan(signal), -1, np.arange(len(signal))))
+        if last[0] < 0:
+            raise JodaError(
+                f"{table.path}, line {table.lines[0]}: no {name}; the first cell must tell it, and "
+                "an empty one below is held from the one above."
+            )
+        out.append(signal[last])
+    return np.stack(out, axis=1)
 
 
 def _curve(table: Table) -> QuasiStatic:
@@ -180,6 +207,19 @@ def evened(run: Run) -> tuple[Run, str | None]:
         f"{run.name}: force is known at one sample of {usual:.0f} only; between them it is taken "
         "as linear."
     )
+
+
+def held(time: Array, values: Array, edges: Array) -> Array:
+    """Means between edges of what is held from one sample to the next; shape (m,).
+
+    Args:
+        time, values: of the samples, shape (n,); before the first and after the last the same.
+        edges: increasing times, s, shape (m + 1,).
+    """
+    total = np.append(0.0, np.cumsum(values[:-1] * np.diff(time)))
+    at = np.clip(np.searchsorted(time, edges, side="right") - 1, 0, len(time) - 1)
+    area = total[at] + values[at] * (edges - time[at])
+    return np.asarray(np.diff(area) / np.diff(edges))
 
 
 def until_end(run: Run, span: tuple[float, float], clear: float) -> Run:

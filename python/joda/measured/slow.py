@@ -62,6 +62,8 @@ def as_curve(
         inertia: of the model, kg·m² or kg.
         replay: the model's positions at the run's times, rad or m.
     """
+    if run.command is not None:
+        return None
     lo, hi = profile.joint.range
     force = float(np.sqrt(np.mean(run.force**2)))  # NaN where some is not known
     travels = float(np.ptp(run.position)) > TRAVEL * (hi - lo)

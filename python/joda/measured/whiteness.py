@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from joda.measured.reading import Measured
+from joda.measured.replay import Start
 from joda.measured.runs import Run, until_end
 from joda.measured.smoothing import resolution
 
@@ -41,30 +42,58 @@ def free_parts(measured: Measured) -> list[tuple[Run, float]]:
     return [(run, sigma) for run, sigma in parts if len(run.time) >= FEW * LEAST]
 
 
-def drifts(parts: Sequence[tuple[Run, float]], left: Sequence[Array]) -> float:
+def forced_parts(measured: Measured) -> list[tuple[Run, float]]:
+    """The same of runs with a force that is known throughout: so much of them as tells of noise."""
+    span = measured.profile.joint.range
+    pairs = zip(measured.runs, measured.sigma, strict=True)
+    parts = [
+        (until_end(run, span, CLEAR * sigma), sigma)
+        for run, sigma in pairs
+        if run.forced and not np.isnan(run.force).any()
+    ]
+    return [(run, sigma) for run, sigma in parts if len(run.time) >= FEW * LEAST]
+
+
+def strays(measured: Measured) -> float:
+    """Probability that noise of position and force make as large means of what is missed of a
+    forced run; 1 where there is none."""
+    parts, replayer = forced_parts(measured), measured.replayer
+    left, moved = [], []
+    for run, sigma in parts:
+        path, start = replayer.followed(run, sigma)
+        left.append(path / sigma)
+        moved.append(replayer.scatter(run, Start(start, np.zeros((2, 2)))) / sigma)
+    return drifts(parts, left, moved)
+
+
+def drifts(
+    parts: Sequence[tuple[Run, float]], left: Sequence[Array], moved: Sequence[float] = ()
+) -> float:
     """Probability that noise makes as large means of what is missed of any run.
 
     Args:
-        parts: of `free_parts`.
+        parts: of `free_parts`, or `forced_parts`.
         left: what is missed of each, in noises.
+        moved: RMS by which errors of the force move each one's replay, in noises.
 
     Returns:
         1 where no run is free.
     """
-    pairs = zip(parts, left, strict=True)
     each = [
-        drift(own, run.position, resolution(run.position) / sigma) for (run, sigma), own in pairs
+        drift(own, run.position, resolution(run.position) / sigma, *by)
+        for (run, sigma), own, *by in zip(parts, left, *([moved] if moved else []), strict=True)
     ]
     return min(1.0, len(each) * min(each)) if each else 1.0
 
 
-def drift(residual: Array, position: Array, step: float) -> float:
+def drift(residual: Array, position: Array, step: float, moved: float = 0.0) -> float:
     """Probability that noise makes as large means of blocks of a residual.
 
     Args:
         residual: in noises, of a start that was fitted to it, shape (n,).
         position: measured, shape (n,).
         step: of a quantised position, in noises; 0: none.
+        moved: RMS by which something else that is known moves it, in noises.
 
     Returns:
         1 where nothing can be told.
@@ -78,7 +107,7 @@ def drift(residual: Array, position: Array, step: float) -> float:
     if told.sum() < FEW:
         return 1.0
     means, sizes = np.array([(own.mean(), len(own)) for own in blocks])[told].T
-    doubt = max(long_run_variance(blocks), 1.0) / sizes + TOLERATED**2
+    doubt = max(long_run_variance(blocks), 1.0) / sizes + TOLERATED**2 + moved**2
     doubt += step**2 / 12 / np.maximum(changes[told], 1)
     return float(chi2.sf(np.sum(means**2 / doubt), told.sum() - 2))
 

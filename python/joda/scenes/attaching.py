@@ -7,7 +7,7 @@ damping).
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
@@ -18,6 +18,7 @@ import numpy as np
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes
 from joda.profile import Profile
+from joda.scenes.actuators import Servo
 from joda.scenes.editing import EditedScene
 from joda.scenes.model import find_joint, joint_name, load, sentence
 
@@ -74,8 +75,12 @@ def attached(
     joint: str | None = None,
     native: Literal["replace", "keep"] = "replace",
     also: Mapping[str, str] = MappingProxyType({}),
+    servo: Servo | None = None,
 ) -> tuple[bytes, list[str]]:
-    """The scene that `attach`, with the same arguments, writes to `output`, and what it tells."""
+    """The scene that `attach`, with the same arguments, writes to `output`, and what it tells.
+
+    `servo`: of the actuators on the (only) joint, with another gain or delay; None: as they are.
+    """
     model = Path(model)
     items = [profiles] if isinstance(profiles, str | Path | Profile) else list(profiles)
     loaded = [item if isinstance(item, Profile) else Profile.read(item) for item in items]
@@ -90,16 +95,18 @@ def attached(
     scene = EditedScene(model, spec, compiled, targets)
     for target, profile in zip(targets, loaded, strict=True):
         scene.add(target, profile, native, also)
+    if servo is not None:
+        scene.drive(targets[0], servo)
     content = scene.finish(output.parent)
-    _verify(output, content, compiled, scene.heavier or "armature" in also)
+    changed = ["dof_invweight0"] * (scene.heavier or "armature" in also)
+    changed += ["actuator_gainprm"] * (servo is not None)
+    _verify(output, content, compiled, changed)
     return content, scene.notes
 
 
-def _verify(output: Path, content: bytes, before: mujoco.MjModel, heavier: bool) -> None:
-    """Compiles the scene where it will lie; raises JodaError if it is not the model it was.
-
-    `heavier`: joints were given armature.
-    """
+def _verify(output: Path, content: bytes, before: mujoco.MjModel, changed: Collection[str]) -> None:
+    """Compiles the scene where it will lie; raises JodaError if it is not the model it was, but for
+    what was changed."""
     trial = output.with_name(f".{output.stem}.{os.getpid()}.xml")
     try:
         trial.write_bytes(content)
@@ -112,7 +119,7 @@ def _verify(output: Path, content: bytes, before: mujoco.MjModel, heavier: bool)
     finally:
         trial.unlink(missing_ok=True)
     for name in SAME:
-        if name == "dof_invweight0" and heavier:
+        if name in changed:
             continue
         old, new = np.array(getattr(before, name)), np.array(getattr(after, name))
         if old.shape != new.shape or not np.allclose(old, new, rtol=1e-3, atol=1e-6):

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from joda.scenes.engine import is_on, polynomial
 from joda.scenes.model import moves_with
 from joda.scenes.scene import DAMPING_ROW
 
@@ -13,18 +14,22 @@ TINY = 1e-6
 
 
 def acting_besides(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
-    """The tendons, equality constraints and media that act on a joint, by kind and name.
+    """The tendons, equality constraints and media that act on a joint, by kind and name, and what
+    of its own is not replayed.
 
     Args:
         model: compiled.
         joint: id of a hinge or slide.
     """
     moved = _moved_tendons(model, joint)
+    cubic = any(polynomial(model, "dof_damping", int(model.jnt_dofadr[joint]))[2:])
     medium = model.opt.density > 0 or model.opt.viscosity > 0
     return (
         *(_named("a tendon", model.tendon(k).name) for k in moved if _resists(model, k)),
         *(_named("an equality", model.equality(k).name) for k in _equalities(model, joint, moved)),
         *(["a medium (<option density viscosity wind>)"] if medium else []),
+        *(["its damping's third power"] if cubic and is_on(model, "damper") else []),
+        *([] if is_on(model, "limit") else ["the flag that disables its limits"]),
     )
 
 
@@ -69,7 +74,8 @@ def _equalities(model: mujoco.MjModel, joint: int, tendons: list[int]) -> list[i
             touches = bool(moved[bodies[0]]) != bool(moved[bodies[1]])
         else:
             touches = False
-        if touches and model.eq_active0[k] and DAMPING_ROW not in model.equality(k).name:
+        active = model.eq_active0[k] and is_on(model, "equality")
+        if touches and active and DAMPING_ROW not in model.equality(k).name:
             out.append(k)
     return out
 

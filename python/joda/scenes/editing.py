@@ -14,6 +14,7 @@ from joda.errors import JodaError
 from joda.field import evaluate
 from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
+from joda.scenes.actuators import Servo, redriven
 from joda.scenes.engine import is_discrete, polynomial
 from joda.scenes.limits import firm_limit, limit_parameters
 from joda.scenes.mjcf import Element, MjcfError, Source, quoted
@@ -39,6 +40,10 @@ class Instance:
     joint: int
     existing: str  # its name if it stands in <extension> already, else empty
     config: dict[str, str]
+
+
+OF_SHORTCUTS = ("kp", "kv", "dampratio", "inheritrange", *("gaintype", "biastype", "dyntype"))
+"""What <position>, <velocity> and <general> elements may have that is written anew."""
 
 
 class EditedScene:
@@ -114,6 +119,27 @@ class EditedScene:
         if damping_equality(self.model, joint) < 0:
             row, name = quoted(DAMPING_ROW + self.names[joint]), quoted(self.names[joint])
             self.rows.append(f"<joint name={row} joint1={name} {INERT}/>")
+
+    def drive(self, joint: int, servo: Servo) -> None:
+        """Gives the actuators on a joint another gain and delay."""
+        written = [
+            element
+            for section in self.source.root.children
+            if section.tag == "actuator"
+            for element in section.children
+        ]
+        if len(written) != self.model.nu:
+            raise JodaError(
+                f"{self.source.main.path}: the actuator of joint "
+                f"'{joint_name(self.model, joint)}' is not written there, and cannot be changed."
+            )
+        for k, values in redriven(self.model, joint, servo).items():
+            kept = {a: x for a, x in written[k].attributes.items() if a not in OF_SHORTCUTS}
+            text = " ".join(f"{a}={quoted(x)}" for a, x in {**kept, **values}.items())
+            written[k].replace(f"<general {text}/>")
+            told = f"gainprm {values['gainprm']}, biasprm {values['biasprm']}"
+            told += f", delay {values['delay']} s" if "delay" in values else ""
+            self._note(joint, f"has its actuator as <general> with {told}")
 
     def finish(self, folder: Path) -> bytes:
         """The text with the plugin's instances in it, for a file that will lie in `folder`."""

@@ -30,6 +30,20 @@ def polynomial(model: mujoco.MjModel, field: str, index: int) -> list[float]:
     return [getattr(model, field)[index], *(() if higher is None else higher[index])]
 
 
+def is_on(model: mujoco.MjModel, flag: str) -> bool:
+    """Whether what a flag of <option> can disable acts: "spring", "damper" (older MuJoCo:
+    "passive"), "frictionloss", "limit", "equality"; without "constraint" rows none of the last
+    three does."""
+    bits = {
+        name: int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}", 0))
+        for name in (flag, "passive", "constraint")
+    }
+    off = bits[flag] or bits["passive"]
+    if flag in ("frictionloss", "limit", "equality"):
+        off |= bits["constraint"]
+    return not model.opt.disableflags & off
+
+
 def inertia_at(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:
     """Inertia of a degree of freedom, all others held, after mj_fwdPosition (kg·m² or kg)."""
     unit, column = np.zeros(model.nv), np.zeros(model.nv)

@@ -17,7 +17,7 @@ def counted(run: Run) -> str:
 def unread(run: Run | QuasiStatic) -> str:
     """Speaks where a column that was not read may be a missing one."""
     timed = isinstance(run, Run)
-    if isinstance(run, Run) and run.forced:
+    if isinstance(run, Run) and run.pushed:
         return ""
     name, parts = ("force", FORCE) if timed else ("time", TIME)
     # columns of several joints (`force:JOINT`) are spoken of where they are read

@@ -26,7 +26,7 @@ def driven(run: Run, position: Array, sigma: float, unit: str) -> str:
     What springs, magnets and gravity store depends on the position alone, and all else takes
     energy: a later passage is never the faster one.
     """
-    if run.forced:
+    if run.pushed:
         return ""
     lo, hi = float(position.min()), float(position.max())
     grown: list[tuple[float, float, float, float, float]] = []

@@ -39,9 +39,11 @@ class Balance:
 
 
 def balance_of_run(run: Run, position: Array, sigma: float, context: Context) -> Balance | None:
-    """Impulses between times at which the velocity is estimated; None without a force."""
+    """Impulses between times at which the velocity is estimated; None without a force, or where
+    an actuator acts too."""
     time, known = run.time, ~np.isnan(run.force)
-    if not run.forced or not np.any(run.force[known]) or _one_way(position):
+    alone = run.forced and run.command is None
+    if not alone or not np.any(run.force[known]) or _one_way(position):
         return None
     spacing = max(0.05, 5 * np.median(np.diff(time)), (time[-1] - time[0]) / 200)
     edge = np.unique(np.searchsorted(time[:-1], np.arange(time[0], time[-1], spacing)))
