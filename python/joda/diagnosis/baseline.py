@@ -22,6 +22,8 @@ BASE_DOUBT = 0.15
 """How far off (one standard deviation, relative) the model's own strengths may be."""
 GAIN_AT_MOST, GAIN_DOUBT = 7.0, 0.7
 """Largest logarithm of the factor by which an actuator's gain may be off, and its doubt."""
+HELD = 1e-6
+"""Doubt of a number that is not there."""
 DELAY_AT_MOST, DELAY_DOUBT = 0.1, 0.02
 """Longest delay of commands, and its doubt, s."""
 SOFT = (0.02, 1.0)
@@ -39,7 +41,7 @@ AT_END = 0.02
 @dataclass(frozen=True)
 class Base:
     """The model as it is, with numbers: a factor for each of its components' strengths, and of an
-    actuator the logarithm of its gain's factor and its delay (s).
+    actuator the logarithms of its gain's and its damping's factors and its delay (s).
 
     Attributes:
         profile: of the joint.
@@ -64,9 +66,8 @@ class Base:
         """The joint but for its profile, with its actuator's numbers."""
         if (servo := self.single.servo) is None:
             return self.single
-        gain, delay = x[len(self.places) : self.count]
-        changed = replace(servo, gain=servo.gain * float(np.exp(gain)), delay=float(delay))
-        return replace(self.single, servo=changed)
+        gain, drag, delay = map(float, x[len(self.places) : self.count])
+        return replace(self.single, servo=servo.changed(np.exp(gain), np.exp(drag), delay))
 
     def written(self, x: Array) -> Profile:
         """The profile with its factors."""
@@ -115,13 +116,14 @@ def base_of(profile: Profile, single: Single, h: float) -> Base:
 
 
 def _of_servo(servo: Servo) -> Unknowns:
-    """Gain and delay of an actuator, of which a model's are rarely right."""
+    """Gain, damping and delay of an actuator, of which a model's are rarely right."""
+    damps = GAIN_DOUBT if servo.damping else HELD  # else only the joint's own does
     return Unknowns(
-        low=np.array([-GAIN_AT_MOST, 0.0]),
-        high=np.array([GAIN_AT_MOST, DELAY_AT_MOST]),
-        step=np.array([0.01, 2e-4]),
-        mean=np.array([0.0, servo.delay]),
-        doubt=np.array([GAIN_DOUBT, DELAY_DOUBT]),
+        low=np.array([-GAIN_AT_MOST, -GAIN_AT_MOST, 0.0]),
+        high=np.array([GAIN_AT_MOST, GAIN_AT_MOST, DELAY_AT_MOST]),
+        step=np.array([0.01, 0.01, 2e-4]),
+        mean=np.array([0.0, 0.0, servo.delay]),
+        doubt=np.array([GAIN_DOUBT, damps, DELAY_DOUBT]),
     )
 
 

@@ -23,7 +23,7 @@ CLEARLY = 3.0
 """And by so many of its standard errors."""
 ANYTHING = 10.0
 """How far off a number may be of which the data tell nothing, in its own unit."""
-GAIN, DELAY = "gain of the actuator", "delay of commands"
+GAIN, DRAG, DELAY = "gain of the actuator", "damping of the actuator", "delay of commands"
 """What the numbers of an actuator are called."""
 ALIKE = 0.12
 """By how much factors may differ that are one."""
@@ -106,7 +106,7 @@ class Number:
     def correction(self, joint: Joint) -> Correction:
         """The number as a correction of the model."""
         assert self.parameter is not None
-        name = self.parameter if self.parameter in NATIVE.values() else self.label
+        name = self.parameter if self.label in NATIVE else self.label
         return Correction(
             parameter=self.parameter,
             joint=joint.name,
@@ -141,15 +141,31 @@ def numbers(
         for place, part, factor, error in zip(base.places, parts, x, errors, strict=False)
     ]
     if servo is not None:
-        (gain, late), (doubt, uneven) = (own[len(out) : base.count] for own in (x, errors))
+        (gain, drag, late), (doubt, unsure, uneven) = (
+            own[len(out) : base.count] for own in (x, errors)
+        )
         factor, stiff = float(np.exp(gain)), servo.stiffness
         given, unit = (stiff, f"{joint.force_unit}/{joint.unit}") if stiff > 0 else (1.0, "")
         error = factor * float(doubt)
         out += [
             Number(GAIN, "actuator_gain", given, factor * given, error * given, unit, scale=given),
+            *_drag(servo, joint, out, (float(np.exp(drag)), float(unsure))),
             Number(DELAY, "time_delay", servo.delay, float(late), float(uneven), "s", scale=SLOW),
         ]
     return tuple(out)
+
+
+def _drag(
+    servo: Servo, joint: Joint, others: Sequence[Number], found: tuple[float, float]
+) -> list[Number]:
+    """The damping of an actuator that has some, which is told beside the joint's own."""
+    if not servo.damping:
+        return []
+    (factor, error), given = found, servo.damping
+    own = sum(one.given for one in others if one.parameter == "damping")
+    unit = f"{joint.force_unit}·s/{joint.unit}"
+    size = factor * given
+    return [Number(DRAG, "damping", given, size, error * size, unit, scale=given + own)]
 
 
 @dataclass(frozen=True)

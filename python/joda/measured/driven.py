@@ -1,19 +1,22 @@
-"""Runs of a joint that an actuator acts on, and columns of logs that are not read yet."""
+"""Logs of a joint, of joints that an actuator drives, and of several joints at once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from joda.errors import JodaError
-from joda.measured.runs import QuasiStatic, Run, evened, read_measurement
+from joda.measured.others import force_of_others
+from joda.measured.runs import QuasiStatic, Run, evened, read_measurement, read_together
 from joda.measured.table import header
-from joda.scenes.actuators import Servo, actuators_on, drive_of
+from joda.scenes.actuators import Drive, Servo, actuators_on, drive_of
 from joda.scenes.model import joint_name
 
 OF_JOINTS = ("position", "velocity", "force")
+SHOWN = 6
+"""Most joints that a note names."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +56,9 @@ def read_logs(
     read: list[Run | QuasiStatic] = []
     notes: list[str] = []
     for path, commanded in zip(files, told, strict=True):
-        notes += _unused(model, joint, path, acting if commanded else ())
-        one = read_measurement(path, drive if commanded else None)
+        own = drive if commanded else None
+        one, more = _read(model, joint, path, own)
+        notes += more
         if isinstance(one, Run):
             one, note = evened(one)
             notes += [note] if note else []
@@ -77,6 +81,38 @@ def read_logs(
             continue
         read.append(one)
     return Logs(tuple(read), drive.servo if drive else None, tuple(notes))
+
+
+def joints_in(model: mujoco.MjModel, path: Path) -> list[str]:
+    """The model's joints that a log of several has, in the model's order; none if it is of one."""
+    names = {name.lower() for name in header(path)}
+    if "position" in names:
+        return []
+    slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+    single = [k for k in range(model.njnt) if model.jnt_type[k] in (slide, hinge)]
+    every = [model.joint(k).name for k in single]
+    return [name for name in every if name and f"position:{name}".lower() in names]
+
+
+def _read(
+    model: mujoco.MjModel, joint: int, path: Path, drive: Drive | None
+) -> tuple[Run | QuasiStatic, list[str]]:
+    """A measurement of a joint, what other joints of its log do to it as a force; and notes."""
+    name, there = joint_name(model, joint), joints_in(model, path)
+    if name not in there:
+        unused = _unused(model, joint, path, drive.names if drive else ())
+        return read_measurement(path, drive), unused
+    run, positions = read_together(path, name, [one for one in there if one != name], drive)
+    by_id = {model.joint(one).id: position for one, position in positions.items()}
+    force = run.force + force_of_others(model, joint, run.time, by_id)
+    away = [model.joint(k).name or f"#{k}" for k in range(model.njnt) if k not in by_id]
+    notes = []
+    if away:
+        notes.append(
+            f"{path.name}: has no positions of {_listed(away[:SHOWN])}"
+            f"{' and others' if len(away) > SHOWN else ''}: held at the model's reference."
+        )
+    return replace(run, force=force, forced=True), notes
 
 
 def _commands(path: Path, acting: Sequence[str]) -> bool:
@@ -121,9 +157,8 @@ def _unused(model: mujoco.MjModel, joint: int, path: Path, commanded: Sequence[s
     others = [f"{kind}:{of}" for kind, of in kinds if kind in OF_JOINTS]
     if others and "position" not in {name.lower() for name in names}:
         raise JodaError(
-            f"{path}: logs of several joints are not supported yet ({_listed(others)}); give "
-            f"joint '{joint_name(model, joint)}' a file of its own, with the columns time, "
-            "position and perhaps velocity, force and the signals of its actuators."
+            f"{path}: no column 'position:{joint_name(model, joint)}'; it has {_listed(others)}. "
+            "Give the positions of this joint, or name one that the log has with --joint."
         )
     if not commands + others:
         return []

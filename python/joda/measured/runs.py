@@ -110,6 +110,32 @@ def read_run(path: str | Path) -> Run:
     return _run(_table(Path(path)), None)
 
 
+def read_together(
+    path: str | Path, joint: str, others: Sequence[str], drive: Drive | None = None
+) -> tuple[Run, dict[str, Array]]:
+    """Reads a run of several joints: columns `position:NAME`, perhaps `velocity:` and `force:`.
+
+    Args:
+        path: CSV, as in `read_measurement`.
+        joint: whose run it shall be.
+        others: whose positions are read besides.
+        drive: see `read_measurement`.
+
+    Returns:
+        the run, and the positions of the joint and the others by name, shape (n,) each.
+
+    Raises:
+        JodaError: it cannot be read; file, line and column are named.
+    """
+    own = {f"{name}:{joint}": name for name in COLUMNS if name != "time"}
+    places = [f"position:{name}" for name in others]
+    table = _table(Path(path), [*own, *places, *([] if drive is None else drive.columns)])
+    check_filled(table, (f"position:{joint}", *places), "a run needs every position")
+    positions = {name: table.columns[f"position:{name}"] for name in (joint, *others)}
+    columns = {own.get(name, name): values for name, values in table.columns.items()}
+    return _run(replace(table, columns=columns), drive), positions
+
+
 def _table(path: Path, more: Sequence[str] = ()) -> Table:
     return read_table(path, (*COLUMNS, *more), "time and position (or position and force)")
 

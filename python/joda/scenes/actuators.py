@@ -49,6 +49,12 @@ class Servo:
         free = self.gain * wanted - self.damping * velocity
         return np.asarray(np.clip(free, self.low, self.high))
 
+    def changed(self, gain: float, damping: float, delay: float) -> "Servo":
+        """The same with factors of its gain and of its damping, and another delay (s)."""
+        return replace(
+            self, gain=gain * self.gain, damping=damping * self.damping, delay=float(delay)
+        )
+
     def stepped(self, h: float) -> "Servo":
         """The same for steps of h (s), in which the engine takes the stiffness at their beginning:
         that takes h / 2 times it from the damping, to the first order, which is given back here."""
@@ -187,12 +193,14 @@ def redriven(model: mujoco.MjModel, joint: int, servo: Servo) -> dict[int, dict[
         by the actuators' ids.
     """
     out = {}
-    follows = not drive_of(model, joint).servo.stiffness
+    was = drive_of(model, joint).servo
+    follows = not was.stiffness
     for k in acting_on(model, joint):
         gain = servo.gain * float(model.actuator_gainprm[k, 0])
+        damps = servo.gain if follows else servo.damping / was.damping if was.damping else 1.0
         affine = int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
         bias = model.actuator_biasprm[k, :3] * affine
-        bias = bias * (servo.gain, servo.gain, servo.gain if follows else 1.0)
+        bias = bias * (servo.gain, servo.gain, damps)
         lo, hi = (float(x) for x in model.actuator_ctrlrange[k])
         out[k] = {
             "gaintype": "fixed",

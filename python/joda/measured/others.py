@@ -1,0 +1,80 @@
+"""What other joints of a log do to a joint: a force, by MuJoCo along the measured motion."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+Array = NDArray[np.float64]
+
+SMOOTHED, ORDER = 0.2, 3
+"""Time over which a motion is smoothed, s, and by polynomials of which order."""
+FEWEST = 7
+"""Samples over which it is smoothed at least."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Smoothed positions of a joint, with speeds and accelerations; shape (n,) each."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+def motion(time: Array, position: Array) -> Motion:
+    """A measured motion smoothed (Savitzky and Golay, Anal. Chem. 36 (1964) 1627)."""
+    count = len(time)
+    grid = np.linspace(time[0], time[-1], count)
+    gap = float(grid[1] - grid[0])
+    wide = min(max(round(SMOOTHED / gap), FEWEST) | 1, count - 1 + count % 2)
+    even = np.interp(grid, time, position)
+    found = [
+        np.interp(time, grid, savgol_filter(even, wide, min(ORDER, wide - 1), deriv=k, delta=gap))
+        for k in range(3)
+    ]
+    return Motion(*found)
+
+
+def force_of_others(
+    model: mujoco.MjModel, joint: int, time: Array, positions: Mapping[int, Array]
+) -> Array:
+    """The force on a joint of what else of the mechanism moves, or stands elsewhere.
+
+    It is the joint's inverse dynamics with all other joints at their reference, minus that along
+    the measured motion: with this force the joint by itself, all others held there, moves as it
+    does among them. Friction, damping and springs have no part in it.
+
+    Args:
+        model: compiled.
+        joint: its id.
+        time: s, shape (n,).
+        positions: measured, of the joint and others, by their ids; rad or m, shape (n,) each.
+
+    Returns:
+        N·m or N, shape (n,).
+    """
+    data, dof = mujoco.MjData(model), int(model.jnt_dofadr[joint])
+    motions = {k: motion(time, position) for k, position in positions.items()}
+    out, torque = np.empty(len(time)), np.empty(model.nv)
+
+    def needed(moving: Mapping[int, Motion], k: int, still: bool) -> float:
+        data.qpos[:], data.qvel[:], data.qacc[:] = model.qpos0, 0.0, 0.0
+        for number, own in moving.items():
+            adr, at = model.jnt_qposadr[number], model.jnt_dofadr[number]
+            data.qpos[adr] = own.position[k]
+            data.qvel[at] = 0.0 if still else own.velocity[k]
+            data.qacc[at] = own.acceleration[k]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 1, torque)
+        return float(torque[dof])
+
+    alone = {joint: motions[joint]}
+    for k in range(len(time)):
+        out[k] = needed(alone, k, True) - needed(motions, k, False)
+    return out
