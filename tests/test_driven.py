@@ -160,13 +160,11 @@ def test_commands_of_what_was_off_or_is_elsewhere_are_named(tmp_path):
     assert "not used: 'ctrl:lamp'" in note
 
 
-def test_columns_of_several_joints_are_named(tmp_path):
+def test_columns_of_other_joints_are_named(tmp_path):
     model = write(tmp_path, ARM.format(actuator=""), "arm.xml")
     run = headed(tmp_path, "position", "position:elbow")
-    with pytest.raises(
-        JodaError, match=r"several joints are not supported yet \('position:elbow'\)"
-    ):
-        read_measured(model, "elbow", [run])
+    with pytest.raises(JodaError, match=r"no column 'position:wrist'; it has 'position:elbow'\."):
+        read_measured(model, "wrist", [run])
     run = headed(tmp_path, "force", "force:wrist")
     (note,) = read_measured(model, "elbow", [run]).notes
     assert "not used: 'force:wrist'" in note

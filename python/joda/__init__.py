@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from joda.commands.demo import demo
     from joda.commands.diagnose import diagnose
     from joda.commands.doctor import doctor
+    from joda.commands.each_joint import compare_all, diagnose_all
     from joda.commands.estimate import estimate
     from joda.commands.evaluate import evaluate
     from joda.commands.export import export
@@ -56,10 +57,12 @@ __all__ = [
     "attach",
     "bench",
     "compare",
+    "compare_all",
     "compile",
     "context",
     "demo",
     "diagnose",
+    "diagnose_all",
     "distribute",
     "doctor",
     "estimate",
@@ -118,8 +121,10 @@ _LAZY = {
     "Decision": "joda.commands.review",
     "Profile": "joda.profile",
     "attach": "joda.scenes.attaching",
+    "compare_all": "joda.commands.each_joint",
     "compile": "joda.compiling",
     "context": "joda.scenes.context",
+    "diagnose_all": "joda.commands.each_joint",
     "distribute": "joda.distributed.folder",
     "estimate": "joda.commands.estimate",
     "experiments": "joda.cases.experiments",

@@ -7,13 +7,25 @@ from typing import Annotated
 
 import typer
 
-from joda.cli.options import Force, Joint, Json, Model, Passive, Runs, Scene
+from joda.cli.options import (
+    Force,
+    Joint,
+    Joints,
+    Json,
+    Model,
+    Passive,
+    Runs,
+    Scene,
+    one_joint_only,
+    several,
+)
 from joda.cli.progress import loss_bar, spinner
 from joda.cli.say import say
 from joda.cli.tell import (
     print_json,
     tell_changes,
     tell_errors,
+    tell_joints,
     tell_ratios,
     tell_worlds,
     with_text_paths,
@@ -79,7 +91,7 @@ def refine(
 def compare(
     model: Model,
     runs: Runs,
-    joint: Joint,
+    joint: Joints = None,
     as_json: Annotated[
         Path | None, typer.Option("--json", help="Write all numbers to this file.")
     ] = None,
@@ -101,9 +113,23 @@ def compare(
     from joda import compare as run
     from joda.measured.comparison import sentences
 
+    if several(joint):
+        one_joint_only(report, output)
+        from joda import compare_all
+
+        with spinner("compare") as progress:
+            every = compare_all(
+                model, runs, joint or (), passive=passive, json=as_json, force=force,
+                progress=progress,
+            )  # fmt: skip
+        tell_joints(every)
+        if as_json:
+            say(as_json)
+        return
+    assert joint
     with spinner("compare") as progress:
         found = run(
-            model, joint, runs, passive=passive, json=as_json, report=report, picture=output,
+            model, joint[0], runs, passive=passive, json=as_json, report=report, picture=output,
             force=force, progress=progress,
         )  # fmt: skip
     for sentence in (*found.notes, *sentences(found)):

@@ -5,7 +5,18 @@ from typing import Annotated
 
 import typer
 
-from joda.cli.options import Force, Joint, Json, Model, Passive, Runs, Scene
+from joda.cli.options import (
+    Force,
+    Joint,
+    Joints,
+    Json,
+    Model,
+    Passive,
+    Runs,
+    Scene,
+    one_joint_only,
+    several,
+)
 from joda.cli.progress import progress_bar, spinner
 from joda.cli.say import say
 from joda.cli.tell import print_json
@@ -16,7 +27,7 @@ Report = Annotated[Path | None, typer.Option(help="Write an HTML page with pictu
 def diagnose(
     model: Model,
     runs: Runs,
-    joint: Joint,
+    joint: Joints = None,
     as_json: Annotated[
         Path | None, typer.Option("--json", help="Write the diagnosis to this file, for joda add.")
     ] = None,
@@ -39,9 +50,26 @@ def diagnose(
     from joda import diagnose as run
     from joda.commands.diagnose import sentences
 
+    if several(joint):
+        one_joint_only(report, output)
+        from joda import diagnose_all
+
+        with progress_bar() as bar:
+            every = diagnose_all(
+                model, runs, joint or (), exclude=exclude or (), passive=passive, json=as_json,
+                force=force, progress=bar,
+            )  # fmt: skip
+        for name, one in every.items():
+            say(f"{name}:")
+            for sentence in sentences(one):
+                say(f"  {sentence}")
+        if as_json:
+            say(as_json)
+        return
+    assert joint
     with progress_bar() as bar:
         found = run(
-            model, joint, runs, exclude=exclude or (), json=as_json, report=report,
+            model, joint[0], runs, exclude=exclude or (), json=as_json, report=report,
             picture=output, passive=passive, force=force, progress=bar,
         )  # fmt: skip
     for sentence in sentences(found):

@@ -1,9 +1,12 @@
 """Arguments and options that several commands have."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
+
+from joda.errors import JodaError
 
 Force = Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
@@ -14,6 +17,15 @@ Runs = Annotated[
 ]
 Joint = Annotated[
     str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
+]
+Joints = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--joint",
+        help="A name, body:NAME[:K] or #K; of logs with position:JOINT several, or all [default: "
+        "all].",
+        show_default=False,
+    ),
 ]
 Passive = Annotated[
     bool, typer.Option("--passive", help="The joint's actuators were off while it was measured.")
@@ -53,3 +65,15 @@ Proposer = Annotated[
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with what the folder holds.")]
 Rounds = Annotated[int, typer.Option(min=1, help="At most so many proposals.")]
+
+
+def several(joints: Sequence[str] | None) -> bool:
+    """Whether `--joint` means several joints of a log, or all."""
+    return not joints or len(joints) > 1 or joints[0] == "all"
+
+
+def one_joint_only(report: Path | None, picture: Path | None) -> None:
+    """Raises JodaError where pictures are asked for of several joints."""
+    if report or picture:
+        option = "--report" if report else "-o"
+        raise JodaError(f"{option} is of one joint; name it with --joint, or use --json.")

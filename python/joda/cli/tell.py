@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from joda.commands.bench import Row
     from joda.commands.demo import Demo
     from joda.commands.doctor import Check
+    from joda.commands.each_joint import Compared
     from joda.commands.estimate import Estimate
     from joda.commands.evaluate import Evaluation
     from joda.commands.generate import Generated
@@ -247,6 +248,23 @@ def tell_errors(result: "Refined", unit: str) -> None:
         if places:
             where = ", ".join(f"s = {a:.2f} to {b:.2f}" for a, b in places)
             say(f"The data tell little of {channel} at {where}: it is hardly measured there.")
+
+
+def tell_joints(found: "Compared") -> None:
+    """Errors of all joints of logs of several, a row each, and what is said of each."""
+    rows: list[tuple[str, ...]] = []
+    rows.append(("joint", "whole runs", "windows of 0.4 s", "noise", "all joints at once"))
+    for name, one in found.joints.items():
+        errors = one.rmse, one.rmse_window, one.noise_floor, found.rmse(name)
+        rows.append((name, *("" if x is None else f"{x:.3g} {one.unit}" for x in errors)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        say("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip())
+    if not found.together:
+        say("Not replayed all at once: the logs have not the command of every actuator on them.")
+    notes = dict.fromkeys(note for one in found.joints.values() for note in one.notes)
+    for note in notes:
+        say(note)
 
 
 def tell_ratios(rows: "Iterable[Row]") -> None:

@@ -10,9 +10,9 @@ from scipy.signal import savgol_filter
 
 Array = NDArray[np.float64]
 
-SMOOTHED, ORDER = 0.2, 3
+SMOOTHED, ORDER = 0.3, 5
 """Time over which a motion is smoothed, s, and by polynomials of which order."""
-FEWEST = 7
+FEWEST = 9
 """Samples over which it is smoothed at least."""
 
 

@@ -51,9 +51,8 @@ class Servo:
 
     def changed(self, gain: float, damping: float, delay: float) -> "Servo":
         """The same with factors of its gain and of its damping, and another delay (s)."""
-        return replace(
-            self, gain=gain * self.gain, damping=damping * self.damping, delay=float(delay)
-        )
+        gain, damping = float(gain * self.gain), float(damping * self.damping)
+        return replace(self, gain=gain, damping=damping, delay=float(delay))
 
     def stepped(self, h: float) -> "Servo":
         """The same for steps of h (s), in which the engine takes the stiffness at their beginning:

@@ -1,0 +1,141 @@
+"""Logs of several joints: what the others do to one, each by itself, and all at once."""
+
+import json
+
+import mujoco
+import numpy as np
+import pytest
+
+from joda import JodaError, compare, compare_all, diagnose_all
+from joda.measured.others import force_of_others
+from joda.measured.reading import read_measured
+from joda.measured.scene_replay import replayed_together
+
+ARM = """<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.002" integrator="implicitfast"/>
+  <worldbody>
+    <body>
+      <joint name="shoulder" axis="0 1 0" range="-2 2" limited="true" damping=".1"/>
+      <inertial pos="0.2 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
+      <body pos="0.4 0 0">
+        <joint name="elbow" axis="0 1 0" range="-2 2" limited="true" damping=".05"/>
+        <inertial pos="0.15 0 0" mass="0.8" diaginertia="0.01 0.01 0.01"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="first" joint="shoulder" kp="80" kv="6"/>
+    <position name="second" joint="elbow" kp="{kp}" kv="1.5"/>
+  </actuator>
+</mujoco>
+"""
+NOISE = 3e-4
+
+
+def model(folder, kp=30.0):
+    path = folder / f"arm_{kp:g}.xml"
+    path.write_text(ARM.format(kp=kp))
+    return path
+
+
+def log(path, seed, seconds=6.0, header=True, kp=30.0):
+    """The arm in MuJoCo under smooth commands of both joints, logged at 100 Hz."""
+    arm = mujoco.MjModel.from_xml_string(ARM.format(kp=kp))
+    data, rng, rows = mujoco.MjData(arm), np.random.default_rng(seed), []
+    pace, phase = rng.uniform(0.3, 1.0, (2, 3)), rng.uniform(0, 2 * np.pi, (2, 3))
+
+    def command(time):
+        ramp = 1 - np.exp(-(time**2))  # it begins at rest
+        return 0.3 * ramp * np.sin(2 * np.pi * pace * time + phase).sum(axis=1)
+
+    weight = [0.2 * 9.81 + 0.8 * 9.81 * 0.55, 0.8 * 9.81 * 0.15]
+    data.qpos[:] = np.array(weight) / (80, kp)  # where the servos hold it
+    data.qvel[:] = 0.0
+    for _ in range(2000):
+        mujoco.mj_step(arm, data)
+    data.time = 0.0
+    for _ in range(round(seconds * 100)):
+        data.ctrl[:] = command(data.time)
+        rows.append((data.time, *(data.qpos + rng.normal(0, NOISE, 2)), *data.ctrl))
+        mujoco.mj_step(arm, data, 5)
+    names = "time,position:shoulder,position:elbow,ctrl:first,ctrl:second"
+    path.write_text("\n".join([names, *(",".join(f"{x:.7f}" for x in row) for row in rows)]) + "\n")
+    return path
+
+
+def logs(folder, count=2, **more):
+    seeds = np.random.SeedSequence().generate_state(count)
+    return [log(folder / f"log{k}.csv", int(seed), **more) for k, seed in enumerate(seeds)]
+
+
+def test_the_force_of_the_others_is_that_of_a_planar_arm():
+    """Two-link arm in closed form (Craig, Introduction to Robotics, section 6.7), rods of one
+    point mass each and inertias about it."""
+    arm = mujoco.MjModel.from_xml_string(ARM.format(kp=30))
+    time = np.linspace(0, 4, 801)
+    q = np.stack([0.8 * np.sin(2.1 * time), 0.7 * np.cos(1.7 * time)])
+    v = np.stack([0.8 * 2.1 * np.cos(2.1 * time), -0.7 * 1.7 * np.sin(1.7 * time)])
+    a = np.stack([-(2.1**2) * q[0], -(1.7**2) * q[1]])
+    m2, l1, c2 = 0.8, 0.4, 0.15
+    cos = np.cos(q[1])
+    inertia = 0.01 + m2 * c2**2
+    torque = (
+        inertia * (a[0] + a[1])
+        + m2 * l1 * c2 * (cos * a[0] + np.sin(q[1]) * v[0] ** 2)
+        - m2 * 9.81 * c2 * np.cos(q[0] + q[1])  # about +y a weight at +x pulls towards +q
+    )
+    alone = inertia * a[1] - m2 * 9.81 * c2 * np.cos(q[1])
+    found = force_of_others(arm, 1, time, {0: q[0], 1: q[1]})
+    inner = slice(40, -40)  # the ends are smoothed from one side
+    np.testing.assert_allclose(found[inner], (alone - torque)[inner], atol=0.02)
+    assert np.ptp(found) > 1.0
+
+
+def test_each_joint_is_replayed_among_the_others(tmp_path):
+    runs = logs(tmp_path)
+    for joint in ("shoulder", "elbow"):
+        found = compare(model(tmp_path), joint, runs)
+        assert found.rmse < 5 * NOISE, joint
+    wrong = compare(model(tmp_path, kp=20.0), "elbow", runs)
+    assert wrong.rmse > 20 * NOISE
+
+
+def test_all_at_once_are_replayed_in_the_scene(tmp_path):
+    runs = logs(tmp_path)
+    arm = mujoco.MjModel.from_xml_path(str(model(tmp_path)))
+    for one in replayed_together(arm, runs):
+        assert max(one.rmse.values()) < 2 * NOISE
+    found = compare_all(model(tmp_path, kp=20.0), runs, json=tmp_path / "c.json")
+    assert list(found.joints) == ["shoulder", "elbow"]
+    assert found.rmse("elbow") > 20 * NOISE
+    written = json.loads((tmp_path / "c.json").read_text())["joints"]
+    assert written["elbow"]["rmse_together"] == found.rmse("elbow")
+    assert written["shoulder"]["rmse"] == found.joints["shoulder"].rmse
+
+
+def test_the_joint_whose_gain_is_off_is_found(tmp_path):
+    runs = logs(tmp_path, 3)
+    found = diagnose_all(model(tmp_path, kp=60.0), runs, ["elbow"], json=tmp_path / "d.json")
+    by_name = {one.parameter: one for one in found["elbow"].corrections}
+    assert abs(by_name["actuator_gain"].value - 30) < 1.5
+    assert "time_delay" not in by_name
+    written = json.loads((tmp_path / "d.json").read_text())["joints"]["elbow"]
+    assert written["verdict"] == found["elbow"].verdict
+
+
+def test_a_joint_that_the_log_has_not_stays_at_its_reference(tmp_path):
+    run = log(tmp_path / "log.csv", 0)
+    text = run.read_text().replace("position:shoulder", "position:lamp")
+    run.write_text(text)
+    (note,) = (n for n in read_measured(model(tmp_path), "elbow", [run]).notes if "held" in n)
+    assert note == "log.csv: has no positions of 'shoulder': held at the model's reference."
+
+
+def test_a_log_of_one_joint_needs_its_name(tmp_path):
+    run = tmp_path / "one.csv"
+    run.write_text("\n".join(["time,position", *(f"{k / 50},{k / 100}" for k in range(60))]))
+    with pytest.raises(
+        JodaError, match=r"one\.csv: has no columns 'position:JOINT' of the model's"
+    ):
+        compare_all(model(tmp_path), [run])
