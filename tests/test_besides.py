@@ -1,5 +1,7 @@
 """What acts on a joint besides itself is said, and then a model is never cleared."""
 
+import mujoco
+import numpy as np
 import pytest
 from test_compare import SCENE, door, runs_of, scene_of
 
@@ -18,7 +20,14 @@ ELEMENTS = {
         '<connect name="rod" body1="part" body2="other" anchor="0 0 0"/>'
     ),
     "a medium": '<option density="50" wind="0 8 0"/>',
+    "the flag that disables its limits": '<option><flag limit="disable"/></option>',
 }
+OWN = """<mujoco><compiler angle="radian"/><option timestep=".002" integrator="implicitfast">
+    <flag {flag}/></option>
+  <worldbody><body><joint name="j" axis="0 1 0" range="-2 2" limited="true" {own}/>
+    <inertial pos=".1 0 .05" mass="1" diaginertia=".02 .02 .02"/></body></worldbody></mujoco>"""
+ALL = 'damping=".3" frictionloss=".1" stiffness="2" springref=".4"'
+POLYNOMIALS = mujoco.mj_version() >= 3009000
 
 
 def scene_with(folder, extra):
@@ -48,3 +57,54 @@ def test_other_tendons_and_joda_s_own_are_none(tmp_path):
     for extra in (FIXED.format("slack", ""), wheel):
         found = compare(scene_with(tmp_path, extra), "joint", runs)
         assert not [note for note in found.notes if "leaves that out" in note]
+
+
+def own_runs(folder, text, sigma=3e-4):
+    """Two free runs of a joint in MuJoCo as its scene has it."""
+    model = mujoco.MjModel.from_xml_string(text)
+    rng, paths = np.random.default_rng(), []
+    for k, start in enumerate((-1.0, 1.2)):
+        data, rows = mujoco.MjData(model), []
+        data.qpos[0] = start
+        while data.time < 3:
+            rows.append((data.time, data.qpos[0] + rng.normal(0, sigma)))
+            mujoco.mj_step(model, data, 5)
+        paths.append(folder / f"own{k}.csv")
+        lines = [f"{t:.5f},{q:.7f}" for t, q in rows]
+        paths[-1].write_text("\n".join(["time,position", *lines]) + "\n")
+    return paths
+
+
+@pytest.mark.parametrize(
+    ("flag", "own"),
+    [
+        ('frictionloss="disable"', ALL),
+        ('damper="disable"', ALL),
+        ('spring="disable"', ALL),
+        ('constraint="disable"', ALL.replace("frictionloss", "armature")),
+        pytest.param(
+            'gravity="enable"',
+            'damping=".3" stiffness="2 3 4" springref=".4"',
+            marks=pytest.mark.skipif(not POLYNOMIALS, reason="this MuJoCo has no polynomials"),
+        ),
+    ],
+)
+def test_what_the_scene_switches_off_or_bends_is_replayed_so(flag, own, tmp_path):
+    text = OWN.format(flag=flag, own=own)
+    (tmp_path / "scene.xml").write_text(text)
+    found = compare(tmp_path / "scene.xml", "j", own_runs(tmp_path, text))
+    assert found.rmse < (5 if "3 4" in own else 1.5) * found.noise_floor
+    plain = OWN.format(flag='gravity="enable"', own=ALL)
+    (tmp_path / "plain.xml").write_text(plain)
+    wrong = compare(tmp_path / "plain.xml", "j", own_runs(tmp_path, text))
+    assert wrong.adequacy.verdict == "beyond_noise" and wrong.rmse > 10 * wrong.noise_floor
+
+
+@pytest.mark.skipif(not POLYNOMIALS, reason="this MuJoCo has no polynomials")
+def test_the_third_power_of_damping_never_clears_a_model(tmp_path):
+    text = OWN.format(flag='gravity="enable"', own='damping="1 0 2"')
+    (tmp_path / "scene.xml").write_text(text)
+    runs = own_runs(tmp_path, text.replace("1 0 2", "1"))  # as it would be without
+    found = compare(tmp_path / "scene.xml", "j", runs)
+    assert any("its damping's third power" in note for note in found.notes)
+    assert found.adequacy.verdict == "not_enough_data"

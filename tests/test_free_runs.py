@@ -1,5 +1,6 @@
 """What free runs as a whole tell, in which errors add up that windows cannot see."""
 
+import mujoco
 import numpy as np
 import pytest
 from lids import FRICTION, INERTIA, SIGMA, thrown
@@ -9,6 +10,7 @@ from joda.diagnosis.asking import asked
 from joda.diagnosis.verdict import diagnosed
 from joda.diagnosis.whole import free_runs
 from joda.errors import JodaError
+from joda.measured.comparison import sentences
 from joda.measured.reading import read_measured
 from joda.measured.runs import write_run
 from joda.measured.whiteness import drift, drifts, free_parts, long_run_variance
@@ -84,6 +86,39 @@ def test_the_long_run_variance_of_a_moving_mean(rng):
 
 def test_without_a_free_run_nothing_drifts():
     assert drifts([], []) == 1.0
+
+
+def test_what_errors_of_a_force_make_is_no_drift(rng):
+    moved = rng.standard_normal(SAMPLES) + np.linspace(-1, 1, SAMPLES)
+    assert drift(moved, np.arange(SAMPLES), 0.0) < 1e-6
+    assert drift(moved, np.arange(SAMPLES), 0.0, moved=1.0) > 0.05
+
+
+def test_a_small_fault_under_a_force_is_not_cleared(tmp_path):
+    """Friction a tenth off in pushed runs, each window of which hides it."""
+    model = """<mujoco><compiler angle="radian"/><option timestep=".002"/><worldbody><body>
+      <joint name="j" range="-9 9" limited="true" damping="{}"/>
+      <inertial pos="0 0 0" mass="1" diaginertia=".5 .5 .5"/></body></worldbody></mujoco>"""
+    (tmp_path / "m.xml").write_text(model.format(1.0))
+    (tmp_path / "true.xml").write_text(model.format(1.1))
+    rng, paths = np.random.default_rng(), []
+    plant = mujoco.MjModel.from_xml_path(str(tmp_path / "true.xml"))
+    for k in range(4):
+        data, rows, phase = mujoco.MjData(plant), [], rng.uniform(0, 6)
+        while data.time < 6:
+            force = 0.6 * np.sin(1.5 * data.time + phase)
+            rows.append((data.time, data.qpos[0] + rng.normal(0, 0.005), force))
+            for _ in range(5):
+                data.qfrc_applied[0] = 0.6 * np.sin(1.5 * data.time + phase)
+                mujoco.mj_step(plant, data)
+        paths.append(tmp_path / f"{k}.csv")
+        lines = [f"{t:.5f},{q:.6f},{f:.8f}" for t, q, f in rows]
+        paths[-1].write_text("\n".join(["time,position,force", *lines]) + "\n")
+    found = compare(tmp_path / "m.xml", "j", paths)
+    assert found.adequacy.verdict != "within_noise"
+    assert "no fault of the model" not in " ".join(sentences(found))
+    right = compare(tmp_path / "true.xml", "j", paths)
+    assert not right.adequacy.adrift
 
 
 # --- of a joint

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from joda import JodaError, compare, compare_all, diagnose_all
+from joda import JodaError, compare, compare_all, diagnose_all, improve_all
 from joda.measured.others import force_of_others
 from joda.measured.reading import read_measured
 from joda.measured.scene_replay import replayed_together
@@ -114,14 +114,21 @@ def test_all_at_once_are_replayed_in_the_scene(tmp_path):
     assert written["shoulder"]["rmse"] == found.joints["shoulder"].rmse
 
 
-def test_the_joint_whose_gain_is_off_is_found(tmp_path):
-    runs = logs(tmp_path, 3)
-    found = diagnose_all(model(tmp_path, kp=60.0), runs, ["elbow"], json=tmp_path / "d.json")
+def test_the_joint_whose_gain_is_off_is_found_and_mended(tmp_path):
+    runs, given = logs(tmp_path, 3), model(tmp_path, kp=60.0)
+    found = diagnose_all(given, runs, ["elbow"], json=tmp_path / "d.json")
     by_name = {one.parameter: one for one in found["elbow"].corrections}
     assert abs(by_name["actuator_gain"].value - 30) < 1.5
     assert "time_delay" not in by_name
     written = json.loads((tmp_path / "d.json").read_text())["joints"]["elbow"]
     assert written["verdict"] == found["elbow"].verdict
+
+    done = improve_all(given, runs, tmp_path / "new.xml")
+    assert list(done) == ["shoulder", "elbow"] and done["shoulder"].scene is None
+    assert done["elbow"].picture == tmp_path / "new.elbow.png" and done["elbow"].picture.exists()
+    new = mujoco.MjModel.from_xml_path(str(tmp_path / "new.xml"))
+    assert new.actuator_gainprm[:, 0] == pytest.approx([80, 30], rel=0.03)
+    assert compare_all(tmp_path / "new.xml", runs).rmse("elbow") < 6 * NOISE
 
 
 def test_a_joint_that_the_log_has_not_stays_at_its_reference(tmp_path):

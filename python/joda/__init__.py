@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from joda.commands.demo import demo
     from joda.commands.diagnose import diagnose
     from joda.commands.doctor import doctor
-    from joda.commands.each_joint import compare_all, diagnose_all
+    from joda.commands.each_joint import compare_all, diagnose_all, improve_all
     from joda.commands.estimate import estimate
     from joda.commands.evaluate import evaluate
     from joda.commands.export import export
@@ -74,6 +74,7 @@ __all__ = [
     "hidden_effect",
     "import_log",
     "improve",
+    "improve_all",
     "plot",
     "plugin_path",
     "read_profiles",
@@ -131,6 +132,7 @@ _LAZY = {
     "generate_all": "joda.commands.generate_all",
     "hidden_effect": "joda.commands.hidden_effect",
     "import_log": "joda.commands.import_log",
+    "improve_all": "joda.commands.each_joint",
     "read_profiles": "joda.scenes.scene",
     "render": "joda.pictures.positions",
     "set_profile": "joda.scenes.scene",

@@ -120,8 +120,8 @@ def add(
 def improve(
     model: Model,
     runs: Runs,
-    joint: Joint,
     output: Scene,
+    joint: Joints = None,
     report: Report = None,
     passive: Passive = False,
     force: Force = False,
@@ -136,9 +136,25 @@ def improve(
     from joda import improve as run
     from joda.commands.improve import sentences
 
+    if several(joint):
+        one_joint_only(report, None)
+        from joda import improve_all
+
+        with spinner("improve") as progress:
+            every = improve_all(
+                model, runs, output, joint or (), passive=passive, force=force, progress=progress
+            )
+        for name, one in every.items():
+            say(f"{name}:")
+            for sentence in sentences(one):
+                say(f"  {sentence}")
+            for path in filter(None, (one.scene, one.composed, one.picture)):
+                say(path)
+        return
+    assert joint
     with spinner("improve") as progress:
         result = run(
-            model, joint, runs, output, report=report, passive=passive, force=force,
+            model, joint[0], runs, output, report=report, passive=passive, force=force,
             progress=progress,
         )  # fmt: skip
     for sentence in sentences(result):

@@ -1,7 +1,7 @@
-"""Compares and diagnoses every joint of logs of several joints, one by one."""
+"""Compares, diagnoses and improves every joint of logs of several joints, one by one."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from json import dumps, loads
 from pathlib import Path
 
@@ -9,9 +9,11 @@ import numpy as np
 
 from joda.commands.compare import compare
 from joda.commands.diagnose import diagnose
+from joda.commands.improve import Improved, improve
 from joda.diagnosis.findings import Diagnosis
+from joda.diagnosis.improving import INTERRUPTED
 from joda.errors import JodaError
-from joda.files import check_targets, write_text
+from joda.files import check_targets, file_name, named_like, write_text
 from joda.measured.comparison import Comparison
 from joda.measured.driven import joints_in
 from joda.measured.scene_replay import Together, replayed_together
@@ -123,6 +125,61 @@ def diagnose_all(
         if json:  # what is done stays, whatever ends the rest
             own = {joint: loads(one.to_json()) for joint, one in found.items()}
             write_text(Path(json), dumps({"joints": own}, indent=2, ensure_ascii=False) + "\n")
+    return found
+
+
+def improve_all(
+    model: str | Path,
+    runs: Sequence[str | Path],
+    output: str | Path,
+    joints: Sequence[str] = (ALL,),
+    *,
+    passive: bool = False,
+    force: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> dict[str, Improved]:
+    """Improves one joint of logs of several joints after the other, as `joda.improve` does.
+
+    Args:
+        model, runs, joints, passive: as in `compare_all`.
+        output: scene to write; beside it, with its name and each joint's, go .composed.json and
+            .png. What is done is written joint by joint, and stays if the rest is interrupted.
+        force: overwrite what exists.
+        progress: told what is being done.
+
+    Returns:
+        what was done by joint; no scene is written where nothing was.
+
+    Raises:
+        JodaError: as `joda.improve`.
+    """
+    target, names = Path(output), named(model, runs, joints)
+    suffixes = ".composed.json", ".png"
+    kept = {
+        (name, end): named_like(target, f".{file_name(name)}{end}")
+        for name in names
+        for end in suffixes
+    }
+    check_targets([target, *kept.values()], force, [model, *runs])
+    found: dict[str, Improved] = {}
+    current = Path(model)
+    for name in names:
+
+        def told(what: str, name: str = name) -> None:
+            progress(f"{name}: {what}")
+
+        done = improve(
+            current, name, runs, target, passive=passive, force=force or bool(found), progress=told
+        )
+        if done.scene and done.composed and done.picture:
+            current = done.scene
+            composed, picture = (kept[name, end] for end in suffixes)
+            done.composed.replace(composed)
+            done.picture.replace(picture)
+            done = replace(done, composed=composed, picture=picture)
+        found[name] = done
+        if done.why == INTERRUPTED:
+            break
     return found
 
 

@@ -30,8 +30,8 @@ class Improved:
     """What an improvement did.
 
     Attributes:
-        scene, composed, picture: the files that were written; None where no effect was added: then
-            only the report is.
+        scene, composed, picture: the files that were written; None where nothing was added or
+            corrected: then only the report is.
         joint: its name.
         steps: the model as it was, then with one effect more each.
         why: it ended, a sentence.

@@ -170,7 +170,7 @@ def asked(measured: Measured, length: float | None = None, near: Array | None = 
     single, own = single_for(measured, windows.h), measured.own_row
     base = base_of(measured.profile, single, windows.h)
     fit, given = _fitted(judge, base, near)
-    if measured.runs and own:
+    if measured.runs and own and measured.profile.channels.friction.components:
         yielding = base_of(measured.profile, replace(single, friction_row=own), windows.h)
         fit_so, given_so = _fitted(judge, yielding, near)
         calm = excess(fit_so.loss, max(judge.samples, 1.0)) < CALM  # else something else is missing

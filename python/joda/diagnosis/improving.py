@@ -27,6 +27,7 @@ TRIED = 3
 LIKELY = 0.1
 """Least probability of an effect, besides the first, that is tried."""
 NOTHING_HELPS = "No likely effect clearly lowers the error on what was held out of the fit."
+INTERRUPTED = "Interrupted; what was found until then is kept."
 WORTH, MUCH = 0.95, 0.8
 """Part of the error before, on runs held out, to which an effect must bring it: a likely one; one
 that is tried because nothing is likely and the first did not."""
@@ -99,7 +100,7 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
             steps += [replace(step, servo=steps[-1].servo) for step in more]
             steps = _named_anew(parts, steps, told)
     except KeyboardInterrupt:
-        why = "Interrupted; what was found until then is kept."
+        why = INTERRUPTED
     return tuple(steps), why
 
 

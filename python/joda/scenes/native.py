@@ -116,10 +116,11 @@ def native_attributes(profile: Profile) -> dict[str, tuple[float, ...]]:
 
 def own_friction_row(model: mujoco.MjModel, joint: int) -> Row | None:
     """solref and solimp of the friction row that MuJoCo makes of a joint's native friction; None if
-    it has none, or the joint carries a profile, which makes that row its own."""
+    it has no native friction nor damping, or carries a profile, which makes that row its own."""
     dof = model.jnt_dofadr[joint]
     rubs = is_on(model, "frictionloss") and model.dof_frictionloss[dof] > LEAST
-    if not rubs or joint_name(model, joint) in profiles_of(model):
+    damps = is_on(model, "damper") and model.dof_damping[dof] > 0
+    if not (rubs or damps) or joint_name(model, joint) in profiles_of(model):
         return None
     row = model.dof_solref[dof], model.dof_solimp[dof]
     return tuple(map(float, row[0])), tuple(map(float, row[1]))
