@@ -41,12 +41,15 @@ bool IsFinite(const Solo::State& state) {
 }  // namespace
 
 Solo::Solo(const Body& body, const Servo& servo, const char* const texts[kTexts])
-    : body_(body),
-      servo_(servo),
-      profile_(ParseProfile("", body.range[0], body.range[1], texts)) {
+    : body_(body), servo_(servo), profile_(ParseProfile("", body.range[0], body.range[1], texts)) {
   if (!(body_.range[0] < body_.range[1])) {
     throw std::invalid_argument("the range must be two increasing numbers");
   }
+  const auto [low, high] = servo_.limits;
+  if (!(low < high)) {
+    throw std::invalid_argument("a servo's limits must be two increasing numbers");
+  }
+  if (!(servo_.delay >= 0)) throw std::invalid_argument("a servo's delay must not be negative");
   if (profile_.effects) body_.inertia += profile_.effects->added_inertia;
   if (!(body_.inertia > 0)) throw std::invalid_argument("the inertia must be positive");
   if (!(body_.row_inertia > 0)) body_.row_inertia = body_.inertia;
@@ -79,13 +82,14 @@ void Solo::Advance(double h, double force, double command, State* state) const {
     pushed = MoveHandle(effects->backlash, h, force, v, &state->loose);
   } else if (has_load) {
     behind = Meet(effects->backlash, h, body_.inertia, spring + weight + force, v, own, stiffness,
-                resist(v + state->loose.velocity), state->loose);
+                  resist(v + state->loose.velocity), state->loose);
   }
   const FrictionBounds bounds = behind.On(own).dry;
   double drag = behind.On(own).drag + behind.scale * stiffness;
 
   const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
-  const FrictionRow row = StiffenFrictionRow(effects, h, held, bound, v, inertia, behind.resistance);
+  const FrictionRow row =
+      StiffenFrictionRow(effects, h, held, bound, v, inertia, behind.resistance);
   drag += row.damping;
   Friction friction = {held - row.D * v / h, row.D, bound};
   if (const auto [per_second, stiff] = body_.friction_row; stiff > 0) {
@@ -126,7 +130,7 @@ void Solo::Restart(const Start& start, bool fresh, State* state) const {
 void Solo::Replay(double h, const double* force, const double* command, std::int64_t n,
                   const std::vector<Start>& starts, double* before, double* after) const {
   struct Run {
-    size_t start, last;  // the current one, and the first of the next run
+    size_t start, last;                      // the current one, and the first of the next run
     std::int64_t k = 0, end = 0, first = 0;  // the latter is that of its fresh start
     bool lost = true;
     State state = {};

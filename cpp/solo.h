@@ -62,10 +62,11 @@ class Solo {
   void Advance(double h, double force, double command, State* state) const;
 
   // Steps through n forces and as many commands, which come later by the delay; what was before a
-  // fresh start is its first command. before[k] and after[k] are the positions at both ends of step k. At
-  // each start position and velocity are set; unless fresh, friction's memory stays and the handle
-  // or the load as it is beside the part. What follows a number that is not finite is NaN until the
-  // next start, which then is fresh. Starts are in increasing order, the first one at step 0.
+  // fresh start is its first command. before[k] and after[k] are the positions at both ends of step
+  // k. At each start position and velocity are set; unless fresh, friction's memory stays and the
+  // handle or the load as it is beside the part. What follows a number that is not finite is NaN
+  // until the next start, which then is fresh. Starts are in increasing order, the first one at
+  // step 0.
   void Replay(double h, const double* force, const double* command, std::int64_t n,
               const std::vector<Start>& starts, double* before, double* after) const;
 

@@ -76,7 +76,9 @@ def said(verdict, *effects):
         verdict=verdict, effects=[*map(finding, effects)], summary="The end.", doubt=None
     )
     puzzling = verdict == "unexplained"
-    return SimpleNamespace(diagnosis=told, candidates=told.effects, puzzling=puzzling)
+    return SimpleNamespace(
+        diagnosis=told, candidates=told.effects, puzzling=puzzling, corrected=None
+    )
 
 
 @pytest.mark.parametrize(("refused", "there"), [((), BOTH), (BOTH[1:], BOTH[:1]), (BOTH, ())])

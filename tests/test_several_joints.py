@@ -1,6 +1,8 @@
 """Logs of several joints: what the others do to one, each by itself, and all at once."""
 
 import json
+import subprocess
+import sys
 
 import mujoco
 import numpy as np
@@ -137,6 +139,31 @@ def test_a_joint_that_the_log_has_not_stays_at_its_reference(tmp_path):
     run.write_text(text)
     (note,) = (n for n in read_measured(model(tmp_path), "elbow", [run]).notes if "held" in n)
     assert note == "log.csv: has no positions of 'shoulder': held at the model's reference."
+
+
+def test_pictures_are_of_one_joint(tmp_path):
+    run = log(tmp_path / "log.csv", 0, seconds=1.0)
+    command = [sys.executable, "-m", "joda", "compare", str(model(tmp_path)), str(run)]
+    for option, name in (("--report", "r.html"), ("-o", "p.png")):
+        found = subprocess.run(
+            [*command, option, str(tmp_path / name)], capture_output=True, text=True
+        )
+        assert found.returncode == 2
+        assert f"{option} is of one joint; name it with --joint, or use --json." in found.stderr
+    told = subprocess.run(command, capture_output=True, text=True)
+    assert told.returncode == 0 and "all joints at once" in told.stdout
+
+
+def test_without_a_command_not_all_is_replayed_at_once(tmp_path):
+    run = log(tmp_path / "log.csv", 0, seconds=1.0)
+    run.write_text(run.read_text().replace("ctrl:second", "ctrl:lamp"))
+    arm = mujoco.MjModel.from_xml_path(str(model(tmp_path)))
+    assert replayed_together(arm, [run]) == ()
+    run.write_text(run.read_text().replace("position:", "speed:"))
+    with pytest.raises(
+        JodaError, match=r"log\.csv: no column 'position:JOINT' of a hinge or slide"
+    ):
+        replayed_together(arm, [run])
 
 
 def test_a_log_of_one_joint_needs_its_name(tmp_path):

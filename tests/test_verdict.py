@@ -13,7 +13,7 @@ from joda import add, compare, diagnose
 from joda.commands.hidden_effect import _judged
 from joda.diagnosis import verdict
 from joda.diagnosis.asking import asked
-from joda.diagnosis.corrections import off, strengths
+from joda.diagnosis.corrections import numbers, off
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.summary import summarised
@@ -188,9 +188,9 @@ def test_a_recorded_force_that_is_off_by_a_factor_is_no_missing_inertia(tmp_path
 def test_numbers_are_off_only_by_more_than_their_errors(tmp_path):
     runs = runs_of(door(), tmp_path, 4)
     right = asked(read_measured(scene_of(door(), tmp_path), "joint", runs))
-    assert off(strengths(right)) == ""
+    assert off(numbers(right)) == ""
     wrong = asked(read_measured(scene_of(door(damping=1.0), tmp_path), "joint", runs))
-    told = off(strengths(wrong))
+    told = off(numbers(wrong))
     factor, error = map(float, re.search(r"([\d.]+) ± ([\d.e-]+\d)", told).groups())
     assert factor == pytest.approx(0.5, abs=0.05) and 0 < error < 0.1
     assert told.count("±") == 1  # the friction is right

@@ -142,7 +142,7 @@ def test_a_fit_takes_a_windows_start_anew_where_that_is_better():
         """Moves as measured from where it was measured; beyond an edge to and fro, whose best start
         is there too."""
 
-        def replay(self, force, at, start, fresh, h):
+        def replay(self, force, at, start, fresh, h, command):
             path = np.interp(h * np.arange(len(force) + 1), windows.time, windows.position)
             far = np.abs(start[:, 0] - windows.start[:, 0]) > 5 * windows.doubt[:, 0]
             window = np.searchsorted(at, np.arange(len(force) + 1), side="right") - 1

@@ -245,15 +245,21 @@ Trial TrySolo(Random& random) {
       {Odd(random, 100), Odd(random, Below(random, 2) ? 9 : 0)}};
   Trial out = {Joined(texts)};
   try {
-    const Solo solo(body, Pointers(texts).data());
+    const Servo servo = {Odd(random, 1),
+                         Odd(random, 50),
+                         Odd(random, 2),
+                         {Odd(random, -3), Odd(random, 3)},
+                         Odd(random, 0.01 * Below(random, 2))};
+    const Solo solo(body, servo, Pointers(texts).data());
     out.accepted = true;
-    std::vector<double> force(60), before(60), after(60);
+    std::vector<double> force(60), command(60), before(60), after(60);
     for (double& one : force) one = Odd(random, 10 * Uniform(random) - 5);
+    for (double& one : command) one = Odd(random, 10 * Uniform(random) - 5);
     const std::vector<Solo::Start> starts = {{0, Odd(random, 0.1), 0, true},
                                              {20, 0, Odd(random, 1), false},
                                              {40, 0.2, 0, Below(random, 2) == 0}};
-    solo.Replay(std::pow(10, -4 + 3 * Uniform(random)), force.data(), 60, starts, before.data(),
-                after.data());
+    solo.Replay(std::pow(10, -4 + 3 * Uniform(random)), force.data(), command.data(), 60, starts,
+                before.data(), after.data());
     out.good = IsReplay(after, starts);
   } catch (const std::invalid_argument&) {
   }

@@ -70,7 +70,7 @@ def compare(
     if judged and judged.verdict == "within_noise" and places:
         judged = replace(judged, verdict="not_enough_data")
     described = measured.profile.joint
-    note = timestep_note(measured, found.window) if found.runs else None
+    note = timestep_note(measured, found.window, found.whole) if found.runs else None
     forces = tuple(failing_force(measured.curves, described))
     comparison = Comparison(
         joint=described.name,

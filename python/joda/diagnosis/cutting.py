@@ -91,7 +91,7 @@ def windows_of(
             command = held(time, given, edges)
             parts.append((force, command, step + begins, fresh, start, doubts, same))
             window = np.where(enough[window] & _thinned(window), window + count, -1)
-            noise = spread, smoothing.force_error(time, run.force[piece], run.forced)
+            noise = spread, run.part(piece).force_error()
             samples.append((step + index, place - index, position, time, window, hits, *noise))
             step, count = step + steps, count + many
     force, command, at, fresh, start, doubts, run_of = (

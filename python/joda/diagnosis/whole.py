@@ -65,12 +65,19 @@ def worst(measured: Measured, asked: Asked) -> Worst:
 
     @cache  # only a run that is missed by much asks for them
     def others() -> list[Replayer]:
-        return [_replayer(measured, asked, x, finer) for x in _drawn(asked)]
+        return [_replayer(measured, asked, x, finest) for x in _drawn(asked)]
 
-    finer = FINER if measured.single.servo else 1
-    replayer = _replayer(measured, asked, asked.fit.x, finer)
+    @cache
+    def fitted(finer: int) -> Replayer:
+        return _replayer(measured, asked, asked.fit.x, finer)
+
+    finest = FINER if measured.single.servo else 1
 
     def times(part: Run, sigma: float) -> float:
+        found = replayed(part, sigma, fitted(finest))
+        return found if found <= BEYOND else min(found, replayed(part, sigma, fitted(FINER)))
+
+    def replayed(part: Run, sigma: float, replayer: Replayer) -> float:
         if not (start := replayer.start(part, sigma)):
             return 0.0
         path = replayer.whole(part, start)

@@ -34,6 +34,7 @@ class Single:
         friction_row: solref and solimp of MuJoCo's own friction row, which yields where the joint
             all but rests; None: the plugin's, which hardly does.
         servo: what the joint's actuators make of commands; None where none acted.
+        integrator: of the scene (`mujoco.mjtIntegrator`), for what MuJoCo simulates by itself.
     """
 
     inertia: float
@@ -44,6 +45,7 @@ class Single:
     solimp: tuple[float, ...]
     friction_row: Row | None = None
     servo: Servo | None = None
+    integrator: int = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
 
     def solo(self, profile: Profile, h: float) -> Solo:
         """The joint with a profile, for steps of h (s)."""
@@ -119,6 +121,7 @@ def single(context: Context, profile: Profile, model: mujoco.MjModel, joint: int
         hinge=hinge,
         solref=tuple(map(float, model.jnt_solref[joint])),
         solimp=tuple(map(float, model.jnt_solimp[joint])),
+        integrator=int(model.opt.integrator),
     )
 
 

@@ -8,8 +8,15 @@ import mujoco
 import numpy as np
 
 from joda.errors import JodaError
-from joda.measured.others import force_of_others
-from joda.measured.runs import QuasiStatic, Run, evened, read_measurement, read_together
+from joda.measured.others import SHORTER, SMOOTHED, doubt_of_others, force_of_others
+from joda.measured.runs import (
+    LEAST,
+    QuasiStatic,
+    Run,
+    evened,
+    read_measurement,
+    read_together,
+)
 from joda.measured.table import header
 from joda.scenes.actuators import Drive, Servo, actuators_on, drive_of
 from joda.scenes.model import joint_name
@@ -104,7 +111,14 @@ def _read(
         return read_measurement(path, drive), unused
     run, positions = read_together(path, name, [one for one in there if one != name], drive)
     by_id = {model.joint(one).id: position for one, position in positions.items()}
-    force = run.force + force_of_others(model, joint, run.time, by_id)
+    found, other = (
+        force_of_others(model, joint, run.time, by_id, over) for over in (SMOOTHED, SHORTER)
+    )
+    doubt = doubt_of_others(run.time, found, other)
+    run = replace(run, force=run.force + found, forced=True, doubt=doubt)
+    inner = np.abs(run.time - (run.time[0] + run.time[-1]) / 2) <= (np.ptp(run.time) - SMOOTHED) / 2
+    if inner.sum() >= LEAST and len(there) > 1:  # the ends are smoothed from one side only
+        run = run.part(np.flatnonzero(inner))
     away = [model.joint(k).name or f"#{k}" for k in range(model.njnt) if k not in by_id]
     notes = []
     if away:
@@ -112,7 +126,7 @@ def _read(
             f"{path.name}: has no positions of {_listed(away[:SHOWN])}"
             f"{' and others' if len(away) > SHOWN else ''}: held at the model's reference."
         )
-    return replace(run, force=force, forced=True), notes
+    return run, notes
 
 
 def _commands(path: Path, acting: Sequence[str]) -> bool:

@@ -22,6 +22,15 @@ def missed(replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float]) -> f
     return rms(np.concatenate([joined(replayer.windows(run, noise)) for run, noise in pairs]))
 
 
+def missed_whole(replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float]) -> float:
+    """RMS error of whole runs, where their force is known; rad or m, NaN if there are none."""
+    parts = []
+    for run, noise in zip(runs, sigma, strict=True):
+        path = replayer.whole(run, replayer.start(run, noise))
+        parts.append((path - run.position)[~np.isnan(path)])
+    return rms(np.concatenate(parts or [np.zeros(0)]))
+
+
 def rms(values: Array) -> float:
     """Root mean square; NaN of nothing."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")

@@ -12,6 +12,8 @@ Array = NDArray[np.float64]
 
 SMOOTHED, ORDER = 0.3, 5
 """Time over which a motion is smoothed, s, and by polynomials of which order."""
+SHORTER = 0.2
+"""Another time, with which its error is told, s."""
 FEWEST = 9
 """Samples over which it is smoothed at least."""
 
@@ -25,12 +27,12 @@ class Motion:
     acceleration: Array
 
 
-def motion(time: Array, position: Array) -> Motion:
-    """A measured motion smoothed (Savitzky and Golay, Anal. Chem. 36 (1964) 1627)."""
+def motion(time: Array, position: Array, over: float = SMOOTHED) -> Motion:
+    """A motion smoothed over a time, s (Savitzky and Golay, Anal. Chem. 36 (1964) 1627)."""
     count = len(time)
     grid = np.linspace(time[0], time[-1], count)
     gap = float(grid[1] - grid[0])
-    wide = min(max(round(SMOOTHED / gap), FEWEST) | 1, count - 1 + count % 2)
+    wide = min(max(round(over / gap), FEWEST) | 1, count - 1 + count % 2)
     even = np.interp(grid, time, position)
     found = [
         np.interp(time, grid, savgol_filter(even, wide, min(ORDER, wide - 1), deriv=k, delta=gap))
@@ -40,7 +42,11 @@ def motion(time: Array, position: Array) -> Motion:
 
 
 def force_of_others(
-    model: mujoco.MjModel, joint: int, time: Array, positions: Mapping[int, Array]
+    model: mujoco.MjModel,
+    joint: int,
+    time: Array,
+    positions: Mapping[int, Array],
+    over: float = SMOOTHED,
 ) -> Array:
     """The force on a joint of what else of the mechanism moves, or stands elsewhere.
 
@@ -53,12 +59,13 @@ def force_of_others(
         joint: its id.
         time: s, shape (n,).
         positions: measured, of the joint and others, by their ids; rad or m, shape (n,) each.
+        over: time over which the motion is smoothed, s.
 
     Returns:
         N·m or N, shape (n,).
     """
     data, dof = mujoco.MjData(model), int(model.jnt_dofadr[joint])
-    motions = {k: motion(time, position) for k, position in positions.items()}
+    motions = {k: motion(time, own, over) for k, own in positions.items()}
     out, torque = np.empty(len(time)), np.empty(model.nv)
 
     def needed(moving: Mapping[int, Motion], k: int, still: bool) -> float:
@@ -78,3 +85,19 @@ def force_of_others(
     for k in range(len(time)):
         out[k] = needed(alone, k, True) - needed(motions, k, False)
     return out
+
+
+def doubt_of_others(time: Array, force: Array, shorter: Array) -> Array:
+    """Standard deviation of that force, as white noise from sample to sample, shape (n,).
+
+    What another smoothing makes of it tells its error; that is the same over the time smoothed, so
+    that it counts as so many times more of white noise.
+
+    Args:
+        time: s, shape (n,).
+        force: smoothed over `SMOOTHED`.
+        shorter: over `SHORTER`.
+    """
+    count = max(round(SMOOTHED * (len(time) - 1) / float(np.ptp(time))), 1)
+    square = np.convolve((force - shorter) ** 2, np.full(count, 1 / count), mode="same")
+    return np.asarray(np.sqrt(count * square))

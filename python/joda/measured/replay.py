@@ -31,6 +31,8 @@ FIRST_HORIZON, LONGER, HORIZON = 30, 4, 5.0
 to so many seconds. A start that is far off runs into an end soon, and then tells nothing."""
 AT_REST = 2.0
 """How much larger the sum of squares may be from a start at rest, where a joint seems to rest."""
+POOR = 2.0
+"""Mean squared misfit, in noises, from which a start at rest is tried that does not seem so."""
 SETTLED = 0.1
 """Change of a sum of squared residuals below which a start is no better."""
 ENSEMBLE = 8
@@ -123,6 +125,8 @@ class Replayer:
         self.servo = single.servo
         self.model = rig(alone, profile, single.friction_row, self.servo)
         self.model.opt.timestep = self.h = timestep
+        if not self.model.nplugin:
+            self.model.opt.integrator = single.integrator
         solref, solimp = single.limits(profile, timestep)
         self.model.jnt_solref[0], self.model.jnt_solimp[0] = solref, solimp
         self.data = mujoco.MjData(self.model)
@@ -147,7 +151,7 @@ class Replayer:
             return 0.0
         time, force = _known(run)
         every = slice(None, None, len(time) // DENSEST + 1)
-        off = smoothing.force_error(time, force, run.forced)[every] / np.sqrt(every.step)
+        off = run.part(slice(0, len(time))).force_error()[every] / np.sqrt(every.step)
         command = _command(run, len(time), every)
         time, force = time[every], force[every]
         rng = np.random.default_rng(0)
@@ -210,9 +214,10 @@ class Replayer:
         )
         known = time, position, force, _command(run, len(time)), sigma, prior
         least, best, covariance = self._fitted_start(*known, False)
-        if smoothing.begins_at_rest(time, position, sigma):
-            still = self._fitted_start(*known, True)
-            if still[0] < AT_REST * least:
+        rests = smoothing.begins_at_rest(time, position, sigma)
+        if rests or least > POOR * min(len(time), int(np.searchsorted(time, HORIZON))):
+            still = self._fitted_start(*known, True)  # a release may be too quick for the samples
+            if still[0] < (AT_REST if rests else 1.0) * least:
                 _, best, covariance = still
         factor = prior.deviation[:, None] * np.linalg.cholesky(covariance)
         return Start(prior.mean + prior.deviation * best, factor)
@@ -461,8 +466,7 @@ def _with_force(window: Window, run: Run, inertia: float) -> Window:
     White noise of acceleration moves a free joint by a random walk of its velocity: a variance of
     noise² gap t³ / 3 after a time t.
     """
-    time = run.time[window.samples]
-    error = smoothing.force_error(time, run.force[window.samples], forced=True)
+    time, error = run.time[window.samples], run.part(window.samples).force_error()
     off = float(np.sqrt(np.mean(error**2)))
     length, count = float(np.ptp(time)), len(time)
     moved = off / inertia * float(np.sqrt(length**4 / (12 * max(count - 1, 1))))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.measured.misfit import missed, rms
+from joda.measured.misfit import missed, missed_whole, rms
 from joda.measured.reading import Measured
 from joda.measured.replay import Replayer
 
@@ -14,23 +14,25 @@ BEYOND = 1.5
 """How much larger than the noise an error must be to be looked into."""
 
 
-def timestep_note(measured: Measured, error: float) -> str | None:
-    """A sentence, if shorter steps would make the error in windows clearly smaller.
+def timestep_note(measured: Measured, window: float, whole: float) -> str | None:
+    """A sentence, if shorter steps would make the error clearly smaller.
 
     Args:
         measured: the joint and its runs.
-        error: RMS in windows at the scene's timestep, rad or m.
+        window, whole: RMS in windows and of whole runs at the scene's timestep, rad or m; NaN where
+            there is none.
     """
-    if not error >= BEYOND * rms(np.array(measured.sigma)):  # nor if no window was replayed
+    least = BEYOND * rms(np.array(measured.sigma))
+    step, unit = measured.timestep / FINER, measured.profile.joint.unit
+    if not max(window, whole) >= least:
         return None
-    step = measured.timestep / FINER
     finer = Replayer(measured.context, measured.profile, measured.single, step)
-    less = missed(finer, measured.runs, measured.sigma)
-    if less > CLEARLY * error:
-        return None
-    unit = measured.profile.joint.unit
-    return (
-        f"At the scene's timestep of {measured.timestep:g} s windows are missed by {error:.2g} "
-        f"{unit} RMS, at {step:g} s by {less:.2g} {unit}: this much is the timestep's, and no "
-        "effect can mend it."
-    )
+    tried = [("windows are", window, missed), ("whole runs are", whole, missed_whole)]
+    for what, error, of in tried:
+        if error >= least and (less := of(finer, measured.runs, measured.sigma)) < CLEARLY * error:
+            return (
+                f"At the scene's timestep of {measured.timestep:g} s {what} missed by {error:.2g} "
+                f"{unit} RMS, at {step:g} s by {less:.2g} {unit}: this much is the timestep's, and "
+                "no effect can mend it."
+            )
+    return None
