@@ -2,8 +2,7 @@
 //
 // The step's constraint problem has one unknown then, the acceleration, and at most three rows: dry
 // friction, damping, an end of the range. Its optimality condition is increasing and piecewise
-// linear, so that its solution can be written down. See python/joda/joints/solo.py, which is the
-// same step in JAX.
+// linear, so that its solution can be written down.
 #ifndef JODA_SOLO_H_
 #define JODA_SOLO_H_
 
