@@ -13,7 +13,10 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
 Model = Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)]
 Runs = Annotated[
     list[Path],
-    typer.Argument(help="Measured runs (CSV: time, position, force) or curves (position, force)."),
+    typer.Argument(
+        help="Measured runs (CSV: time, position, perhaps force, ctrl:ACTUATOR; or position:JOINT "
+        "of several joints) or curves (position, force)."
+    ),
 ]
 Joint = Annotated[
     str, typer.Option("--joint", help="A name, body:NAME[:K] or #K.", show_default=False)
