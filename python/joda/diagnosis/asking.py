@@ -149,6 +149,8 @@ def _fitted(judge: Judge, base: Base, near: Array | None) -> tuple[Fit, Fit]:
     tried = [(as_it_is, judge.windows.start), (as_it_is, given.start)]
     if near is not None:
         tried.append((near, judge.started(base.solo(near)).start))
+    away = [replace(judge.started(base.solo(x)), x=x) for x in base.beginnings()]
+    tried += [(one.x, one.start) for one in away if one.loss < given.loss]
     fits = [judge.fit(base.solo, base.unknowns, x, start) for x, start in tried]
     return judge.refit(base.solo, base.unknowns, min(fits, key=lambda f: f.loss)), given
 

@@ -20,12 +20,16 @@ Array = NDArray[np.float64]
 
 BASE_DOUBT = 0.15
 """How far off (one standard deviation, relative) the model's own strengths may be."""
+DRIVEN_DOUBT = 3.0
+"""The same of joints that an actuator drives, whose friction few models know."""
 GAIN_AT_MOST, GAIN_DOUBT = 7.0, 0.7
 """Largest logarithm of the factor by which an actuator's gain may be off, and its doubt."""
 HELD = 1e-6
 """Doubt of a number that is not there."""
 DELAY_AT_MOST, DELAY_DOUBT = 0.1, 0.02
 """Longest delay of commands, and its doubt, s."""
+FAR_AWAY = ((-4.0, -2.0, 10.0), (-2.0, -1.0, 3.0), (2.0, 1.0, 1.0))
+"""Logarithms of gain and damping, and factors of friction, from which fits begin besides."""
 SOFT = (0.02, 1.0)
 """MuJoCo's own `solreflimit`: time constant (s) and damping ratio of the ends of a range."""
 BEYOND, STRAYS = 4.0, 3
@@ -61,6 +65,17 @@ class Base:
     def count(self) -> int:
         """Of the numbers."""
         return len(self.unknowns.mean)
+
+    def beginnings(self) -> list[Array]:
+        """Numbers from which a fit may begin besides those of the model: of an actuator that is
+        much stiffer or softer, beside a friction that is larger."""
+        out = []
+        for gain, drag, rubs in FAR_AWAY if self.single.servo else ():
+            x = self.unknowns.mean.copy()
+            x[: len(self.places)] = [rubs if name == "friction" else 1.0 for name, _ in self.places]
+            x[len(self.places) : len(self.places) + 2] = gain, drag
+            out.append(x)
+        return out
 
     def own(self, x: Array) -> Single:
         """The joint but for its profile, with its actuator's numbers."""
@@ -107,8 +122,9 @@ def base_of(profile: Profile, single: Single, h: float) -> Base:
         if any(part.y)
     )
     k = len(places)
+    doubt, most = (BASE_DOUBT, 20.0) if single.servo is None else (DRIVEN_DOUBT, 100.0)
     unknowns = Unknowns(
-        np.zeros(k), np.full(k, 20.0), np.full(k, 0.01), np.ones(k), np.full(k, BASE_DOUBT)
+        np.zeros(k), np.full(k, most), np.full(k, 0.01), np.ones(k), np.full(k, doubt)
     )
     if single.servo is not None:
         unknowns = unknowns.and_(_of_servo(single.servo))
