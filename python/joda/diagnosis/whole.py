@@ -75,7 +75,9 @@ def worst(measured: Measured, asked: Asked) -> Worst:
 
     def times(part: Run, sigma: float) -> float:
         found = replayed(part, sigma, fitted(finest))
-        return found if found <= BEYOND else min(found, replayed(part, sigma, fitted(FINER)))
+        if found <= BEYOND or finest == FINER:
+            return found
+        return min(found, replayed(part, sigma, fitted(FINER)))
 
     def replayed(part: Run, sigma: float, replayer: Replayer) -> float:
         if not (start := replayer.start(part, sigma)):

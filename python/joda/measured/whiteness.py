@@ -36,20 +36,16 @@ def free_parts(measured: Measured) -> list[tuple[Run, float]]:
 
     With a recorded force its errors add up as a fault does; and at an end the stop decides too.
     """
-    span = measured.profile.joint.range
-    pairs = zip(measured.runs, measured.sigma, strict=True)
-    parts = [(until_end(run, span, CLEAR * sigma), sigma) for run, sigma in pairs if not run.forced]
-    return [(run, sigma) for run, sigma in parts if len(run.time) >= FEW * LEAST]
+    return _parts(measured, forced=False)
 
 
-def forced_parts(measured: Measured) -> list[tuple[Run, float]]:
-    """The same of runs with a force that is known throughout: so much of them as tells of noise."""
+def _parts(measured: Measured, forced: bool) -> list[tuple[Run, float]]:
+    """The same, or of the runs with a force that is known throughout."""
     span = measured.profile.joint.range
-    pairs = zip(measured.runs, measured.sigma, strict=True)
     parts = [
         (until_end(run, span, CLEAR * sigma), sigma)
-        for run, sigma in pairs
-        if run.forced and not np.isnan(run.force).any()
+        for run, sigma in zip(measured.runs, measured.sigma, strict=True)
+        if run.forced == forced and not np.isnan(run.force).any()
     ]
     return [(run, sigma) for run, sigma in parts if len(run.time) >= FEW * LEAST]
 
@@ -57,7 +53,7 @@ def forced_parts(measured: Measured) -> list[tuple[Run, float]]:
 def strays(measured: Measured) -> float:
     """Probability that noise of position and force make as large means of what is missed of a
     forced run; 1 where there is none."""
-    parts, replayer = forced_parts(measured), measured.replayer
+    parts, replayer = _parts(measured, forced=True), measured.replayer
     left, moved = [], []
     for run, sigma in parts:
         path, start = replayer.followed(run, sigma)
@@ -72,7 +68,7 @@ def drifts(
     """Probability that noise makes as large means of what is missed of any run.
 
     Args:
-        parts: of `free_parts`, or `forced_parts`.
+        parts: of `free_parts`, or such of forced runs.
         left: what is missed of each, in noises.
         moved: RMS by which errors of the force move each one's replay, in noises.
 

@@ -76,14 +76,12 @@ def _left(profile: Profile, springs: bool, damps: bool, rubs: bool) -> Profile:
 
 def _spring(model: mujoco.MjModel, joint: int, described: Joint) -> Component:
     """The joint's spring, which is a line unless its stiffness is a polynomial."""
-    lo, hi = described.range
-    adr, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
-    higher = any(polynomial(model, "jnt_stiffness", joint)[1:])
-    u = np.linspace(0, 1, KNOTS if higher else 2)
-    if not higher:
-        stiffness, rest = float(model.jnt_stiffness[joint]), float(model.qpos_spring[adr])
+    (lo, hi), adr, dof = described.range, model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+    stiffness, *higher = map(float, polynomial(model, "jnt_stiffness", joint))
+    if not any(higher):
+        rest = float(model.qpos_spring[adr])
         return _line(SPRING, -stiffness * (lo - rest), -stiffness * (hi - rest))
-    data, force = mujoco.MjData(model), []
+    u, data, force = np.linspace(0, 1, KNOTS), mujoco.MjData(model), []
     for q in lo + u * (hi - lo):
         data.qpos[adr] = q
         mujoco.mj_fwdPosition(model, data)
