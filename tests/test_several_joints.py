@@ -116,6 +116,36 @@ def test_all_at_once_are_replayed_in_the_scene(tmp_path):
     assert written["shoulder"]["rmse"] == found.joints["shoulder"].rmse
 
 
+def test_all_at_once_forces_act_empty_commands_are_held_and_names_may_lack(tmp_path):
+    """A pendulum that a force pushes, beside a servo without a name."""
+    text = ARM.format(kp=30).replace('name="second" ', "")
+    arm = mujoco.MjModel.from_xml_string(text)
+    data, rows = mujoco.MjData(arm), []
+    for k in range(300):
+        force, command = 0.8 * np.sin(2 * data.time), 0.1 * (k // 10 % 3)
+        cell = f"{command}" if k % 10 == 0 else ""
+        rows.append(f"{data.time:.4f},{data.qpos[0]:.9f},{data.qpos[1]:.9f},{force:.9f},0,{cell}")
+        data.ctrl[1] = command
+        for _ in range(5):
+            data.qfrc_applied[0] = 0.8 * np.sin(2 * data.time)
+            mujoco.mj_step(arm, data)
+    head = "time,position:shoulder,position:elbow,force:shoulder,ctrl:first,ctrl:actuator 1"
+    run = tmp_path / "log.csv"
+    run.write_text("\n".join([head, *rows]) + "\n")
+    (found,) = replayed_together(arm, [run])
+    assert max(found.rmse.values()) < 1e-3  # it is let go: its first velocity is smoothed
+    run.write_text(run.read_text().replace(rows[9], rows[9].replace(rows[9].split(",")[3], "")))
+    assert replayed_together(arm, [run]) == ()
+
+
+def test_an_unstable_scene_has_no_error_and_no_warning(tmp_path, capfd):
+    run = log(tmp_path / "log.csv", 0, seconds=1.0)
+    wild = mujoco.MjModel.from_xml_string(ARM.format(kp=1e9))
+    (found,) = replayed_together(wild, [run])
+    assert set(found.rmse.values()) == {None}
+    assert capfd.readouterr().err == ""
+
+
 def test_the_joint_whose_gain_is_off_is_found_and_mended(tmp_path):
     runs, given = logs(tmp_path, 3), model(tmp_path, kp=60.0)
     found = diagnose_all(given, runs, ["elbow"], json=tmp_path / "d.json")

@@ -261,7 +261,7 @@ def tell_joints(found: "Compared") -> None:
     for row in rows:
         say("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip())
     if not found.together:
-        say("Not replayed all at once: the logs have not the command of every actuator on them.")
+        say("Not replayed all at once: a command of an actuator on them, or a force, is not known.")
     notes = dict.fromkeys(note for one in found.joints.values() for note in one.notes)
     for note in notes:
         say(note)

@@ -16,6 +16,7 @@ from joda.errors import JodaError
 from joda.files import check_targets, file_name, named_like, write_text
 from joda.measured.comparison import Comparison
 from joda.measured.driven import joints_in
+from joda.measured.misfit import rms
 from joda.measured.scene_replay import Together, replayed_together
 from joda.scenes.model import load_model
 
@@ -30,16 +31,16 @@ class Compared:
     Attributes:
         joints: each joint by itself, what the others do to it as a force on it, by name.
         together: replays of the scene as it is, all joints at once; none where a command of one of
-            their actuators is missing.
+            their actuators, or a force, is not known.
     """
 
     joints: dict[str, Comparison]
     together: tuple[Together, ...]
 
     def rmse(self, joint: str) -> float | None:
-        """Of a joint in the replays of all at once, over the runs, rad or m; None without one."""
-        errors = [run.rmse[joint] for run in self.together if joint in run.rmse]
-        return float(np.sqrt(np.mean(np.square(errors)))) if errors else None
+        """Of a joint in the replays of all at once, rad or m; None where a run has none."""
+        errors = [error for run in self.together if (error := run.rmse.get(joint)) is not None]
+        return rms(np.array(errors)) if errors and len(errors) == len(self.together) else None
 
     def to_json(self) -> str:
         """The comparison as JSON."""

@@ -163,16 +163,21 @@ def _run(table: Table, drive: Drive | None) -> Run:
         velocity=columns.get("velocity"),
         force=columns.get("force", np.zeros(len(time))),
         forced="force" in columns,
-        command=None if drive is None else drive.command(_held(table, drive)),
+        command=None if drive is None else drive.command(_held(table, drive.columns)),
         origin=origin,
         unread=table.others,
     )
 
 
-def _held(table: Table, drive: Drive) -> Array:
+def read_signals(path: str | Path, names: Sequence[str]) -> Array:
+    """Columns of a log, held from one sample to the next, shape (n, k); raises JodaError."""
+    return _held(read_table(Path(path), names, "signals"), names)
+
+
+def _held(table: Table, names: Sequence[str]) -> Array:
     """The signals, shape (n, k): an empty cell is as the one above; raises JodaError."""
     out = []
-    for name in drive.columns:
+    for name in names:
         signal = table.columns[name]
         last = np.maximum.accumulate(np.where(np.isnan(signal), -1, np.arange(len(signal))))
         if last[0] < 0:

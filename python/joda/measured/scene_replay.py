@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from joda.errors import JodaError
 from joda.measured import smoothing
 from joda.measured.driven import joints_in
-from joda.measured.runs import held, read_together
+from joda.measured.misfit import rms
+from joda.measured.runs import held, read_signals, read_together
 from joda.measured.table import header, read_table
-from joda.scenes.actuators import actuators_on
+from joda.scenes.actuators import acting_on, actuators_on
+from joda.scenes.motion import unheard
 
 Array = NDArray[np.float64]
 
@@ -28,11 +30,11 @@ class Together:
 
     Attributes:
         file: its name.
-        rmse: of each joint's position, by name, rad or m; NaN where the scene is unstable.
+        rmse: of each joint's position, by name, rad or m; None where the scene is unstable.
     """
 
     file: str
-    rmse: dict[str, float]
+    rmse: dict[str, float | None]
 
 
 def replayed_together(model: mujoco.MjModel, paths: Sequence[Path]) -> tuple[Together, ...]:
@@ -40,10 +42,11 @@ def replayed_together(model: mujoco.MjModel, paths: Sequence[Path]) -> tuple[Tog
 
     Args:
         model: compiled, with its actuators.
-        paths: logs with `position:JOINT`, and `ctrl:ACTUATOR` of all that drives these joints.
+        paths: logs with `position:JOINT`, `ctrl:ACTUATOR` of all that drives these joints, and
+            perhaps `force:JOINT`.
 
     Returns:
-        none where a command is missing.
+        none where a command or a force is not known.
 
     Raises:
         JodaError: a file cannot be read.
@@ -57,20 +60,33 @@ def _replayed(model: mujoco.MjModel, path: Path) -> Together | None:
     if not joints:
         raise JodaError(f"{path}: no column 'position:JOINT' of a hinge or slide of the model.")
     ids = [int(model.joint(name).id) for name in joints]
-    acting = sorted({name for k in ids for name in actuators_on(model, k)})
+    acting = {
+        f"ctrl:{name}": number
+        for k in ids
+        for number, name in zip(acting_on(model, k), actuators_on(model, k), strict=True)
+    }
     names = {name.lower() for name in header(path)}
-    columns = [f"ctrl:{name}" for name in acting]
-    if any(column.lower() not in names for column in columns):
+    if any(column.lower() not in names for column in acting):
+        return None
+    pushed = {
+        f"force:{name}": int(model.jnt_dofadr[k])
+        for k, name in zip(ids, joints, strict=True)
+        if f"force:{name}".lower() in names
+    }
+    forces = read_table(path, [*pushed], "forces").columns if pushed else {}
+    if any(np.isnan(force).any() for force in forces.values()):
         return None
     run, positions = read_together(path, joints[0], joints[1:])
     time = run.time - run.time[0]
     steps = int(np.ceil(time[-1] / model.opt.timestep))
     edges = model.opt.timestep * np.arange(steps + 1)
     inputs = np.zeros((steps, model.nu + model.nv))
-    if columns:
-        table = read_table(path, columns, "signals")
-        for name, column in zip(acting, columns, strict=True):
-            inputs[:, model.actuator(name).id] = held(time, table.columns[column], edges)
+    if acting:
+        signals = read_signals(path, [*acting])
+        for number, signal in zip(acting.values(), signals.T, strict=True):
+            inputs[:, number] = held(time, signal, edges)
+    for name, force in forces.items():
+        inputs[:, model.nu + pushed[name]] = np.interp(edges[:-1], time, force)
     data = mujoco.MjData(model)
     for k, name in zip(ids, joints, strict=True):
         own = positions[name]
@@ -81,10 +97,14 @@ def _replayed(model: mujoco.MjModel, path: Path) -> Together | None:
             data.qvel[model.jnt_dofadr[k]] = begun.velocity[0]
     state = np.empty(mujoco.mj_stateSize(model, FULL))
     mujoco.mj_getState(model, data, state, FULL)
-    states, _ = rollout.rollout(model, data, state[None], inputs[None], control_spec=INPUTS)
-    paths = np.vstack([state, states[0]])[:, 1 : 1 + model.nq]
-    errors = {}
+    with unheard():
+        states, _ = rollout.rollout(model, data, state[None], inputs[None], control_spec=INPUTS)
+    course = np.vstack([state, states[0]])
+    stable = bool(np.all(np.diff(course[:, 0]) > 0))  # else MuJoCo has begun anew
+    paths = course[:, 1 : 1 + model.nq]
+    errors: dict[str, float | None] = {}
     for k, name in zip(ids, joints, strict=True):
         path_of = np.interp(time, edges, paths[:, model.jnt_qposadr[k]])
-        errors[name] = float(np.sqrt(np.mean((path_of - positions[name]) ** 2)))
+        error = rms(path_of - positions[name])
+        errors[name] = error if stable and np.isfinite(error) else None
     return Together(run.name, errors)

@@ -1,6 +1,7 @@
 """A joint in motion in its scene, and what gravity does to it, in MuJoCo."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco
@@ -108,16 +109,24 @@ def play(
         out.append((*state, felt(model, data, dof)))
 
 
-def _advance(model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
-    """Steps the scene; raises JodaError if it is unstable, of which MuJoCo says nothing then."""
-    before, heard = data.time, mujoco.get_mju_user_warning()
-    if heard is None:  # else MuJoCo would print it, and leave a log file where one stands
+@contextmanager
+def unheard() -> Iterator[None]:
+    """MuJoCo prints no warnings, and leaves none in a log file, unless somebody listens to them."""
+    heard = mujoco.get_mju_user_warning()
+    if heard is None:
         mujoco.set_mju_user_warning(_unheard)
     try:
-        mujoco.mj_step(model, data, steps)
+        yield
     finally:
         if heard is None:
             mujoco.set_mju_user_warning(None)
+
+
+def _advance(model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
+    """Steps the scene; raises JodaError if it is unstable, of which MuJoCo says nothing then."""
+    before = data.time
+    with unheard():
+        mujoco.mj_step(model, data, steps)
     if data.time > before:
         return  # else MuJoCo has begun anew
     dofs = [data.warning[kind].lastinfo for kind in _BAD if data.warning[kind].number]
