@@ -184,6 +184,15 @@ def test_pictures_are_of_one_joint(tmp_path):
     assert told.returncode == 0 and "all joints at once" in told.stdout
 
 
+def test_a_driven_joint_of_such_a_log_needs_its_command_too(tmp_path):
+    run = log(tmp_path / "log.csv", 0, seconds=2.0)
+    run.write_text(run.read_text().replace("ctrl:second", "ctrl:lamp"))
+    with pytest.raises(JodaError, match="the run has neither a column 'ctrl:second' nor 'force'"):
+        read_measured(model(tmp_path), "elbow", [run])
+    assert read_measured(model(tmp_path), "elbow", [run], passive=True).runs[0].command is None
+    assert read_measured(model(tmp_path), "shoulder", [run]).runs[0].command is not None
+
+
 def test_without_a_command_not_all_is_replayed_at_once(tmp_path):
     run = log(tmp_path / "log.csv", 0, seconds=1.0)
     run.write_text(run.read_text().replace("ctrl:second", "ctrl:lamp"))

@@ -1,11 +1,12 @@
 """Logs of a joint, of joints that an actuator drives, and of several joints at once."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.measured.others import SHORTER, SMOOTHED, doubt_of_others, force_of_others
@@ -20,6 +21,8 @@ from joda.measured.runs import (
 from joda.measured.table import header
 from joda.scenes.actuators import Drive, Servo, actuators_on, drive_of
 from joda.scenes.model import joint_name
+
+Array = NDArray[np.float64]
 
 OF_JOINTS = ("position", "velocity", "force")
 SHOWN = 6
@@ -64,7 +67,7 @@ def read_logs(
     notes: list[str] = []
     for path, commanded in zip(files, told, strict=True):
         own = drive if commanded else None
-        one, more = _read(model, joint, path, own)
+        one, positions, more = _read(model, joint, path, own)
         notes += more
         if isinstance(one, Run):
             one, note = evened(one)
@@ -80,6 +83,8 @@ def read_logs(
                 f"'ctrl:{acting[0]}' nor 'force'; record its signal or the whole force on the "
                 "joint, or say with --passive that the actuator was off."
             )
+        if isinstance(one, Run) and positions:
+            one = _among_others(model, joint, one, positions)
         if first := next((other for other in read if _copies(one, other)), None):
             notes.append(
                 f"{path.name}: holds the same as {first.name}, and is left out: a copy is no "
@@ -103,22 +108,14 @@ def joints_in(model: mujoco.MjModel, path: Path) -> list[str]:
 
 def _read(
     model: mujoco.MjModel, joint: int, path: Path, drive: Drive | None
-) -> tuple[Run | QuasiStatic, list[str]]:
-    """A measurement of a joint, what other joints of its log do to it as a force; and notes."""
+) -> tuple[Run | QuasiStatic, dict[int, Array], list[str]]:
+    """A measurement of a joint; of a log of several all positions by joint; and notes."""
     name, there = joint_name(model, joint), joints_in(model, path)
     if name not in there:
         unused = _unused(model, joint, path, drive.names if drive else ())
-        return read_measurement(path, drive), unused
+        return read_measurement(path, drive), {}, unused
     run, positions = read_together(path, name, [one for one in there if one != name], drive)
     by_id = {model.joint(one).id: position for one, position in positions.items()}
-    found, other = (
-        force_of_others(model, joint, run.time, by_id, over) for over in (SMOOTHED, SHORTER)
-    )
-    doubt = doubt_of_others(run.time, found, other)
-    run = replace(run, force=run.force + found, forced=True, doubt=doubt)
-    inner = np.abs(run.time - (run.time[0] + run.time[-1]) / 2) <= (np.ptp(run.time) - SMOOTHED) / 2
-    if inner.sum() >= LEAST and len(there) > 1:  # the ends are smoothed from one side only
-        run = run.part(np.flatnonzero(inner))
     away = [model.joint(k).name or f"#{k}" for k in range(model.njnt) if k not in by_id]
     notes = []
     if away:
@@ -126,7 +123,22 @@ def _read(
             f"{path.name}: has no positions of {_listed(away[:SHOWN])}"
             f"{' and others' if len(away) > SHOWN else ''}: held at the model's reference."
         )
-    return run, notes
+    return run, by_id, notes
+
+
+def _among_others(
+    model: mujoco.MjModel, joint: int, run: Run, positions: Mapping[int, Array]
+) -> Run:
+    """The run with what the other joints of its log do to the joint as a force on it."""
+    found, other = (
+        force_of_others(model, joint, run.time, positions, over) for over in (SMOOTHED, SHORTER)
+    )
+    doubt = doubt_of_others(run.time, found, other)
+    run = replace(run, force=run.force + found, forced=True, doubt=doubt)
+    inner = np.abs(run.time - (run.time[0] + run.time[-1]) / 2) <= (np.ptp(run.time) - SMOOTHED) / 2
+    if inner.sum() < LEAST or len(positions) == 1:
+        return run
+    return run.part(np.flatnonzero(inner))  # the ends are smoothed from one side only
 
 
 def _commands(path: Path, acting: Sequence[str]) -> bool:
