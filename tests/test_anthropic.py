@@ -1,6 +1,7 @@
 """Asking a model: pictures go out, proposals come in, a failure is a sentence with its cost."""
 
 import base64
+import codecs
 import html
 import json
 import os
@@ -344,6 +345,20 @@ KEY = "sk-proj-Zq9x/W+7aLm3-4kTvB=8sPdYhJ"
         base64.b64encode(f"x-api-key: {KEY}".encode()).decode(),
         base64.b32encode(KEY.encode()).decode(),
         base64.b85encode(KEY.encode()).decode(),
+        "\\u200d".join(KEY),
+        "".join(f"\\\\u{byte:04x}" for byte in KEY.encode()),
+        "".join(f"\\u{{{byte:04x}}}" for byte in KEY.encode()),
+        "".join(f"\\{byte:03o}" for byte in KEY.encode()),
+        " ".join(f"{byte:o}" for byte in KEY.encode()),
+        ",".join(f"0x{byte:x}" for byte in KEY.encode()),
+        " ".join(f"{byte:08b}" for byte in KEY.encode()),
+        "".join(f"\\U{byte:08x}" for byte in KEY.encode()),
+        "\u0301".join(KEY),
+        codecs.encode(KEY, "rot13"),
+        "".join(chr(byte + 0xFEE0) for byte in KEY.encode()),
+        quote(quote(KEY, safe=""), safe="").replace("Zq9x", "%2525Zq9x"),
+        " and ".join(KEY[k : k + 9] for k in range(0, len(KEY), 9)),
+        " then ".join(KEY[k : k + 9] for k in range(0, len(KEY), 9)[::-1]),
     ],
 )
 def test_an_answer_that_holds_a_key_in_disguise_is_not_shown(monkeypatch, echo):
@@ -352,6 +367,16 @@ def test_an_answer_that_holds_a_key_in_disguise_is_not_shown(monkeypatch, echo):
     hide = Credentials("ANTHROPIC", None).hide
     assert hide(f"the key {echo} is wrong") == "[an answer that repeats a secret, not shown]"
     assert hide("objects, articulated: every where") == "objects, articulated: every where"
+
+
+def test_no_answer_is_hidden_that_only_looks_odd(monkeypatch):
+    monkeypatch.setenv("ANTHROPIC_API_KEY", KEY)
+    hide = Credentials("ANTHROPIC", None).hide
+    for path in sorted(Path(__file__).parent.parent.glob("docs/*.md")):
+        said = json.dumps({"said": path.read_text(), "x": [k / 7 for k in range(2000)]})
+        assert json.loads(hide(said)) == json.loads(said), path
+    assert "sk-proj" in hide("the key must begin with sk-proj")
+    assert hide("a" * 2_000_001) == "[an answer of more than two million characters, not shown]"
 
 
 @pytest.mark.parametrize(
