@@ -9,7 +9,13 @@ from test_compare import door, runs_of, scene_of
 from joda.component import Component
 from joda.diagnosis.better import improves, risen
 from joda.diagnosis.mending import Error
-from joda.diagnosis.plausible import EXCESS, Needs, implausible, unseen_place
+from joda.diagnosis.plausible import (
+    EXCESS,
+    Needs,
+    implausible,
+    unseen_place,
+    unseen_shape,
+)
 from joda.effects import StribeckFriction
 from joda.measured.reading import read_measured
 from joda.measured.visited import unvisited, unvisited_part, visited_share
@@ -104,6 +110,30 @@ def test_an_effect_is_not_placed_where_nobody_was(measured):
     assert "hardly any run visited s = 0.00 to 0.30" in unseen_place(near, (0.0, 0.3))
     assert unseen_place(measured, None) is None
     assert unseen_place(near, (0.0, 1.0)) is None  # a law, not a place
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "said"),
+    [
+        ((0, 0.4, 0.8, 1), (1, 1, 1, 1), None),  # as it is where runs were
+        ((0, 0.4, 0.8, 1), (1, 1, 2, 2), None),
+        ((0, 0.4, 0.8, 1), (-1, -1, 1, 1), "its force turns or begins at s = 0.6"),
+        ((0, 0.4, 0.8, 1), (1, 1, -0.05, -0.05), None),  # as good as nothing
+        ((0, 0.55, 0.8, 1), (1, 1, 4, 5), "its force would be 5 times as much at s = 1.00"),
+        ((0, 0.55, 0.8, 1), (0, 0, 1, 1), "its force turns or begins at s = 0.60"),
+        ((0, 0.1, 0.3, 1), (3, -1, 1, 1), "its force turns or begins at s = 0.0"),  # below, too
+    ],
+)
+def test_no_effect_turns_or_grows_where_no_run_was(measured, x, y, said):
+    lo, hi = measured.profile.joint.range
+    own = measured.runs[0]
+    there = lo + (hi - lo) * np.linspace(0.2, 0.5, len(own.time))
+    seen = measured.with_runs([replace(own, position=there)], [0])
+    part = Component(label="detent_internal", interval=(0, 1), x=x, y=y)
+    profile = measured.profile.with_component("conservative", part)
+    reason = unseen_shape((seen,), profile, "detent_internal", measured.profile)
+    assert reason is None if said is None else reason.startswith(said), reason
+    assert unseen_shape((seen, measured), profile, "detent_internal", measured.profile) is None
 
 
 @pytest.mark.parametrize(

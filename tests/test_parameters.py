@@ -5,6 +5,7 @@ import pytest
 
 from joda import templates
 from joda.component import Component
+from joda.diagnosis.reshaping import resolved
 from joda.field import evaluate
 from joda.joints.least_squares import bounded_step
 from joda.joints.parameters import KINDS, Parameters
@@ -50,6 +51,24 @@ def test_whatever_is_allowed_keeps_signs_and_rises_and_falls(name):
                 assert 0 <= a < b <= 1
                 for old, new in ((was.y, now.y), (np.diff(was.y), np.diff(now.y))):
                     assert np.all(np.sign(old) * np.array(new) >= -1e-6 * np.abs(was.y).max())
+
+
+@pytest.mark.parametrize("width", [0.3, 0.02])
+def test_a_steep_edge_keeps_its_shape_and_gets_no_points(width):
+    x, y = (0.0, 0.01, 0.5, 0.99, 1.0), (0.0, 0.6, 0.6, 0.6, 0.0)
+    rub = Component(label="rub", interval=(0.3, 0.3 + width), x=x, y=y)
+    joint = Joint(name="j", type="hinge", range=(0, 2), unit="rad")
+    channels = Channels(friction=Resistance(components=(rub,)))
+    finer = resolved(Profile(joint=joint, channels=channels))
+    (more,) = finer.channels.friction.components
+    gaps = np.diff(more.x) * width
+    assert set(x) <= set(more.x) and np.sum(gaps < 0.005) == 2  # the edges alone
+    assert len(more.x) == (7 if width > 0.1 else 5)
+    s = np.linspace(0, 1, 2001)
+    curves = (evaluate(Resistance(components=(one,)), s)[0] for one in (rub, more))
+    np.testing.assert_allclose(*curves, atol=1e-12)
+    slots = Parameters(finer, ("values",), keep_shape=False).slots
+    assert {slot.index for slot in slots} == set(range(1, len(more.x) - 1))  # the feet stay
 
 
 def test_strengths_multiply_channels():

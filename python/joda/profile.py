@@ -25,6 +25,8 @@ from joda.files import read_json
 from joda.plain import plain
 
 CHANNELS = ("conservative", "friction", "damping")
+NOUNS = {"conservative": "force", "friction": "friction", "damping": "damping"}
+"""What a channel is of, in words."""
 ATTRIBUTES = (
     "range",
     *(f"{name}{part}" for name in CHANNELS for part in ("", "_combine")),

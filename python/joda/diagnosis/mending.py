@@ -16,7 +16,7 @@ from joda.diagnosis.coverage import at_rest
 from joda.diagnosis.given import FAITHFUL, SHARED, Departures, departures, restored
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS
-from joda.diagnosis.plausible import Needs, implausible, unseen_place
+from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
 from joda.diagnosis.reshaping import Trials, Tried, checked
 from joda.diagnosis.share import overlap
 from joda.measured.errors import Errors, errors, known
@@ -135,6 +135,7 @@ def mend(
         reasons = []
         for one in sorted(some, key=lambda one: one.score):
             reason = implausible(needs, one.profile, effect)
+            reason = reason or unseen_shape((train, held), one.profile, effect, train.profile)
             if not reason and not _clearly(one.unseen, loss):
                 reason = NO_LESS
             if not reason:  # replays take longest
@@ -158,7 +159,7 @@ def mend(
         parts = departs.parts
         with threadpool_limits(1, BLAS):
             back = restored(first.profile, given, parts)
-            tried += trials.holding(back, effect, parts) if parts else ()
+            tried += trials.holding(back, parts) if parts else ()
         count = len(departs.sentences)
         found = [(one, departures(given, one.profile, effect, near)) for one in tried]
         other, error_then, _ = best(one for one, own in found if len(own.sentences) < count)

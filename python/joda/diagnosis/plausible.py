@@ -21,8 +21,8 @@ from joda.joints.resistance import damping, friction_bounds
 from joda.measured import smoothing
 from joda.measured.reading import Measured
 from joda.measured.runs import QuasiStatic, Run
-from joda.measured.visited import visited_share
-from joda.profile import CHANNELS, Profile
+from joda.measured.visited import unvisited_part, visited_share
+from joda.profile import CHANNELS, NOUNS, Profile
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -33,6 +33,10 @@ RESISTED = 0.2
 """Least part of the model's resistance that is left to a joint that no recorded force moves."""
 VISITED = 0.25
 """Least part of an effect's interval that runs must have visited."""
+UNSEEN = 3.0
+"""How many times what it is where runs were a curve may be where none was."""
+SOME = 0.1
+"""Of a curve's largest value: less is as good as nothing."""
 GRID = 201
 """Positions at which a curve's largest value is looked for."""
 
@@ -70,6 +74,48 @@ def unseen_place(measured: Measured, interval: Interval | None) -> str | None:
     if (a <= 0.0 and b >= 1.0) or visited_share(measured, (a, b)) >= VISITED:
         return None
     return f"hardly any run visited s = {a:.2f} to {b:.2f}, where it acts"
+
+
+def unseen_shape(
+    parts: Sequence[Measured], profile: Profile, effect: str, given: Profile
+) -> str | None:
+    """Why what is added cannot be told from the runs, as a clause: where none was it turns, or is
+    much more than where they were; None if neither.
+
+    Args:
+        parts: the measurements, in parts.
+        profile: with the effect.
+        effect: its name.
+        given: the profile before.
+    """
+    away = [(0.0, 1.0)]
+    for part in parts:
+        away = [(c, d) for one in away for c, d in unvisited_part(part, one)]
+    s, own = np.linspace(0, 1, GRID), divided(profile, effect, given)[0]
+    inside = [(s >= c) & (s <= d) for c, d in away]
+    seen = ~np.any(inside, axis=0) if inside else np.ones(GRID, bool)
+    for name in CHANNELS:
+        channel = getattr(own.channels, name)
+        if not channel.components or not seen.any():
+            continue
+        y = merge(channel)(s)[0]
+        for there in inside:
+            edges = y[seen & (np.roll(there, 1) | np.roll(there, -1))]
+            other = (
+                there & (np.abs(y) > SOME * np.abs(y).max()) & ~np.isin(np.sign(y), np.sign(edges))
+            )
+            if other.any():
+                return (
+                    f"its {NOUNS[name]} turns or begins at s = {s[other][0]:.2f}, where no run was"
+                )
+        most, beyond = (float(np.abs(y[some]).max(initial=0.0)) for some in (seen, ~seen))
+        if beyond > UNSEEN * most:
+            at = s[~seen][np.argmax(np.abs(y[~seen]))]
+            return (
+                f"its {NOUNS[name]} would be {beyond / most:.2g} times as much at s = {at:.2f}, "
+                "where no run was, as anywhere that runs were"
+            )
+    return None
 
 
 class Needs:

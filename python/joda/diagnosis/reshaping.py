@@ -1,8 +1,8 @@
 """Fits all numbers of a profile, with as many control points of an effect as the data support.
 
-First its shape is kept; then control points are added halfway between those it has, and each is
-free. Windows of the runs grow longer, as what is right in short ones is a good start for longer
-ones.
+First it has those of its template; then control points are added halfway between. What rises keeps
+rising, what falls falling, so that a magnet stays a magnet. Windows of the runs grow longer, as
+what is right in short ones is a good start for longer ones.
 """
 
 from collections.abc import Callable, Collection, Iterator
@@ -18,7 +18,7 @@ from joda.diagnosis.given import DOUBT, EFFECTS, Moved
 from joda.diagnosis.guessing import usual
 from joda.diagnosis.judge import BEND, Judge, Unknowns
 from joda.field import evaluate
-from joda.joints.parameters import Kind, Parameters
+from joda.joints.parameters import NARROWEST, Kind, Parameters
 from joda.measured.reading import Measured
 from joda.measured.replay import WINDOW
 from joda.profile import CHANNELS, Channel, Channels, Profile
@@ -107,19 +107,18 @@ class Trials:
             for length in self.lengths:
                 pace = f", windows of {length:.2g} s" if self.train.runs else ""
                 told(f"all numbers, {points} control points of the effect{pace}")
-                profile = refitted(self.train, profile, length, effect if finer else None)
+                profile = refitted(self.train, profile, length)
                 yield self.tried(profile)
 
-    def holding(self, profile: Profile, effect: str, parts: Collection[Moved]) -> Iterator[Tried]:
+    def holding(self, profile: Profile, parts: Collection[Moved]) -> Iterator[Tried]:
         """What fits of all other numbers make of a profile, while some parts stay as they are.
 
         Args:
             profile: to be fitted.
-            effect: whose shape need not be kept.
             parts: that stay.
         """
         for length in self.lengths:
-            profile = refitted(self.train, profile, length, effect, parts)
+            profile = refitted(self.train, profile, length, parts)
             yield self.tried(profile)
 
 
@@ -130,7 +129,7 @@ def _parts(profile: Profile) -> list[Component]:
 
 def resolved(profile: Profile, effect: str | None = None) -> Profile:
     """The same curves, nearly, of an effect or of all, with a control point halfway between each
-    two."""
+    two that are not close."""
     channels = {}
     for name in CHANNELS:
         channel = getattr(profile.channels, name)
@@ -142,8 +141,10 @@ def resolved(profile: Profile, effect: str | None = None) -> Profile:
 
 
 def _finer(part: Component) -> Component:
+    """Where control points are close, as in a steep edge, runs tell none between them."""
     x, (a, b) = np.array(part.x), part.interval
-    halves = (x[1:] + x[:-1]) / 2
+    wide = np.diff(x) * (b - a) >= 2 * NARROWEST
+    halves = ((x[1:] + x[:-1]) / 2)[wide]
     between = evaluate(Channel(components=(part,)), a + (b - a) * halves)[0]
     order = np.argsort(at := np.append(x, halves))
     y = np.append(part.y, between)[order]
@@ -159,7 +160,6 @@ def refitted(
     train: Measured,
     profile: Profile,
     length: float,
-    free: str | None = None,
     parts: Collection[Moved] = (),
 ) -> Profile:
     """All numbers of a profile fitted, near where they were.
@@ -168,7 +168,6 @@ def refitted(
         train: measured.
         profile: its shapes are kept.
         length: of windows, s.
-        free: effect whose shape need not be.
         parts: whose numbers stay as they are.
     """
     windows = windows_for(train, length, fine=False)  # at the scene's own step
@@ -177,7 +176,7 @@ def refitted(
         return profile
     kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
     inertia = train.single.inertia
-    parameters = Parameters(checked(profile), kinds, free=free, inertia=inertia)
+    parameters = Parameters(checked(profile), kinds, inertia=inertia)
     n = len(parameters.start)
     if not n:
         return profile

@@ -30,7 +30,8 @@ sizes before all else."""
 FARTHEST, LOGARITHM = 1e4, 8.0
 """Largest number, and largest logarithm of a size, that counts: a step may lead further."""
 NARROWEST, LEAST_WIDTH = 0.005, 1e-4
-"""Least width of an interval, in normalised position, of a fit and of all that it tries."""
+"""Least width of an interval, in normalised position, of a fit and of all that it tries. Points of
+a curve that are closer than the first are an edge, of which runs tell no shape."""
 
 SIGNED = ("sin", "cos", "force")
 """Numbers of effects that may have either sign."""
@@ -91,7 +92,6 @@ class Parameters:
         kinds: Collection[Kind],
         *,
         keep_shape: bool = True,
-        free: str | None = None,
         gravity: float = 1.0,
         inertia: float = np.inf,
     ) -> None:
@@ -101,14 +101,13 @@ class Parameters:
             profile: to be changed.
             kinds: of numbers that may change.
             keep_shape: see `constraints`.
-            free: label of components whose shapes are not kept all the same.
             gravity: the unit of a gravity offset, N·m or N, see `gravity_scale`.
             inertia: of the joint, kg·m² or kg; what is beyond a play is part of it.
         """
         self.profile = profile
         self.kinds = tuple(kinds)
         self._made: Callable[[Profile, Collection[Kind]], Parameters] = partial(
-            Parameters, keep_shape=keep_shape, free=free, gravity=gravity, inertia=inertia
+            Parameters, keep_shape=keep_shape, gravity=gravity, inertia=inertia
         )
         slots: list[Slot] = []
         start: list[float] = []
@@ -124,8 +123,7 @@ class Parameters:
                     slots.append(Slot("sizes", name, number))
                     start.append(0.0)
                 if "values" in kinds:
-                    kept = keep_shape and component.label != free
-                    _values(name, number, component, kept, slots, start, rows)
+                    _values(name, number, component, keep_shape, slots, start, rows)
                 if "intervals" in kinds:
                     _interval(name, number, component, slots, start, rows)
         if "effects" in kinds:
@@ -246,13 +244,17 @@ def _values(
     start: list[float],
     rows: Rows,
 ) -> None:
-    """A component's control points; where shapes are kept, those that are zero stay so."""
+    """A component's control points; those that are zero stay so where shapes are kept, and at the
+    foot of a steep edge."""
     y = np.array(component.y)
     scale = float(np.abs(y).max()) or 1.0
+    a, b = component.interval
+    steep = np.diff(component.x) * (b - a) < NARROWEST
+    foot = np.append(steep, False) | np.insert(steep, 0, False)
     at: dict[int, int] = {}
     for index, value in enumerate(y):
         sign = float(np.sign(value))
-        if keep_shape and sign == 0:
+        if sign == 0 and (keep_shape or foot[index]):
             continue
         at[index] = len(slots)
         if keep_shape or channel != "conservative":

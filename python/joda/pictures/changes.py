@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from joda.component import Component
 from joda.field import evaluate
 from joda.pictures.style import COLOURS, GRAVITY, clean, house_style
-from joda.profile import CHANNELS, Channel, Profile
+from joda.profile import CHANNELS, NOUNS, Channel, Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-
-NOUNS = {"conservative": "force", "friction": "friction", "damping": "damping"}
 
 
 def changes(before: Profile, after: Profile) -> list[str]:
