@@ -140,6 +140,16 @@ def test_refine_factors_multiply(door):
     assert peak(refined) == pytest.approx(0.5 * peak(plain), rel=1e-5)
 
 
+def test_what_no_joint_can_need_is_refused(door):
+    far = effect(FRICTION, friction="dominant", factor={"friction": 100})
+    with pytest.raises(JodaError, match=r"friction would be up to .* times what 'strong' stands"):
+        compile(proposal(far), door)
+    many = effect(FRICTION, friction="dominant", factor={"friction": 10})
+    assert peak(compile(proposal(many), door)) > 0
+    with pytest.raises(JodaError, match="propose fewer effects"):
+        compile(proposal(*[many] * 12), door)
+
+
 def test_the_prototype_is_stretched_over_the_interval(door):
     profile = compile(proposal(effect(MAGNET, 0.0, 0.1, conservative="strong")), door)
     (component,) = profile.channels.conservative.components

@@ -11,10 +11,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from joda.component import Component
 from joda.errors import JodaError
+from joda.field import evaluate
 from joda.files import check_target, write_text
-from joda.profile import CHANNELS, Channels, Profile, rounded
+from joda.profile import CHANNELS, NOUNS, Channels, Profile, rounded
 from joda.proposal import EffectProposal, Label, Proposal
 from joda.scenes.context import Context, context
 from joda.template import Template, read_templates
@@ -28,8 +31,14 @@ BANDS: dict[Label, tuple[float, float]] = {
 }
 """Multipliers of the reference that a strength label stands for."""
 
+GRID = 401
+"""Positions at which peaks are looked for."""
+
 TRAVEL_TIME = 1.0
 """Reference time (s) in which the inertial reference force moves a joint through its range."""
+
+LARGEST = 100.0
+"""Peak of a channel, in units of the reference, beyond which a proposal cannot be meant."""
 
 HAND_FORCE = 10.0
 """What a hand calls strong (N), at the end of the lever arm. Small parts would go without it: by
@@ -66,7 +75,8 @@ def compile(  # the command's name
         the profile.
 
     Raises:
-        JodaError: a file cannot be read or written, the joint does not fit, an effect is unknown.
+        JodaError: a file cannot be read or written, the joint does not fit, an effect is unknown,
+            or all together are absurdly strong.
     """
     if output is not None:
         check_target(Path(output), force)
@@ -97,9 +107,26 @@ def compile(  # the command's name
         channels=Channels.model_validate(channels),
         joint_limit_hint=read.joint_limit_hint,
     )
+    if absurd := _absurd(profile, found, read.gravity_can_be_ignored):
+        raise JodaError(f"{file}{absurd}")
     if output is not None:
         write_text(Path(output), profile.to_json())
     return profile
+
+
+def _absurd(profile: Profile, found: Context, ignore_gravity: bool) -> str | None:
+    """That a channel is far stronger than anything that moves the joint, a sentence."""
+    s, unit = np.linspace(0, 1, GRID), found.joint.force_unit
+    for name, reference in reference_scales(found, ignore_gravity).items():
+        peak = float(np.abs(evaluate(getattr(profile.channels, name), s)[0]).max())
+        if peak > LARGEST * reference:
+            per = f"·s/{found.joint.unit}" if name == "damping" else ""
+            return (
+                f"{NOUNS[name]} would be up to {peak:.3g} {unit}{per}, {peak / reference:.3g} "
+                f"times what 'strong' stands for ({reference:.3g} {unit}{per}); lower the "
+                "strengths or the refineFactors, or propose fewer effects."
+            )
+    return None
 
 
 def contributions(

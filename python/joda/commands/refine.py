@@ -22,6 +22,7 @@ from joda.measured.gauge import compared
 from joda.measured.obstructed import clear_of_contacts
 from joda.measured.reading import Measured, checked, taken
 from joda.measured.runs import QuasiStatic, Run, check_known
+from joda.measured.visited import unvisited
 from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.profile import Profile
@@ -164,11 +165,13 @@ def refine(
     parts, _, cut = excerpts(timed)
     notes += cut
     unit = gravity_scale(found, begin)
-    parameters = Parameters(begin, fit, keep_shape=keep_shape, gravity=unit)
-    if not len(parameters.start):
-        raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
     fitting = replace(clear, measured=[*parts, *still])
     at_first = taken(compiled, number, found, whole, fitting, servo=servo)
+    parameters = Parameters(
+        begin, fit, keep_shape=keep_shape, gravity=unit, away=unvisited(at_first)
+    )
+    if not len(parameters.start):
+        raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
     if why := hardly_moved(at_first):
         raise JodaError(f"{', '.join(one.name for one in clear.measured)}: {why}")
     if times := at_first.doubtful_unit:

@@ -257,6 +257,12 @@ def off_beside(found: Sequence[Number]) -> str:
     return f" The model's own numbers that suit the runs best with it: {told}." if told else ""
 
 
+def off_without(found: Sequence[Number]) -> str:
+    """Which numbers are off where no effect is named, as a further sentence; empty if none is."""
+    told = off(found)
+    return f" The model's own numbers that suit the runs best without it: {told}." if told else ""
+
+
 def by_one_factor(found: Sequence[Number]) -> str:
     """That all strengths that the data tell are off by one factor, a further sentence: then it may
     be the force's or, of an actuator too, the inertia's."""

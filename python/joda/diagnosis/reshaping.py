@@ -21,6 +21,7 @@ from joda.field import evaluate
 from joda.joints.parameters import NARROWEST, Kind, Parameters
 from joda.measured.reading import Measured
 from joda.measured.replay import WINDOW
+from joda.measured.visited import unvisited
 from joda.profile import CHANNELS, Channel, Channels, Profile
 
 Array = NDArray[np.float64]
@@ -176,7 +177,8 @@ def refitted(
         return profile
     kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
     inertia = train.single.inertia
-    parameters = Parameters(checked(profile), kinds, inertia=inertia)
+    away = unvisited(train)
+    parameters = Parameters(checked(profile), kinds, inertia=inertia, away=away)
     n = len(parameters.start)
     if not n:
         return profile
@@ -217,7 +219,7 @@ def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:
         y = np.array(there[slot.component].y)
         if y.any() and len(y) == len(own[slot.component].y):
             mean[k] = y[slot.index] / scale
-            doubt[k] = DOUBT * np.abs(y).max() / scale
+            doubt[k] = min(doubt[k], DOUBT * np.abs(y).max() / scale)
     return mean, doubt
 
 

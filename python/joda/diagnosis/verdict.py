@@ -17,6 +17,7 @@ from joda.diagnosis.corrections import (
     numbers,
     off,
     off_beside,
+    off_without,
     one_factor,
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
@@ -106,8 +107,10 @@ EITHER = "Either the model's own numbers are off ({}), or a force is missing"
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
 OUT_THERE = (
-    "Something is missing that acts at s = {:.2f} to {:.2f}, where no run was or hardly any: what "
-    "it is these data cannot tell, an obstacle, another end of the range, a latch."
+    "Something is missing, and what explains most of it would act at s = {:.2f} to {:.2f}, where "
+    "no run was or hardly any: whether it does, these data cannot tell. It may be an obstacle, "
+    "another end of the range, a latch, or nothing of the joint, such as a push that was not "
+    "recorded."
 )
 NO_EFFECT = "Something is missing that no known effect explains."
 
@@ -179,14 +182,11 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     }
     sized = [k for k, one in every.items() if one.sized]
     experiment = _next(measured, ranking, weighed, one_way)
-    if not sized:
-        why = BOUNCY if ranking.bouncy else NO_EFFECT
+    if not sized or unseen_place(measured, every[sized[0]].interval):
+        where = OUT_THERE.format(*every[sized[0]].interval) if sized else NO_EFFECT
+        why = BOUNCY if ranking.bouncy and not sized else where
         said = _said(measured, "unexplained", why, (), experiment)
-        return Diagnosed(said, puzzling=puzzling)
-    if unseen_place(measured, every[sized[0]].interval):
-        where = OUT_THERE.format(*every[sized[0]].interval)
-        said = _said(measured, "unexplained", where, (), experiment)
-        return Diagnosed(said, puzzling=puzzling)
+        return _driven(Diagnosed(said, puzzling=puzzling), ranking.asked)
     findings = tuple(every[k] for k in sized)
     profile = ranking.guesses[sized[0]].written(ranking.asked.base)
     first = findings[0]
@@ -209,7 +209,23 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
         doubt=doubt,
     )
     servo = corrected(ranking.asked, own, FAR_OFF, guess.fit.x, driven_only=True) if sure else None
-    return Diagnosed(said, profile if worth else None, findings, puzzling, corrected=servo)
+    told = Diagnosed(said, profile if worth else None, findings, puzzling, corrected=servo)
+    return told if sure or doubt else _driven(told, ranking.asked)
+
+
+def _driven(found: Diagnosed, begun: Asked) -> Diagnosed:
+    """The same with the numbers of the model that suit the runs best without an effect, where an
+    actuator drives the joint: of that few models know any."""
+    own = numbers(begun)
+    if begun.base.single.servo is None or not (right := corrected(begun, own, OFF, begun.fit.x)):
+        return found
+    said = found.diagnosis
+    told = replace(
+        said,
+        summary=f"{said.summary}{off_without(own)}",
+        corrections=corrections(own, begun.base.profile.joint, OFF),
+    )
+    return replace(found, diagnosis=told, corrected=right)
 
 
 def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosed:

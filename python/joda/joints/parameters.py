@@ -50,6 +50,9 @@ DOUBT: dict[Kind, float] = {
     "sizes": 1.2,
 }
 """How far (one standard deviation) a number may be from its first value before any data."""
+UNSEEN = 0.1
+"""How much less that is for a control point where no run was: of it the data tell only what it does
+to the curve beside it, which is no reason to bend it."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,7 @@ class Parameters:
         keep_shape: bool = True,
         gravity: float = 1.0,
         inertia: float = np.inf,
+        away: Sequence[tuple[float, float]] = (),
     ) -> None:
         """Lists the numbers.
 
@@ -103,11 +107,12 @@ class Parameters:
             keep_shape: see `constraints`.
             gravity: the unit of a gravity offset, N·m or N, see `gravity_scale`.
             inertia: of the joint, kg·m² or kg; what is beyond a play is part of it.
+            away: parts of the range where no run was, in normalised position.
         """
         self.profile = profile
         self.kinds = tuple(kinds)
         self._made: Callable[[Profile, Collection[Kind]], Parameters] = partial(
-            Parameters, keep_shape=keep_shape, gravity=gravity, inertia=inertia
+            Parameters, keep_shape=keep_shape, gravity=gravity, inertia=inertia, away=away
         )
         slots: list[Slot] = []
         start: list[float] = []
@@ -143,7 +148,9 @@ class Parameters:
         self.slots = tuple(slots)
         self.start = np.array(start)
         self.scales = np.array([_scale(profile, slot, gravity) for slot in slots])
-        self.doubt = np.array([DOUBT[slot.kind] for slot in slots])
+        unseen = np.array([_at(profile, slot, away) for slot in slots], bool)
+        doubt = np.array([DOUBT[slot.kind] for slot in slots])
+        self.doubt = np.where(unseen, UNSEEN, 1.0) * doubt
         farthest = [LOGARITHM if slot.kind == "sizes" else FARTHEST for slot in slots]
         self._farthest = np.array(farthest)
         G = np.zeros((len(rows), len(slots)))
@@ -224,6 +231,16 @@ def gravity_scale(context: Context, profile: Profile) -> float:
     """The unit of a gravity offset, N·m or N: gravity's largest force, or the profile's."""
     components = profile.channels.conservative.components
     return max(context.gravity_scale, *(abs(y) for c in components for y in c.y), 1e-9)
+
+
+def _at(profile: Profile, slot: Slot, parts: Sequence[tuple[float, float]]) -> bool:
+    """Whether a number is a control point in some parts of the range."""
+    if slot.kind != "values":
+        return False
+    component = getattr(profile.channels, slot.channel).components[slot.component]
+    a, b = component.interval
+    s = a + (b - a) * component.x[slot.index]
+    return any(c < s < d or s == c == 0.0 or s == d == 1.0 for c, d in parts)
 
 
 def _scale(profile: Profile, slot: Slot, gravity: float) -> float:
