@@ -1,6 +1,7 @@
 """Logs of several joints: what the others do to one, each by itself, and all at once."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ from joda import JodaError, compare, compare_all, diagnose_all, improve_all
 from joda.measured.others import force_of_others
 from joda.measured.reading import read_measured
 from joda.measured.scene_replay import replayed_together
+from joda.measured.touching import NEAR, touching
 
 ARM = """<mujoco>
   <compiler angle="radian"/>
@@ -69,6 +71,62 @@ def log(path, seed, seconds=6.0, header=True, kp=30.0):
 def logs(folder, count=2, **more):
     seeds = np.random.SeedSequence().generate_state(count)
     return [log(folder / f"log{k}.csv", int(seed), **more) for k, seed in enumerate(seeds)]
+
+
+TABLE = """<mujoco><compiler angle="radian"/><worldbody>
+  <geom name="table" type="plane" pos="0 0 -.3" size="2 2 .1"/>
+  <body>
+    <joint name="shoulder" axis="0 1 0" range="-2 2" limited="true"/>
+    <geom type="box" size=".2 .01 .01" pos=".2 0 .1"/>
+    <body pos=".4 0 0">
+      <joint name="elbow" axis="0 1 0" range="-2 2" limited="true"/>
+      <geom name="tip" type="sphere" size=".02" pos=".3 0 0"/>
+      <body pos=".3 0 .1"><joint name="jaw" type="slide" axis="1 0 0" range="0 .1" limited="true"/>
+        <geom size=".01" pos="0 0 .3" contype="0" conaffinity="0"/></body>
+    </body>
+  </body></worldbody></mujoco>"""
+
+
+def test_touches_are_found_where_geometry_has_them():
+    arm = mujoco.MjModel.from_xml_string(TABLE)
+    rng = np.random.default_rng()
+    q = np.stack([rng.uniform(0, 0.8, 400), rng.uniform(-0.6, 0.6, 400), np.zeros(400)])
+    height = -0.4 * np.sin(q[0]) - 0.3 * np.sin(q[:2].sum(axis=0)) - 0.02 + 0.3
+    ids = {name: arm.joint(name).id for name in ("shoulder", "elbow", "jaw")}
+    positions = {ids[name]: own for name, own in zip(ids, q, strict=True)}
+    for name, arms in (("shoulder", (0.6, 0.72)), ("elbow", (0.28, 0.32))):
+        inside, pairs = touching(arm, ids[name], positions)
+        near = [NEAR * length for length in arms]  # how far the place of contact is from the joint
+        sure, never = height < near[0], height > near[1] + 0.002
+        beside = np.convolve(~never, np.ones(5), mode="same") > 0
+        assert 20 < inside.sum() < 380 and ("tip", "table") in pairs
+        assert inside[sure].all() and not inside[~beside].any()
+    assert not touching(arm, ids["jaw"], positions)[0].any()  # the tip does not move with it
+
+
+def test_what_always_touches_is_no_touch():
+    rests = TABLE.replace('pos="0 0 -.3"', 'pos="0 0 -.02"')
+    arm = mujoco.MjModel.from_xml_string(rests)
+    still = {0: np.zeros(50), 1: np.zeros(50)}
+    assert not touching(arm, 0, still)[0].any()
+
+
+def test_where_the_scene_touches_is_left_out_and_said(tmp_path):
+    path = tmp_path / "arm.xml"
+    path.write_text(TABLE)
+    time = np.arange(400) / 100
+    q, u = 0.45 - 0.35 * np.cos(2 * time), 0.1 * np.sin(3 * time)
+    rows = "".join(f"{t:.3f},{a:.6f},{b:.6f}\n" for t, a, b in zip(time, q, u, strict=True))
+    (tmp_path / "run.csv").write_text("time,position:shoulder,position:elbow\n" + rows)
+    found = read_measured(path, "elbow", [tmp_path / "run.csv"])
+    (told,) = [note for note in found.notes if "left out" in note]
+    count = int(re.search(r"run.csv: (\d+) of 400 samples", told).group(1))
+    low = -0.4 * np.sin(q) - 0.3 * np.sin(q + u) - 0.02 + 0.3 < 0
+    assert low.sum() <= count < 390 and "'tip' 'table'" in told
+    gone = np.concatenate([run.time for run in found.runs])[
+        np.isnan(np.concatenate([run.force for run in found.runs]))
+    ]
+    assert set(time[low & (time > 0.16) & (time < 3.83)].round(3)) <= set(gone.round(3))
 
 
 def test_the_force_of_the_others_is_that_of_a_planar_arm():

@@ -15,6 +15,7 @@ from joda.joints.single import Single
 from joda.measured.reading import Measured
 from joda.profile import CHANNELS, Profile
 from joda.scenes.actuators import Servo
+from joda.scenes.native import DAMPING
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,8 @@ AT_END = 0.02
 @dataclass(frozen=True)
 class Base:
     """The model as it is, with numbers: a factor for each of its components' strengths, and of an
-    actuator the logarithms of its gain's and its damping's factors and its delay (s).
+    actuator the logarithms of its gain's and its damping's factors and its delay (s). Where it
+    damps, the joint's own damping has the same factor: no run tells one from the other.
 
     Attributes:
         profile: of the joint.
@@ -90,15 +92,22 @@ class Base:
         for name in CHANNELS:
             channel = getattr(self.profile.channels, name)
             parts = list(channel.components)
-            for (where, number), factor in zip(self.places, x, strict=False):
+            for (where, number), factor in self._factors(x):
                 if where == name:
                     old = parts[number]
-                    y = tuple(float(factor) * value for value in old.y)
+                    y = tuple(factor * value for value in old.y)
                     parts[number] = old.model_copy(update={"y": y})
             channels[name] = channel.model_copy(update={"components": tuple(parts)})
         return self.profile.model_copy(
             update={"channels": self.profile.channels.model_copy(update=channels)}
         )
+
+    def _factors(self, x: Array) -> list[tuple[tuple[str, int], float]]:
+        """Of each component that has one."""
+        own = [(place, float(factor)) for place, factor in zip(self.places, x, strict=False)]
+        drag = self.single.servo is not None and self.single.servo.damping > 0
+        shared = shared_damping(self.profile) if drag else []
+        return own + [(place, float(np.exp(x[len(self.places) + 1]))) for place in shared]
 
     def coarser(self) -> "Base":
         """The same for `GRID` times longer steps."""
@@ -121,6 +130,8 @@ def base_of(profile: Profile, single: Single, h: float) -> Base:
         for number, part in enumerate(getattr(profile.channels, name).components)
         if any(part.y)
     )
+    if single.servo is not None and single.servo.damping > 0:
+        places = tuple(place for place in places if place not in shared_damping(profile))
     k = len(places)
     doubt, most = (BASE_DOUBT, 20.0) if single.servo is None else (DRIVEN_DOUBT, 100.0)
     unknowns = Unknowns(
@@ -129,6 +140,12 @@ def base_of(profile: Profile, single: Single, h: float) -> Base:
     if single.servo is not None:
         unknowns = unknowns.and_(_of_servo(single.servo))
     return Base(profile, single, h, places, unknowns)
+
+
+def shared_damping(profile: Profile) -> list[tuple[str, int]]:
+    """Channel and number of the joint's own damping, which is as an actuator's is."""
+    parts = enumerate(profile.channels.damping.components)
+    return [("damping", number) for number, part in parts if part.label == DAMPING]
 
 
 def _of_servo(servo: Servo) -> Unknowns:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from joda.component import Component
 from joda.diagnosis.asking import Asked
-from joda.diagnosis.baseline import Base, joined
+from joda.diagnosis.baseline import Base, joined, shared_damping
 from joda.diagnosis.guessing import Guess
 from joda.profile import Joint, Profile
 from joda.scenes.actuators import Servo
@@ -23,7 +23,7 @@ CLEARLY = 3.0
 """And by so many of its standard errors."""
 ANYTHING = 10.0
 """How far off a number may be of which the data tell nothing, in its own unit."""
-GAIN, DRAG, DELAY = "gain of the actuator", "damping of the actuator", "delay of commands"
+GAIN, DRAG, DELAY = "gain of the actuator", "damping of joint and actuator", "delay of commands"
 """What the numbers of an actuator are called."""
 ALIKE = 0.12
 """By how much factors may differ that are one."""
@@ -75,6 +75,7 @@ class Number:
         error: its standard error.
         unit: of all three.
         scale: of which a part is much or little.
+        place: of it among those that were fitted.
     """
 
     label: str
@@ -84,6 +85,7 @@ class Number:
     error: float
     unit: str
     scale: float
+    place: int
 
     def off(self, least: float) -> bool:
         """Whether it is off, by some part at the least and by several of its errors."""
@@ -133,39 +135,31 @@ def numbers(
     """
     base = asked.base
     x, errors = found or ((guess.fit if guess else asked.fit).x, _errors(asked, guess))
-    joint = base.profile.joint
+    n, joint, servo = len(base.places), base.profile.joint, base.single.servo
     parts = (getattr(base.profile.channels, name).components[k] for name, k in base.places)
-    servo = base.single.servo
+    told = zip(base.places, parts, x, errors, strict=False)
     out = [
-        _strength(part.label or place[0], part, joint, float(factor), float(error), servo)
-        for place, part, factor, error in zip(base.places, parts, x, errors, strict=False)
+        _strength(part.label or place[0], part, joint, (float(factor), float(error)), k)
+        for k, (place, part, factor, error) in enumerate(told)
     ]
-    if servo is not None:
-        (gain, drag, late), (doubt, unsure, uneven) = (
-            own[len(out) : base.count] for own in (x, errors)
-        )
-        factor, stiff = float(np.exp(gain)), servo.stiffness
-        given, unit = (stiff, f"{joint.force_unit}/{joint.unit}") if stiff > 0 else (1.0, "")
-        error = factor * float(doubt)
-        out += [
-            Number(GAIN, "actuator_gain", given, factor * given, error * given, unit, scale=given),
-            *_drag(servo, joint, out, (float(np.exp(drag)), float(unsure))),
-            Number(DELAY, "time_delay", servo.delay, float(late), float(uneven), "s", scale=SLOW),
-        ]
-    return tuple(out)
+    return (*out, *(_of_actuator(base, servo, x[n:], errors[n:]) if servo else ()))
 
 
-def _drag(
-    servo: Servo, joint: Joint, others: Sequence[Number], found: tuple[float, float]
-) -> list[Number]:
-    """The damping of an actuator that has some, which is told beside the joint's own."""
-    if not servo.damping:
-        return []
-    (factor, error), given = found, servo.damping
-    own = sum(one.given for one in others if one.parameter == "damping")
-    unit = f"{joint.force_unit}·s/{joint.unit}"
-    size = factor * given
-    return [Number(DRAG, "damping", given, size, error * size, unit, scale=given + own)]
+def _of_actuator(base: Base, servo: Servo, x: Array, errors: Array) -> list[Number]:
+    """Its gain, its damping with the joint's own, and its delay."""
+    n, joint = len(base.places), base.profile.joint
+    (gain, drag, late), (doubt, unsure, uneven) = (map(float, own[:3]) for own in (x, errors))
+    factor, stiff = float(np.exp(gain)), servo.stiffness
+    given, unit = (stiff, f"{joint.force_unit}/{joint.unit}") if stiff > 0 else (1.0, "")
+    error = factor * doubt
+    out = [Number(GAIN, "actuator_gain", given, factor * given, error * given, unit, given, n)]
+    if servo.damping > 0:
+        own = (base.profile.channels.damping.components[k] for _, k in shared_damping(base.profile))
+        given, factor = servo.damping + sum(part.y[0] for part in own), float(np.exp(drag))
+        unit, error = f"{joint.force_unit}·s/{joint.unit}", factor * unsure
+        size = factor * given
+        out.append(Number(DRAG, "damping", given, size, error * given, unit, given, n + 1))
+    return [*out, Number(DELAY, "time_delay", servo.delay, late, uneven, "s", SLOW, n + 2)]
 
 
 @dataclass(frozen=True)
@@ -197,9 +191,9 @@ def corrected(
         None if none is.
     """
     base = asked.base
-    off = np.array([one.off(least) for one in found], bool)
-    if driven_only:
-        off[: len(base.places)] = False
+    first = len(base.places) if driven_only else 0
+    off = np.zeros(base.count, bool)
+    off[[one.place for one in found if one.place >= first and one.off(least)]] = True
     if not off.any():
         return None
     mixed = np.where(off, x[: base.count], base.unknowns.mean)
@@ -207,23 +201,18 @@ def corrected(
 
 
 def _strength(
-    label: str,
-    component: Component,
-    joint: Joint,
-    factor: float,
-    error: float,
-    servo: Servo | None,
+    label: str, component: Component, joint: Joint, found: tuple[float, float], place: int
 ) -> Number:
-    """Of a component; a servo damps too, and the data do not tell which of both does."""
+    """Of a component, by its factor and the error of that."""
+    factor, error = found
     if label not in NATIVE:
-        return Number(label, None, 1.0, factor, error, "", scale=1.0)
+        return Number(label, None, 1.0, factor, error, "", 1.0, place)
     parameter, given = NATIVE[label], component.y[0]
     if parameter == "stiffness":
         given = (given - component.y[-1]) / float(np.ptp(joint.range))
     per = {"damping": f"·s/{joint.unit}", "stiffness": f"/{joint.unit}", "frictionloss": ""}
     unit = joint.force_unit + per[parameter]
-    scale = abs(given) + (servo.drag if servo and parameter == "damping" else 0.0)
-    return Number(label, parameter, given, factor * given, error * given, unit, scale)
+    return Number(label, parameter, given, factor * given, error * given, unit, abs(given), place)
 
 
 def _errors(asked: Asked, guess: Guess | None) -> Array:

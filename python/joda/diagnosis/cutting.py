@@ -22,8 +22,9 @@ FEWEST = 12
 """Samples that a window has at least."""
 MOST = 160
 """Samples of a window that count at most; of more, every second or third does."""
-STEPS = 300
-"""Steps that a window has at least."""
+STEPS, DRIVEN_STEPS = 300, 100
+"""Steps that a window has at least; and where an actuator acts, whose commands come in their
+own steps."""
 HOP = 0.25
 """How far a joint must fall back to an end to knock there, in units of that."""
 APPROACH = 8
@@ -58,7 +59,8 @@ def windows_of(
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
-    h = _step(timestep, length, usual) if fine else timestep
+    driven = any(run.command is not None for run in runs)
+    h = _step(timestep, length, usual, DRIVEN_STEPS if driven else STEPS) if fine else timestep
     parts: list[tuple[NDArray[Any], ...]] = []
     samples: list[tuple[NDArray[Any], ...]] = []
     step, count = 0, 0
@@ -118,19 +120,20 @@ def windows_of(
         shared=_shared(rows, time, spread, push / inertia),
         knocks=_knocks(rows, (position - lo) / span, spread / span, hits),
         rests=_rests(rows, (position - lo) / span, spread / span),
-        command=command if any(run.command is not None for run in runs) else None,
+        command=command if driven else None,
     )
 
 
-def _step(timestep: float, length: float, usual: float) -> float:
+def _step(timestep: float, length: float, usual: float, steps: int) -> float:
     """A part or a multiple of the scene's timestep (s) that is short for windows of some length.
 
     Args:
         timestep: the scene's, s.
         length: of the windows, s.
         usual: length of windows by the joint's pace, s; only for its sake are steps longer.
+        steps: that a window has at least.
     """
-    wanted = min(length / STEPS, max(timestep, usual / STEPS))
+    wanted = min(length / steps, max(timestep, usual / steps))
     if wanted < timestep:
         return float(timestep / np.ceil(timestep / wanted))
     return float(timestep * np.floor(wanted / timestep + 1e-9))

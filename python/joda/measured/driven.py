@@ -19,6 +19,7 @@ from joda.measured.runs import (
     read_together,
 )
 from joda.measured.table import header
+from joda.measured.touching import touching
 from joda.scenes.actuators import Drive, Servo, actuators_on, drive_of
 from joda.scenes.model import joint_name
 
@@ -84,7 +85,8 @@ def read_logs(
                 "joint, or say with --passive that the actuator was off."
             )
         if isinstance(one, Run) and positions:
-            one = _among_others(model, joint, one, positions)
+            one, more = _among_others(model, joint, one, positions)
+            notes += more
         if first := next((other for other in read if _copies(one, other)), None):
             notes.append(
                 f"{path.name}: holds the same as {first.name}, and is left out: a copy is no "
@@ -128,17 +130,31 @@ def _read(
 
 def _among_others(
     model: mujoco.MjModel, joint: int, run: Run, positions: Mapping[int, Array]
-) -> Run:
-    """The run with what the other joints of its log do to the joint as a force on it."""
+) -> tuple[Run, list[str]]:
+    """The run with what the other joints of its log do to the joint as a force on it, which is not
+    known where something of the scene touches; and notes."""
     found, other = (
         force_of_others(model, joint, run.time, positions, over) for over in (SMOOTHED, SHORTER)
     )
-    doubt = doubt_of_others(run.time, found, other)
-    run = replace(run, force=run.force + found, forced=True, doubt=doubt)
+    doubt, (inside, pairs) = (
+        doubt_of_others(run.time, found, other),
+        touching(model, joint, positions),
+    )
+    force = np.where(inside, np.nan, run.force + found)
+    run = replace(run, force=force, forced=True, doubt=doubt, among=True)
+    notes = []
+    if inside.any():
+        pair = max(pairs, key=lambda one: pairs[one])
+        more = f" and {len(pairs) - 1} pairs more" if len(pairs) > 1 else ""
+        notes.append(
+            f"{run.name}: {inside.sum()} of {len(inside)} samples are left out, as something of "
+            f"the scene touches what joint '{joint_name(model, joint)}' moves, or may: "
+            f"'{pair[0]}' '{pair[1]}'{more}."
+        )
     inner = np.abs(run.time - (run.time[0] + run.time[-1]) / 2) <= (np.ptp(run.time) - SMOOTHED) / 2
     if inner.sum() < LEAST or len(positions) == 1:
-        return run
-    return run.part(np.flatnonzero(inner))  # the ends are smoothed from one side only
+        return run, notes
+    return run.part(np.flatnonzero(inner)), notes  # the ends are smoothed from one side only
 
 
 def _commands(path: Path, acting: Sequence[str]) -> bool:

@@ -14,6 +14,8 @@ SMOOTHED, ORDER = 0.3, 5
 """Time over which a motion is smoothed, s, and by polynomials of which order."""
 SHORTER = 0.2
 """Another time, with which its error is told, s."""
+GRID = 401
+"""Positions at which what a joint needs by itself is asked for."""
 FEWEST = 9
 """Samples over which it is smoothed at least."""
 
@@ -64,26 +66,35 @@ def force_of_others(
     Returns:
         N·m or N, shape (n,).
     """
-    data, dof = mujoco.MjData(model), int(model.jnt_dofadr[joint])
+    dof = int(model.jnt_dofadr[joint])
     motions = {k: motion(time, own, over) for k, own in positions.items()}
-    out, torque = np.empty(len(time)), np.empty(model.nv)
+    own = motions[joint]
+    grid = np.linspace(own.position.min(), own.position.max(), GRID)
+    still = Motion(grid, np.zeros(GRID), np.zeros(GRID))
+    pushed = Motion(grid, np.zeros(GRID), np.ones(GRID))
+    held, more = (_needed(model, {joint: one})[:, dof] for one in (still, pushed))
+    alone = np.interp(own.position, grid, held)
+    alone += np.interp(own.position, grid, more - held) * own.acceleration
+    return np.asarray(alone - _needed(model, motions)[:, dof])
 
-    def needed(moving: Mapping[int, Motion], k: int, still: bool) -> float:
-        data.qpos[:], data.qvel[:], data.qacc[:] = model.qpos0, 0.0, 0.0
-        for number, own in moving.items():
-            adr, at = model.jnt_qposadr[number], model.jnt_dofadr[number]
-            data.qpos[adr] = own.position[k]
-            data.qvel[at] = 0.0 if still else own.velocity[k]
-            data.qacc[at] = own.acceleration[k]
+
+def _needed(model: mujoco.MjModel, motions: Mapping[int, Motion]) -> Array:
+    """The inverse dynamics along motions of some joints, all others at their reference; N·m or N,
+    shape (n, nv)."""
+    data, count = mujoco.MjData(model), len(next(iter(motions.values())).position)
+    q = np.tile(model.qpos0, (count, 1))
+    v, a, out = (np.zeros((count, model.nv)) for _ in range(3))
+    for number, own in motions.items():
+        at = model.jnt_dofadr[number]
+        q[:, model.jnt_qposadr[number]] = own.position
+        v[:, at], a[:, at] = own.velocity, own.acceleration
+    qpos, qvel, qacc = data.qpos, data.qvel, data.qacc
+    for k in range(count):
+        qpos[:], qvel[:], qacc[:] = q[k], v[k], a[k]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)
-        mujoco.mj_rne(model, data, 1, torque)
-        return float(torque[dof])
-
-    alone = {joint: motions[joint]}
-    for k in range(len(time)):
-        out[k] = needed(alone, k, True) - needed(motions, k, False)
+        mujoco.mj_rne(model, data, 1, out[k])
     return out
 
 

@@ -41,6 +41,7 @@ class Run:
             none.
         command: of the actuators on the joint (`joda.scenes.actuators.Drive`), held from its sample
             to the next, N·m or N; None where none acted.
+        among: whether other joints moved meanwhile, and contacts were looked for along that.
         origin: what was subtracted from the file's times, s.
         unread: names of the file's other columns.
     """
@@ -53,6 +54,7 @@ class Run:
     forced: bool
     doubt: Array | None = None
     command: Array | None = None
+    among: bool = False
     origin: float = 0.0
     unread: tuple[str, ...] = ()
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from joda.profile import Joint
 from joda.scenes.engine import inertia_at
-from joda.scenes.model import moves_with
+from joda.scenes.model import geom_name, moves_with
 from joda.scenes.motion import at_home
 
 Array = NDArray[np.float64]
@@ -240,12 +240,7 @@ class _Sweep:
     def _name(self, geom: int) -> str:
         if geom < 0:
             return "a flexible body"
-        body = int(self.model.geom_bodyid[geom])
-        return str(
-            self.model.geom(geom).name
-            or self.model.body(body).name
-            or ("the world" if body == 0 else f"body {body}")
-        )
+        return geom_name(self.model, geom)
 
     def _force(self, rows: Sequence[int]) -> Array:
         """The generalised force of solver rows, N·m or N, shape (nv,)."""

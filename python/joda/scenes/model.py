@@ -134,6 +134,16 @@ def _find(model: mujoco.MjModel, address: str) -> int | None:
     return first + int(match[2]) if int(match[2]) < count else None
 
 
+def geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """A geom by its name or its body's."""
+    body = int(model.geom_bodyid[geom])
+    return str(
+        model.geom(geom).name
+        or model.body(body).name
+        or ("the world" if body == 0 else f"body {body}")
+    )
+
+
 def moves_with(model: mujoco.MjModel, body: int) -> NDArray[np.bool_]:
     """Which bodies move with this one, itself included; shape (nbody,)."""
     inside = np.zeros(model.nbody, bool)
