@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.ahead import pairs
+from joda.diagnosis.asking import asked
 from joda.diagnosis.baseline import windows_for
-from joda.diagnosis.corrections import Correction
+from joda.diagnosis.corrections import OFF, Corrected, Correction, corrected, corrections, numbers
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.given import FAITHFUL, Departures
 from joda.diagnosis.judge import BLAS
@@ -81,36 +82,52 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
     steps = [Step(None, measured.profile, error(parts[1]))]
     why = f"{MOST} effects were added; that is as many as are tried."
     try:
+        if measured.single.servo and (first := _numbers_first(parts, steps[0].error, told)):
+            parts = _driven(parts, first.servo)
+            steps.append(first)
         while len(steps) <= MOST:
             told("diagnose")
-            asked = diagnosed(_with(parts, steps[-1].profile)[0])
-            steps[-1] = replace(steps[-1], diagnosis=asked.diagnosis)
-            if asked.diagnosis.doubt:
-                why = asked.diagnosis.summary
+            found = diagnosed(_with(parts, steps[-1].profile)[0])
+            said = found.diagnosis
+            steps[-1] = replace(steps[-1], diagnosis=said)
+            if said.doubt:
+                why = said.summary
                 break
-            once = not any(step.corrections for step in steps)
-            if once and asked.corrected and (right := _set_right(parts, asked, told)):
-                parts = _driven(parts, right.servo)
-                steps.append(right)
+            right = None if steps[-1].corrections else found.corrected
+            own, before = said.corrections, steps[-1].error
+            if right and (more := _set_right(parts, before, right, own, told)):
+                parts = _driven(parts, more.servo)
+                steps.append(more)
                 continue
-            if not (more := _next(parts, steps[-1], asked, told)):
-                known = asked.diagnosis.verdict == "missing_effect"
-                why = NOTHING_HELPS if known else asked.diagnosis.summary
+            if not (stairs := _next(parts, steps[-1], found, told)):
+                why = NOTHING_HELPS if said.verdict == "missing_effect" else said.summary
                 break
-            steps += [replace(step, servo=steps[-1].servo) for step in more]
+            steps += [replace(step, servo=steps[-1].servo) for step in stairs]
             steps = _named_anew(parts, steps, told)
     except KeyboardInterrupt:
         why = INTERRUPTED
     return tuple(steps), why
 
 
-def _set_right(parts: Parts, asked: Diagnosed, told: Told) -> Step | None:
+def _numbers_first(parts: Parts, before: Error, told: Told) -> Step | None:
+    """The numbers of a driven joint set right before anything is asked: few models know them, and a
+    diagnosis of a model that is far off takes as long as the next one."""
+    told("the model's own numbers")
+    with threadpool_limits(1, BLAS):
+        begun = asked(parts[0])
+        found = numbers(begun)
+        right = corrected(begun, found, OFF, begun.fit.x)
+    own = corrections(found, begun.base.profile.joint, OFF)
+    return _set_right(parts, before, right, own, told) if right else None
+
+
+def _set_right(
+    parts: Parts, before: Error, right: Corrected, found: tuple[Correction, ...], told: Told
+) -> Step | None:
     """The model with its own numbers set right, at the scene's own step, if that lowers the error
     held out, also as whole runs."""
-    right = asked.corrected
-    assert right is not None
     told("the model's own numbers")
-    before, (train, held) = error(parts[1]), _driven(parts, right.servo)
+    train, held = _driven(parts, right.servo)
     train = train.changed(right.profile)
     with threadpool_limits(1, BLAS):
         profile = refitted(train, right.profile, windows_for(train).length)
@@ -118,7 +135,7 @@ def _set_right(parts: Parts, asked: Diagnosed, told: Told) -> Step | None:
     rises = before.whole is not None and (after.whole or 0.0) > before.whole
     if after.window > WORTH * before.window or rises:
         return None
-    return Step(None, profile, after, corrections=asked.diagnosis.corrections, servo=right.servo)
+    return Step(None, profile, after, corrections=found, servo=right.servo)
 
 
 def _driven(parts: Parts, servo: Servo | None) -> Parts:
@@ -133,11 +150,12 @@ def _next(parts: Parts, last: Step, asked: Diagnosed, told: Told) -> list[Step]:
     """The first effect of the diagnosis that clearly lowers the error held out; none if none does.
 
     Where no effect explains at once what the model as it was lacks, perhaps two do: then the first
-    one of the best pair, and with it the second if that lowers the error further.
+    one of the best pair, and with it the second if that lowers the error further. Not so of joints
+    that an actuator drives, of which that takes too long.
     """
     known = asked.diagnosis.verdict == "missing_effect"
     found: Sequence[Sequence[Finding]] = [[one] for one in asked.candidates]
-    if asked.puzzling and not last.added:
+    if asked.puzzling and not last.added and not parts[0].single.servo:
         train = parts[0].changed(last.profile)
         known, found = False, pairs(train, asked.puzzling, told)
     for number, (first, *second) in enumerate(found[:TRIED]):

@@ -9,6 +9,8 @@ from joda.measured.runs import Run
 
 SAMPLES, DURATION = 40_000, 240.0
 """Most samples, and most time (s), of all runs together that are fitted to."""
+DRIVEN = 120.0
+"""Most time, s, where an actuator acts: nothing moves without it, so that all of it tells."""
 FINEST = 1e-3
 """Samples closer than this are thinned first, s."""
 STRETCH = 5.0
@@ -49,7 +51,8 @@ def _share(runs: Sequence[Run]) -> float:
     """What part of these runs may be used."""
     samples = sum(len(run.time) for run in runs)
     duration = sum(float(np.ptp(run.time)) for run in runs)
-    return min(SAMPLES / max(samples, 1), DURATION / max(duration, 1e-9))
+    most = DRIVEN if any(run.command is not None for run in runs) else DURATION
+    return min(SAMPLES / max(samples, 1), most / max(duration, 1e-9))
 
 
 def _every(run: Run) -> int:
