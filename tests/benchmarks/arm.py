@@ -1,0 +1,65 @@
+"""An arm improved from two thirds of its logs, by name, and compared on the others.
+
+Whole runs, all joints at once, open loop from the first measured positions: the median error of
+each joint as the model is, after a plain fit (`plain_fit`) and after `joda improve --joint all`.
+
+python tests/benchmarks arm arm.xml LOGS/*.csv -o improved.xml
+"""
+
+import argparse
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from plain_fit import Arm, fitted
+
+from joda import improve_all
+from joda.measured.scene_replay import replayed_together
+from joda.scenes.model import load_model
+
+
+def medians(model: Path, logs: list[Path]) -> dict[str, float]:
+    """Of each joint, rad or m."""
+    runs = replayed_together(load_model(model), logs)
+    return {name: float(np.median([run.rmse[name] for run in runs])) for name in runs[0].rmse}
+
+
+def main() -> None:
+    """Improves, fits plainly, and tells."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("model", type=Path)
+    parser.add_argument("logs", type=Path, nargs="+")
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument(
+        "--plain", type=int, default=14, help="iterations of the plain fit; 0: none"
+    )
+    args = parser.parse_args()
+    logs = sorted(args.logs)
+    held = logs[2::3]
+    train = [log for log in logs if log not in held]
+    begin = perf_counter()
+    done = improve_all(args.model, train, args.output, force=True, progress=print)
+    seconds = perf_counter() - begin
+    before, after = medians(args.model, held), medians(args.output, held)
+    plain = dict.fromkeys(before, float("nan"))
+    if args.plain:
+        arm = Arm(args.model, logs)
+        own = [arm.logs[logs.index(log)] for log in train]
+        x = fitted(arm, own, args.plain)
+        errors = arm.rmse(x, [arm.logs[logs.index(log)] for log in held])
+        plain = dict(zip(arm.joints, np.median(errors, axis=0), strict=True))
+    print(
+        f"\n{len(train)} logs fitted in {seconds:.0f} s, {len(held)} held out; mrad or mm, medians"
+    )
+    print(
+        "| joint | as it is | plain fit | improved | of the plain fit's | what was done |\n|"
+        + "---|" * 6
+    )
+    for name, one in before.items():
+        what = "; ".join(
+            step.effect or ", ".join(own.parameter for own in step.corrections)
+            for step in done[name].steps[1:]
+        )
+        part = after[name] / plain[name]
+        told = " | ".join(f"{1e3 * x:.1f}" for x in (one, plain[name], after[name]))
+        print(f"| {name} | {told} | {part:.2f} | {what} |")
