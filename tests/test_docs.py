@@ -79,6 +79,19 @@ def test_the_tutorial_finds_the_closer_and_mends_the_model(my_door):
     assert "All windows of 0.4 s are missed by less than 3 times the noise" in told[-1]
 
 
+@pytest.mark.long
+def test_the_other_tutorial_repairs_the_arm(tmp_path):
+    write_files("my_robot.md", tmp_path)
+    commands = "".join(blocks("my_robot.md", "sh")).splitlines()
+    told = [run(command, tmp_path) for command in commands]
+    assert masked("".join(blocks("my_robot.md", "text"))) <= masked("\n".join(told))
+    (friction,) = re.findall(r"frictionloss is 0.1 N·m, the runs show ([\d.]+) ± ", told[3])
+    (gain,) = re.findall(r"actuator is 60 N·m/rad, the runs show ([\d.]+) ± ", told[3])
+    assert (float(friction), float(gain)) == pytest.approx((1.2, 25), rel=0.03)
+    before, after = (re.findall(r"^\w+ +([\d.]+) rad", one, re.MULTILINE) for one in told[-2:])
+    assert all(float(b) < 0.1 * float(a) for a, b in zip(before, after, strict=True))
+
+
 @pytest.mark.long("my_door")
 def test_a_log_of_mujoco_becomes_a_run(my_door):
     folder, _ = my_door

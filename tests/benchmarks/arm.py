@@ -14,14 +14,37 @@ import numpy as np
 from plain_fit import Arm, fitted
 
 from joda import improve_all
-from joda.measured.scene_replay import replayed_together
+from joda.measured.scene_replay import Course, course_of, replayed_together
+from joda.pictures.style import COLOURS, house_style, write_png
 from joda.scenes.model import load_model
+
+SHOWN = 30.0
+"""How much of a log is drawn, s."""
 
 
 def medians(model: Path, logs: list[Path]) -> dict[str, float]:
     """Of each joint, rad or m."""
     runs = replayed_together(load_model(model), logs)
     return {name: float(np.median([run.rmse[name] for run in runs])) for name in runs[0].rmse}
+
+
+def picture(before: Course, after: Course, output: Path) -> None:
+    """Each joint in a log that was held out: measured, and replayed by both models."""
+    from matplotlib.figure import Figure
+
+    shown = before.time < SHOWN
+    with house_style():
+        figure = Figure(figsize=(11, 6), layout="constrained")
+        for axes, name in zip(figure.subplots(2, 3).flat, before.measured, strict=False):
+            for own, label, colour, style in (
+                (before.replayed[name], "model as it was", COLOURS["friction"], "--"),
+                (after.replayed[name], "improved", COLOURS["conservative"], "-"),
+                (before.measured[name], "measured", "black", ":"),
+            ):
+                axes.plot(before.time[shown], own[shown], style, color=colour, label=label, lw=1.2)
+            axes.set(title=name, xlabel="time (s)", ylabel="position (rad)")
+        figure.axes[0].legend(frameon=False)
+        write_png(figure, output, force=True)
 
 
 def main() -> None:
@@ -41,6 +64,11 @@ def main() -> None:
     done = improve_all(args.model, train, args.output, force=True, progress=print)
     seconds = perf_counter() - begin
     before, after = medians(args.model, held), medians(args.output, held)
+    if args.picture:
+        models = [load_model(one) for one in (args.model, args.output)]
+        errors = [sum(one.rmse.values()) for one in replayed_together(models[1], held)]
+        usual = held[int(np.argsort(errors)[len(errors) // 2])]
+        picture(*(course_of(one, usual) for one in models), args.picture)
     plain = dict.fromkeys(before, float("nan"))
     if args.plain:
         arm = Arm(args.model, logs)

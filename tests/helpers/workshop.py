@@ -73,7 +73,7 @@ def fill(folder: Path) -> None:
     (folder / "curve.csv").write_text("position,force\n" + rows)
     (folder / "robot.csv").write_text("time,arm_pan\n0,0\n1,0.5\n")
     effect = {
-        "effect": "spring_return_to_low_end", "interval": [0, 1], "probability": 0.9,
+        "effect": "gravity_offset", "interval": [0, 1], "probability": 0.9,
         "direction": "both",
         "magnitude": 0.2, "unit": "", "explanation": "", "held_out_error_before": 1,
         "held_out_error_after": 0.5, "indistinguishable_from": [],

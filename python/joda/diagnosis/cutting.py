@@ -22,7 +22,7 @@ FEWEST = 12
 """Samples that a window has at least."""
 MOST = 160
 """Samples of a window that count at most; of more, every second or third does."""
-STEPS, DRIVEN_STEPS = 300, 100
+STEPS, DRIVEN_STEPS = 300, 200
 """Steps that a window has at least; and where an actuator acts, whose commands come in their
 own steps."""
 HOP = 0.25

@@ -18,6 +18,7 @@ from joda.diagnosis.given import DOUBT, EFFECTS, Moved
 from joda.diagnosis.guessing import usual
 from joda.diagnosis.judge import BEND, Judge, Unknowns
 from joda.field import evaluate
+from joda.joints.parameters import DOUBT as USUAL
 from joda.joints.parameters import NARROWEST, Kind, Parameters
 from joda.measured.reading import Measured
 from joda.measured.replay import WINDOW
@@ -219,7 +220,7 @@ def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:
         y = np.array(there[slot.component].y)
         if y.any() and len(y) == len(own[slot.component].y):
             mean[k] = y[slot.index] / scale
-            doubt[k] = min(doubt[k], DOUBT * np.abs(y).max() / scale)
+            doubt[k] *= DOUBT * np.abs(y).max() / scale / USUAL["values"]
     return mean, doubt
 
 

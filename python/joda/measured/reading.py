@@ -33,8 +33,8 @@ Array = NDArray[np.float64]
 
 CLEARLY = 0.9
 """Part of the error in windows to which another friction row must bring it."""
-ENOUGH = 4
-"""Runs that tell which row that is."""
+ENOUGH, BRIEFLY = 4, 15.0
+"""Runs that tell which row that is, and how much of each, s."""
 SURELY = 20.0
 """Squared misfits, in noises, by which MuJoCo's own row must be better to be the one replayed."""
 YIELDS = (
@@ -250,8 +250,11 @@ def taken(
     if row and timed:
         yielding = replace(own, friction_row=row)
         other = Replayer(found, profile, yielding, step)
-        errors = [missed(one, timed[:ENOUGH], sigma[:ENOUGH]) for one in (replayer, other)]
-        samples = sum(len(run.time) for run in timed[:ENOUGH])
+        some = [
+            run.part(np.flatnonzero(run.time < run.time[0] + BRIEFLY)) for run in timed[:ENOUGH]
+        ]
+        errors = [missed(one, some, sigma[:ENOUGH]) for one in (replayer, other)]
+        samples = sum(len(run.time) for run in some)
         gain = samples * (errors[0] ** 2 - errors[1] ** 2) / float(np.mean(np.square(sigma)))
         if errors[1] < CLEARLY * errors[0] or gain > SURELY:
             own, replayer = yielding, other

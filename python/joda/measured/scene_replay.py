@@ -37,6 +37,24 @@ class Together:
     rmse: dict[str, float | None]
 
 
+@dataclass(frozen=True)
+class Course:
+    """What a log measured and what its replay in the scene makes of it.
+
+    Attributes:
+        file: the log's name.
+        time: s, shape (n,).
+        measured, replayed: positions of each joint by name, rad or m, shape (n,).
+        stable: whether the scene was.
+    """
+
+    file: str
+    time: Array
+    measured: dict[str, Array]
+    replayed: dict[str, Array]
+    stable: bool
+
+
 def replayed_together(model: mujoco.MjModel, paths: Sequence[Path]) -> tuple[Together, ...]:
     """Replays logs open loop from their first positions, all joints at once, contacts included.
 
@@ -51,11 +69,21 @@ def replayed_together(model: mujoco.MjModel, paths: Sequence[Path]) -> tuple[Tog
     Raises:
         JodaError: a file cannot be read.
     """
-    found = [_replayed(model, path) for path in paths]
-    return tuple(one for one in found if one) if all(found) else ()
+    found = [course_of(model, path) for path in paths]
+    return tuple(_told(one) for one in found if one) if all(found) else ()
 
 
-def _replayed(model: mujoco.MjModel, path: Path) -> Together | None:
+def _told(course: Course) -> Together:
+    """How far a replay is off."""
+    errors: dict[str, float | None] = {}
+    for name, own in course.replayed.items():
+        error = rms(own - course.measured[name])
+        errors[name] = error if course.stable and np.isfinite(error) else None
+    return Together(course.file, errors)
+
+
+def course_of(model: mujoco.MjModel, path: Path) -> Course | None:
+    """A log replayed, see `replayed_together`; None where a command or a force is not known."""
     joints = joints_in(model, path)
     if not joints:
         raise JodaError(f"{path}: no column 'position:JOINT' of a hinge or slide of the model.")
@@ -102,9 +130,9 @@ def _replayed(model: mujoco.MjModel, path: Path) -> Together | None:
     course = np.vstack([state, states[0]])
     stable = bool(np.all(np.diff(course[:, 0]) > 0))  # else MuJoCo has begun anew
     paths = course[:, 1 : 1 + model.nq]
-    errors: dict[str, float | None] = {}
-    for k, name in zip(ids, joints, strict=True):
-        path_of = np.interp(time, edges, paths[:, model.jnt_qposadr[k]])
-        error = rms(path_of - positions[name])
-        errors[name] = error if stable and np.isfinite(error) else None
-    return Together(run.name, errors)
+    replayed = {
+        name: np.interp(time, edges, paths[:, model.jnt_qposadr[k]])
+        for k, name in zip(ids, joints, strict=True)
+    }
+    measured = {name: positions[name] for name in joints}
+    return Course(run.name, time, measured, replayed, stable)
