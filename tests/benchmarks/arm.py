@@ -53,6 +53,7 @@ def main() -> None:
     parser.add_argument("model", type=Path)
     parser.add_argument("logs", type=Path, nargs="+")
     parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--picture", type=Path, help="PNG to write of a usual log held out")
     parser.add_argument(
         "--plain", type=int, default=14, help="iterations of the plain fit; 0: none"
     )
