@@ -18,7 +18,7 @@ from joda.measured.scene_replay import Course, course_of, replayed_together
 from joda.pictures.style import COLOURS, house_style, write_png
 from joda.scenes.model import load_model
 
-SHOWN = 30.0
+SHOWN = 12.0
 """How much of a log is drawn, s."""
 
 
@@ -43,8 +43,20 @@ def picture(before: Course, after: Course, output: Path) -> None:
             ):
                 axes.plot(before.time[shown], own[shown], style, color=colour, label=label, lw=1.2)
             axes.set(title=name, xlabel="time (s)", ylabel="position (rad)")
-        figure.axes[0].legend(frameon=False)
+        handles = figure.axes[0].get_legend_handles_labels()
+        figure.legend(*handles, loc="outside lower center", ncols=3, frameon=False)
         write_png(figure, output, force=True)
+
+
+def write_picture(model: Path, improved: Path, held: list[Path], output: Path) -> None:
+    """Of the log in which the joint that moves least moves most."""
+    models = [load_model(one) for one in (model, improved)]
+    courses = [course_of(models[1], log) for log in held]
+    moves = [
+        min(float(np.std(q[one.time < SHOWN])) for q in one.measured.values()) for one in courses
+    ]
+    best = int(np.argmax(moves))
+    picture(course_of(models[0], held[best]), courses[best], output)
 
 
 def main() -> None:
@@ -53,7 +65,7 @@ def main() -> None:
     parser.add_argument("model", type=Path)
     parser.add_argument("logs", type=Path, nargs="+")
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--picture", type=Path, help="PNG to write of a usual log held out")
+    parser.add_argument("--picture", type=Path, help="PNG to write of a log held out")
     parser.add_argument(
         "--plain", type=int, default=14, help="iterations of the plain fit; 0: none"
     )
@@ -66,10 +78,7 @@ def main() -> None:
     seconds = perf_counter() - begin
     before, after = medians(args.model, held), medians(args.output, held)
     if args.picture:
-        models = [load_model(one) for one in (args.model, args.output)]
-        errors = [sum(one.rmse.values()) for one in replayed_together(models[1], held)]
-        usual = held[int(np.argsort(errors)[len(errors) // 2])]
-        picture(*(course_of(one, usual) for one in models), args.picture)
+        write_picture(args.model, args.output, held, args.picture)
     plain = dict.fromkeys(before, float("nan"))
     if args.plain:
         arm = Arm(args.model, logs)
