@@ -15,9 +15,12 @@ from scipy.optimize import least_squares
 
 from joda import JodaError, Profile, attach, compare, context, refine
 from joda.commands.refine import Refined
+from joda.component import Component
 from joda.effects import GravityOffset
 from joda.measured.gauge import static_force
 from joda.measured.runs import Run, write_run
+from joda.profile import Channels, Joint, Resistance
+from joda.refining.refinement import extrapolated
 from joda.scenes.scene import read_profiles
 
 RUN = "time,position\n" + "".join(f"{0.01 * k},{0.3 + 0.001 * k}\n" for k in range(40))
@@ -271,6 +274,21 @@ def test_a_force_of_the_other_sign_bends_nothing(tmp_path):
     assert (done.returncode, done.stdout) == (2, "")
     assert "not written, as" in done.stderr
     assert not (tmp_path / "better.xml").exists()
+
+
+def test_what_changes_where_no_run_was_is_said():
+    def rubbing(y):
+        part = Component(label="rub", interval=(0, 1), x=(0, 0.5, 1), y=(y, y, y))
+        channels = Channels(friction=Resistance(components=(part,)))
+        joint = Joint(name="j", type="hinge", range=(0, 2), unit="rad")
+        return Profile(joint=joint, channels=channels)
+
+    away = [(0.0, 0.3), (0.8, 1.0)]
+    assert not extrapolated(rubbing(0.1), rubbing(0.12), away)  # not by much
+    assert not extrapolated(rubbing(0.1), rubbing(0.3), [])
+    (told,) = extrapolated(rubbing(0.1), rubbing(0.3), away)
+    assert "No run was at s = 0.00 to 0.30 and s = 0.80 to 1.00: there the friction is" in told
+    assert "from 0.1 to 0.3 N·m" in told
 
 
 def test_gravity_that_is_fitted_is_written(tmp_path):

@@ -37,7 +37,7 @@ GRID = 401
 TRAVEL_TIME = 1.0
 """Reference time (s) in which the inertial reference force moves a joint through its range."""
 
-LARGEST = 100.0
+LARGEST = 30.0
 """Peak of a channel, in units of the reference, beyond which a proposal cannot be meant."""
 
 HAND_FORCE = 10.0

@@ -29,7 +29,7 @@ from joda.profile import Profile
 from joda.refining.acceptance import refused
 from joda.refining.curvefit import CurveProblem
 from joda.refining.fitting import Problem
-from joda.refining.refinement import history, picture, unseen
+from joda.refining.refinement import extrapolated, history, picture, unseen
 from joda.scenes.attaching import attached
 from joda.scenes.context import Context, context
 from joda.scenes.model import find_joint, joint_name, load_model
@@ -203,10 +203,11 @@ def refine(
     if reason := refused(errors, apart, problem.sigma, (whole, mended), Needs(at_first)):
         noted = "".join(f" {note}" for note in clear.notes)
         raise JodaError(f"{target}: not written, as {reason}.{noted}")
-    hidden = unseen(begin, parameters, result.covariance)
+    away = unvisited(at_first)
+    hidden = unseen(begin, parameters, result.covariance, away)
     also, besides = _beyond(parameters, result.theta, compiled, number, found)
     scene, said = attached(source, after, target, joint=name, native="keep", also=also)
-    notes += [*said, *besides, *problem.notes]
+    notes += [*said, *besides, *problem.notes, *extrapolated(before, after, away)]
     balance = np.array(found.positions), -np.array(found.gravity_force)
     paths = was, problem.paths(result.theta)
     figure = picture(before, after, balance, problem, paths, hidden)

@@ -37,7 +37,7 @@ from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
-from joda.measured.visited import unvisited, unvisited_part
+from joda.measured.visited import unvisited, unvisited_part, visited_share
 from joda.measured.whiteness import strays
 from joda.profile import Profile
 
@@ -107,8 +107,8 @@ EITHER = "Either the model's own numbers are off ({}), or a force is missing"
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
 OUT_THERE = (
-    "Something is missing, and what explains most of it would act at s = {:.2f} to {:.2f}, where "
-    "no run was or hardly any: whether it does, these data cannot tell. It may be an obstacle, "
+    "Something is missing, and what explains most of it would act at s = {:.2f} to {:.2f}, of "
+    "which runs visited {:.0f} %: whether it does, these data cannot tell. It may be an obstacle, "
     "another end of the range, a latch, or nothing of the joint, such as a push that was not "
     "recorded."
 )
@@ -183,8 +183,12 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     sized = [k for k, one in every.items() if one.sized]
     experiment = _next(measured, ranking, weighed, one_way)
     if not sized or unseen_place(measured, every[sized[0]].interval):
-        where = OUT_THERE.format(*every[sized[0]].interval) if sized else NO_EFFECT
-        why = BOUNCY if ranking.bouncy and not sized else where
+        why = NO_EFFECT
+        if sized:
+            there = every[sized[0]].interval
+            why = OUT_THERE.format(*there, 100 * visited_share(measured, there))
+        elif ranking.bouncy:
+            why = BOUNCY
         said = _said(measured, "unexplained", why, (), experiment)
         return _driven(Diagnosed(said, puzzling=puzzling), ranking.asked)
     findings = tuple(every[k] for k in sized)

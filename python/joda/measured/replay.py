@@ -17,6 +17,7 @@ from joda.measured import smoothing
 from joda.measured.runs import Run, held
 from joda.profile import Profile
 from joda.scenes.context import Context
+from joda.scenes.motion import unheard
 
 Array = NDArray[np.float64]
 
@@ -400,7 +401,8 @@ class Replayer:
             own = np.zeros(forces.shape[1]) if command is None else command
             own = np.broadcast_to(own, forces.shape)
             inputs, spec = np.stack([own, forces], axis=2), COMMANDED | APPLIED
-        states, _ = rollout.rollout(self.model, self.data, initial, inputs, control_spec=spec)
+        with unheard():
+            states, _ = rollout.rollout(self.model, self.data, initial, inputs, control_spec=spec)
         return np.hstack([initial[:, 1:2], states[:, :, 1]]), states[:, -1]
 
 

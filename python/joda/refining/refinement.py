@@ -12,13 +12,15 @@ from joda.joints.least_squares import Fit
 from joda.joints.parameters import Parameters
 from joda.pictures.changes import draw_channels
 from joda.pictures.style import COLOURS, clean, house_style
-from joda.profile import CHANNELS, Profile
+from joda.profile import CHANNELS, NOUNS, Profile
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
+MUCH = 0.3
+"""Part of a channel's largest value by which it has changed by much."""
 SEEN = 0.5
 """A part of a curve is seen where the data shrink its uncertainty at least by this factor."""
 STEP = 1e-4
@@ -43,31 +45,72 @@ class Fitted(Protocol):
 
 
 def unseen(
-    profile: Profile, parameters: Parameters, covariance: Array
+    profile: Profile,
+    parameters: Parameters,
+    covariance: Array,
+    away: Sequence[tuple[float, float]],
 ) -> dict[str, tuple[tuple[float, float], ...]]:
     """Per channel, the intervals of normalised position of which the data told little.
 
-    There the curve's standard deviation is more than half of what it was before any data.
+    There no run was, or the curve's standard deviation is more than half of what it was before any
+    data.
 
     Args:
         profile: the fitted profile's form.
         parameters: what was fitted.
         covariance: of the fitted numbers.
+        away: where no run was.
     """
     prior = np.diag(parameters.doubt**2)
     out = {}
     slopes = _curve_slopes(parameters)
+    nowhere = _within(away)
     for name in CHANNELS:
         if not getattr(profile.channels, name).components:
             continue
         J = slopes[name]
         left = np.sqrt(np.einsum("gi,ij,gj->g", J, covariance, J))
         begun = np.sqrt(np.einsum("gi,ij,gj->g", J, prior, J))
-        hidden = (left > SEEN * begun) & (begun > 1e-9 * max(begun.max(), 1e-300))
+        hidden = (left > SEEN * begun) & (begun > 1e-9 * max(begun.max(), 1e-300)) | nowhere
         edges = np.flatnonzero(np.diff(np.concatenate([[0], hidden.astype(int), [0]])))
         pairs = edges.reshape(-1, 2)
         out[name] = tuple((float(GRID[a]), float(GRID[b - 1])) for a, b in pairs if b - a > 2)
     return out
+
+
+def extrapolated(before: Profile, after: Profile, away: Sequence[tuple[float, float]]) -> list[str]:
+    """Where no run was and a fit has changed a channel by much all the same, a sentence each.
+
+    Args:
+        before, after: the profiles.
+        away: where no run was, in normalised position.
+    """
+    nowhere = _within(away)
+    out: list[str] = []
+    if not nowhere.any():
+        return out
+    where = " and ".join(f"s = {a:.2f} to {b:.2f}" for a, b in away)
+    joint = before.joint
+    for name in CHANNELS:
+        was, now = (evaluate(getattr(one.channels, name), GRID)[0] for one in (before, after))
+        change = np.where(nowhere, np.abs(now - was), 0.0)
+        if change.max() > MUCH * np.abs(was).max():
+            at = int(np.argmax(change))
+            unit = joint.force_unit + (f"·s/{joint.unit}" if name == "damping" else "")
+            out.append(
+                f"No run was at {where}: there the {NOUNS[name]} is changed too, at s = "
+                f"{GRID[at]:.2f} from {was[at]:.3g} to {now[at]:.3g} {unit}. That only goes on "
+                "with what changed where runs were, and may be wrong."
+            )
+    return out
+
+
+def _within(parts: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    """Which positions of GRID lie in some parts of the range."""
+    inside = np.zeros(len(GRID), bool)
+    for c, d in parts:
+        inside |= (c <= GRID) & (d >= GRID)
+    return inside
 
 
 def _curve_slopes(parameters: Parameters) -> dict[str, Array]:
