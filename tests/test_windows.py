@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from joda.diagnosis.baseline import base_of, single_for, units_of, usable, windows_for
-from joda.diagnosis.cutting import _step, windows_of
+from joda.diagnosis.cutting import STEPS, _step, windows_of
 from joda.diagnosis.judge import EMPTY, NOTHING, Fit, Judge
 from joda.measured import smoothing
 from joda.measured.reading import read_measured
@@ -195,4 +195,4 @@ def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
     [(2e-3, 0.1, 0.1, 1 / 3000), (5e-4, 0.45, 0.45, 1.5e-3), (5e-4, 1.5, 0.45, 1.5e-3)],
 )
 def test_steps_are_short_for_the_windows(timestep, length, usual, step):
-    assert _step(timestep, length, usual) == pytest.approx(step)
+    assert _step(timestep, length, usual, STEPS) == pytest.approx(step)

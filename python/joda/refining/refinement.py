@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+NARROW = 0.05
+"""Parts of the range that are narrower need no word."""
 MUCH = 0.3
 """Part of a channel's largest value by which it has changed by much."""
 SEEN = 0.5
@@ -64,14 +66,15 @@ def unseen(
     prior = np.diag(parameters.doubt**2)
     out = {}
     slopes = _curve_slopes(parameters)
-    nowhere = _within(away)
+    nowhere = _within([(a, b) for a, b in away if b - a > NARROW])
     for name in CHANNELS:
         if not getattr(profile.channels, name).components:
             continue
         J = slopes[name]
         left = np.sqrt(np.einsum("gi,ij,gj->g", J, covariance, J))
         begun = np.sqrt(np.einsum("gi,ij,gj->g", J, prior, J))
-        hidden = (left > SEEN * begun) & (begun > 1e-9 * max(begun.max(), 1e-300)) | nowhere
+        hidden = (left > SEEN * begun) | nowhere
+        hidden &= begun > 1e-9 * max(begun.max(), 1e-300)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], hidden.astype(int), [0]])))
         pairs = edges.reshape(-1, 2)
         out[name] = tuple((float(GRID[a]), float(GRID[b - 1])) for a, b in pairs if b - a > 2)
