@@ -71,14 +71,19 @@ def test_a_steep_edge_keeps_its_shape_and_gets_no_points(width):
     assert {slot.index for slot in slots} == set(range(1, len(more.x) - 1))  # the feet stay
 
 
-def test_points_where_no_run_was_hardly_change():
+def test_points_where_no_run_was_change_by_what_was_seen_of_what_they_bend():
     rub = Component(label="rub", interval=(0.2, 1.0), x=(0, 0.25, 0.5, 1), y=(1.0, 2.0, 2.0, 1.0))
     joint = Joint(name="j", type="hinge", range=(0, 2), unit="rad")
     profile = Profile(joint=joint, channels=Channels(friction=Resistance(components=(rub,))))
     doubt = Parameters(profile, ("values",), away=((0.0, 0.3), (0.7, 1.0))).doubt
-    np.testing.assert_allclose(doubt, [0.05, 0.5, 0.5, 0.05])
-    about = Parameters(profile, ("values",), away=((0.5, 1.0),)).about(profile)
-    np.testing.assert_allclose(about.doubt, [0.5, 0.5, 0.05, 0.05])
+    np.testing.assert_allclose(doubt, [0.25, 0.5, 0.5, 0.125])  # at s = 0.2, 0.4, 0.6 and 1
+    about = Parameters(profile, ("values",), away=((0.3, 1.0),)).about(profile)
+    np.testing.assert_allclose(about.doubt, [0.5, 0.125, 0.05, 0.05])
+    flat = rub.model_copy(update={"interval": (0.0, 1.0), "x": (0.0, 1.0), "y": (1.0, 1.0)})
+    channels = Channels(friction=Resistance(components=(flat,)))
+    profile = profile.model_copy(update={"channels": channels})
+    doubt = Parameters(profile, ("values",), away=((0.0, 0.2), (0.7, 1.0))).doubt
+    np.testing.assert_allclose(doubt, [0.25, 0.25])  # both ends away, half of it seen
 
 
 def test_strengths_multiply_channels():

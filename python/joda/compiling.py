@@ -116,15 +116,15 @@ def compile(  # the command's name
 
 def _absurd(profile: Profile, found: Context, ignore_gravity: bool) -> str | None:
     """That a channel is far stronger than anything that moves the joint, a sentence."""
-    s, unit = np.linspace(0, 1, GRID), found.joint.force_unit
+    s = np.linspace(0, 1, GRID)
     for name, reference in reference_scales(found, ignore_gravity).items():
         peak = float(np.abs(evaluate(getattr(profile.channels, name), s)[0]).max())
         if peak > LARGEST * reference:
-            per = f"·s/{found.joint.unit}" if name == "damping" else ""
+            unit = found.joint.unit_of(name)
             return (
-                f"{NOUNS[name]} would be up to {peak:.3g} {unit}{per}, {peak / reference:.3g} "
-                f"times what 'strong' stands for ({reference:.3g} {unit}{per}); lower the "
-                "strengths or the refineFactors, or propose fewer effects."
+                f"{NOUNS[name]} would be up to {peak:.3g} {unit}, {peak / reference:.3g} times "
+                f"what 'strong' stands for ({reference:.3g} {unit}); lower the strengths or the "
+                "refineFactors, or propose fewer effects."
             )
     return None
 

@@ -147,6 +147,10 @@ class Joint(Frozen):
         """Of the generalised force on it."""
         return "N·m" if self.type == "hinge" else "N"
 
+    def unit_of(self, channel: str) -> str:
+        """Of a channel's values: a force's, or of damping a force's per velocity."""
+        return f"{self.force_unit}·s/{self.unit}" if channel == "damping" else self.force_unit
+
 
 class JointLimitHint(Frozen):
     """How the joint's end stops feel: `elasticity` sets the damping ratio of the limit.

@@ -15,7 +15,7 @@ import numpy as np
 from mujoco import rollout
 
 from joda.measured.driven import joints_in
-from joda.measured.runs import read_together
+from joda.measured.runs import held, read_signals, read_together
 
 NUMBERS = ("stiffness", "damping", "friction", "armature", "delay")
 STEP = 0.03
@@ -50,11 +50,9 @@ class Arm:
 
     def _read(self, path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Times, positions (n, joints), commands (n, joints)."""
-        runs, commands = [], []
-        table = np.genfromtxt(path, delimiter=",", names=True, deletechars="")
         run, others = read_together(path, self.joints[0], self.joints[1:])
         runs = np.stack([run.position, *(others[name] for name in self.joints[1:])], axis=1)
-        commands = np.stack([table[f"ctrl:{name}"] for name in self.names], axis=1)
+        commands = read_signals(path, [f"ctrl:{name}" for name in self.names])
         return run.time - run.time[0], runs, commands
 
     def changed(self, x: np.ndarray) -> mujoco.MjModel:
@@ -71,7 +69,7 @@ class Arm:
 
     def paths(self, x: np.ndarray, logs: list) -> list[np.ndarray]:
         """Positions at the times of logs, open loop, shapes (n, joints)."""
-        model, data = self.changed(x), []
+        model = self.changed(x)
         initial, controls = [], []
         late = np.exp(x[:, 4])
         longest = max(int(np.ceil(time[-1] / self.h)) + 1 for time, _, _ in logs)
@@ -84,13 +82,8 @@ class Arm:
             initial.append(state)
             edges = self.h * np.arange(longest + 1)
             control = np.zeros((longest, model.nu))
-            for k, servo in enumerate(self.servos):  # mean of what is held, over each step
-                total = np.concatenate([[0.0], np.cumsum(command[:-1, k] * np.diff(time))])
-                at = edges - late[k]
-                area = np.interp(at, time, total)
-                area += np.minimum(at - time[0], 0) * command[0, k]
-                area += np.maximum(at - time[-1], 0) * command[-1, k]
-                control[:, servo] = np.diff(area) / self.h
+            for k, servo in enumerate(self.servos):
+                control[:, servo] = held(time, command[:, k], edges - late[k])
             controls.append(control)
         data = [mujoco.MjData(model) for _ in range(2)]
         states, _ = rollout.rollout(model, data, np.array(initial), np.array(controls))

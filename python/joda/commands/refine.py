@@ -167,9 +167,8 @@ def refine(
     unit = gravity_scale(found, begin)
     fitting = replace(clear, measured=[*parts, *still])
     at_first = taken(compiled, number, found, whole, fitting, servo=servo)
-    parameters = Parameters(
-        begin, fit, keep_shape=keep_shape, gravity=unit, away=unvisited(at_first)
-    )
+    away = unvisited(at_first)
+    parameters = Parameters(begin, fit, keep_shape=keep_shape, gravity=unit, away=away)
     if not len(parameters.start):
         raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
     if why := hardly_moved(at_first):
@@ -203,7 +202,6 @@ def refine(
     if reason := refused(errors, apart, problem.sigma, (whole, mended), Needs(at_first)):
         noted = "".join(f" {note}" for note in clear.notes)
         raise JodaError(f"{target}: not written, as {reason}.{noted}")
-    away = unvisited(at_first)
     hidden = unseen(begin, parameters, result.covariance, away)
     also, besides = _beyond(parameters, result.theta, compiled, number, found)
     scene, said = attached(source, after, target, joint=name, native="keep", also=also)

@@ -105,8 +105,7 @@ class Base:
     def _factors(self, x: Array) -> list[tuple[tuple[str, int], float]]:
         """Of each component that has one."""
         own = [(place, float(factor)) for place, factor in zip(self.places, x, strict=False)]
-        drag = self.single.servo is not None and self.single.servo.damping > 0
-        shared = shared_damping(self.profile) if drag else []
+        shared = shared_damping(self.profile, self.single.servo)
         return own + [(place, float(np.exp(x[len(self.places) + 1]))) for place in shared]
 
     def coarser(self) -> "Base":
@@ -124,14 +123,13 @@ class Base:
 
 def base_of(profile: Profile, single: Single, h: float) -> Base:
     """The model as it is."""
+    shared = shared_damping(profile, single.servo)
     places = tuple(
         (name, number)
         for name in CHANNELS
         for number, part in enumerate(getattr(profile.channels, name).components)
-        if any(part.y)
+        if any(part.y) and (name, number) not in shared
     )
-    if single.servo is not None and single.servo.damping > 0:
-        places = tuple(place for place in places if place not in shared_damping(profile))
     k = len(places)
     doubt, most = (BASE_DOUBT, 20.0) if single.servo is None else (DRIVEN_DOUBT, 100.0)
     unknowns = Unknowns(
@@ -142,8 +140,10 @@ def base_of(profile: Profile, single: Single, h: float) -> Base:
     return Base(profile, single, h, places, unknowns)
 
 
-def shared_damping(profile: Profile) -> list[tuple[str, int]]:
-    """Channel and number of the joint's own damping, which is as an actuator's is."""
+def shared_damping(profile: Profile, servo: Servo | None) -> list[tuple[str, int]]:
+    """Channel and number of the joint's own damping, where an actuator damps too."""
+    if servo is None or not servo.damping > 0:
+        return []
     parts = enumerate(profile.channels.damping.components)
     return [("damping", number) for number, part in parts if part.label == DAMPING]
 

@@ -154,9 +154,10 @@ def _of_actuator(base: Base, servo: Servo, x: Array, errors: Array) -> list[Numb
     error = factor * doubt
     out = [Number(GAIN, "actuator_gain", given, factor * given, error * given, unit, given, n)]
     if servo.damping > 0:
-        own = (base.profile.channels.damping.components[k] for _, k in shared_damping(base.profile))
+        shared = shared_damping(base.profile, servo)
+        own = (base.profile.channels.damping.components[k] for _, k in shared)
         given, factor = servo.damping + sum(part.y[0] for part in own), float(np.exp(drag))
-        unit, error = f"{joint.force_unit}·s/{joint.unit}", factor * unsure
+        unit, error = joint.unit_of("damping"), factor * unsure
         size = factor * given
         out.append(Number(DRAG, "damping", given, size, error * given, unit, given, n + 1))
     return [*out, Number(DELAY, "time_delay", servo.delay, late, uneven, "s", SLOW, n + 2)]

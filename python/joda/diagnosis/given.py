@@ -132,7 +132,7 @@ def _curve(old: Component, new: Component, channel: str, joint: Joint) -> str | 
     change = np.abs(after - before)
     if change.max() <= DOUBT * np.abs(before).max():
         return None
-    unit = joint.force_unit + (f"·s/{joint.unit}" if channel == "damping" else "")
+    unit = joint.unit_of(channel)
     at = int(np.argmax(change))
     where = "" if np.ptp(change) <= DOUBT * change.max() else f" at s = {GRID[at]:.2f}"
     return f"{old.label or channel} {before[at]:.3g} → {after[at]:.3g} {unit}{where}"

@@ -94,12 +94,12 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
                 why = said.summary
                 break
             right = None if steps[-1].corrections else found.corrected
-            if right:
-                more = _set_right(parts, steps[-1].error, right, said.corrections, told)
-                if more:
-                    parts = _driven(parts, more.servo)
-                    steps.append(more)
-                    continue
+            if right and (
+                more := _set_right(parts, steps[-1].error, right, said.corrections, told)
+            ):
+                parts = _driven(parts, more.servo)
+                steps.append(more)
+                continue
             if not (stairs := _next(parts, steps[-1], found, told)):
                 why = NOTHING_HELPS if said.verdict == "missing_effect" else said.summary
                 break

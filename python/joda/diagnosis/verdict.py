@@ -183,12 +183,10 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
     sized = [k for k, one in every.items() if one.sized]
     experiment = _next(measured, ranking, weighed, one_way)
     if not sized or unseen_place(measured, every[sized[0]].interval):
-        why = NO_EFFECT
+        why = BOUNCY if ranking.bouncy else NO_EFFECT
         if sized:
             there = every[sized[0]].interval
             why = OUT_THERE.format(*there, 100 * visited_share(measured, there))
-        elif ranking.bouncy:
-            why = BOUNCY
         said = _said(measured, "unexplained", why, (), experiment)
         return _driven(Diagnosed(said, puzzling=puzzling), ranking.asked)
     findings = tuple(every[k] for k in sized)

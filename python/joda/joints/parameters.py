@@ -51,8 +51,8 @@ DOUBT: dict[Kind, float] = {
 }
 """How far (one standard deviation) a number may be from its first value before any data."""
 UNSEEN = 0.1
-"""How much less that is for a control point where no run was: of it the data tell only what it does
-to the curve beside it, which is no reason to bend it."""
+"""Least part of that which a control point has where no run was: as much as runs have seen of what
+it bends, as the curve beside them is no reason to bend the rest."""
 
 
 @dataclass(frozen=True)
@@ -148,9 +148,8 @@ class Parameters:
         self.slots = tuple(slots)
         self.start = np.array(start)
         self.scales = np.array([_scale(profile, slot, gravity) for slot in slots])
-        unseen = np.array([_at(profile, slot, away) for slot in slots], bool)
-        doubt = np.array([DOUBT[slot.kind] for slot in slots])
-        self.doubt = np.where(unseen, UNSEEN, 1.0) * doubt
+        seen = [max(_seen(profile, slot, away), UNSEEN) for slot in slots]
+        self.doubt = np.array([DOUBT[slot.kind] for slot in slots]) * seen
         farthest = [LOGARITHM if slot.kind == "sizes" else FARTHEST for slot in slots]
         self._farthest = np.array(farthest)
         G = np.zeros((len(rows), len(slots)))
@@ -233,14 +232,20 @@ def gravity_scale(context: Context, profile: Profile) -> float:
     return max(context.gravity_scale, *(abs(y) for c in components for y in c.y), 1e-9)
 
 
-def _at(profile: Profile, slot: Slot, parts: Sequence[tuple[float, float]]) -> bool:
-    """Whether a number is a control point in some parts of the range."""
+def _seen(profile: Profile, slot: Slot, away: Sequence[tuple[float, float]]) -> float:
+    """How much of what a number does the runs have seen, 0 to 1: of a control point where none was,
+    the part of the curve that it bends."""
     if slot.kind != "values":
-        return False
+        return 1.0
     component = getattr(profile.channels, slot.channel).components[slot.component]
     a, b = component.interval
-    s = a + (b - a) * component.x[slot.index]
-    return any(c < s < d or s == c == 0.0 or s == d == 1.0 for c, d in parts)
+    s = a + (b - a) * np.array(component.x)
+    here = float(s[slot.index])
+    if not any(c < here < d or here == c == 0.0 or here == d == 1.0 for c, d in away):
+        return 1.0
+    first, last = s[max(slot.index - 1, 0)], s[min(slot.index + 1, len(s) - 1)]
+    lost = sum(max(min(d, last) - max(c, first), 0.0) for c, d in away)
+    return float(1.0 - lost / (last - first))
 
 
 def _scale(profile: Profile, slot: Slot, gravity: float) -> float:

@@ -136,10 +136,8 @@ def _among_others(
     found, other = (
         force_of_others(model, joint, run.time, positions, over) for over in (SMOOTHED, SHORTER)
     )
-    doubt, (inside, pairs) = (
-        doubt_of_others(run.time, found, other),
-        touching(model, joint, positions),
-    )
+    doubt = doubt_of_others(run.time, found, other)
+    inside, pairs = touching(model, joint, positions)
     force = np.where(inside, np.nan, run.force + found)
     run = replace(run, force=force, forced=True, doubt=doubt, among=True)
     notes = []

@@ -29,7 +29,7 @@ def changes(before: Profile, after: Profile) -> list[str]:
     out = []
     for channel in CHANNELS:
         old, new = getattr(before.channels, channel), getattr(after.channels, channel)
-        unit = _unit(channel, after)
+        unit = after.joint.unit_of(channel)
         for pair in _pairs(old.components, new.components):
             out.append(_line(*pair, NOUNS[channel], unit))
         if old.combine != new.combine:
@@ -92,7 +92,7 @@ def draw_channels(
         if name == "conservative" and gravity is not None:
             axes.plot(*gravity, color=GRAVITY, ls=":", lw=1.4, label="balances gravity")
         axes.axhline(0, color="#bbbbbb", lw=0.7, zorder=0)
-        axes.set_ylabel(f"{NOUNS[name]} ({_unit(name, after)})")
+        axes.set_ylabel(f"{NOUNS[name]} ({after.joint.unit_of(name)})")
         axes.spines[["top", "right"]].set_visible(False)
 
 
@@ -149,10 +149,3 @@ def _peak(component: Component) -> str:
 
 def _largest(component: Component) -> float:
     return max(component.y, key=abs)
-
-
-def _unit(channel: str, profile: Profile) -> str:
-    hinge = profile.joint.type == "hinge"
-    if channel == "damping":
-        return "N·m·s/rad" if hinge else "N·s/m"
-    return "N·m" if hinge else "N"

@@ -178,8 +178,7 @@ def _damping_panel(axes: "Axes", profile: Profile) -> None:
         axes.legend(frameon=False, fontsize=7, ncols=3, loc="upper right")
     if not any(values.any() for values in drawn):
         note(axes, "no damping")
-    unit = "N·m·s/rad" if profile.joint.type == "hinge" else "N·s/m"
-    _value_axis(axes, drawn, "damping", unit)
+    _value_axis(axes, drawn, "damping", profile.joint.unit_of("damping"))
     axes.set_xlabel(f"joint position q ({profile.joint.unit})", fontsize=9, color=INK)
 
 

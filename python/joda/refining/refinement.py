@@ -93,17 +93,16 @@ def extrapolated(before: Profile, after: Profile, away: Sequence[tuple[float, fl
     if not nowhere.any():
         return out
     where = " and ".join(f"s = {a:.2f} to {b:.2f}" for a, b in away)
-    joint = before.joint
     for name in CHANNELS:
         was, now = (evaluate(getattr(one.channels, name), GRID)[0] for one in (before, after))
         change = np.where(nowhere, np.abs(now - was), 0.0)
         if change.max() > MUCH * np.abs(was).max():
             at = int(np.argmax(change))
-            unit = joint.force_unit + (f"·s/{joint.unit}" if name == "damping" else "")
             out.append(
                 f"No run was at {where}: there the {NOUNS[name]} is changed too, at s = "
-                f"{GRID[at]:.2f} from {was[at]:.3g} to {now[at]:.3g} {unit}. That only goes on "
-                "with what changed where runs were, and may be wrong."
+                f"{GRID[at]:.2f} from {was[at]:.3g} to {now[at]:.3g} "
+                f"{before.joint.unit_of(name)}. That only goes on with what changed where runs "
+                "were, and may be wrong."
             )
     return out
 
