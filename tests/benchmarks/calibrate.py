@@ -38,12 +38,17 @@ def looks(row: dict) -> list[Evidence]:
 
 
 def decided(row: dict, settings: Settings) -> Weighed:
-    """What these settings say of a case; without the second look where none was taken."""
+    """What these settings say of a case, by the looks that were taken."""
     first, *more = looks(row)
     said = decide(first, settings=settings)
     if said.verdict != "missing_effect" and more:
-        again = decide(more[0], settings.strictly, wholly=True, settings=settings)
+        again = decide(more.pop(0), settings.strictly, wholly=True, settings=settings)
         said = again if second_counts(said, again, settings) else said
+    for closer in more:
+        anew = decide(closer, settings=settings)
+        if anew.verdict != "missing_effect" or anew.share > said.share:
+            break
+        said = anew
     return said
 
 

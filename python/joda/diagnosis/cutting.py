@@ -20,8 +20,13 @@ TRAVEL = 0.15
 """What part of the range a window goes through at the usual speed."""
 FEWEST = 12
 """Samples that a window has at least."""
-MOST = 160
-"""Samples of a window that count at most; of more, every second or third does."""
+MOST, RESTING, SELDOM = 160, 4, 8
+"""Samples of a stretch of usual length that count at most; of more, every second or third does. Of
+one in which the joint rests so few do, of a longer rest only in every so many stretches: they are
+all the same sample."""
+STILL, CREEPS = 6.0, 3.0
+"""Range of the positions in a window, in noises, up to which the joint may rest there; and how much
+its two halves may differ, in standard errors."""
 STEPS, DRIVEN_STEPS = 300, 200
 """Steps that a window has at least; and where an actuator acts, whose commands come in their
 own steps."""
@@ -61,6 +66,7 @@ def windows_of(
     length = length or usual
     driven = any(run.command is not None for run in runs)
     h = _step(timestep, length, usual, DRIVEN_STEPS if driven else STEPS) if fine else timestep
+    chunk = max(round(usual / h), 1)
     parts: list[tuple[NDArray[Any], ...]] = []
     samples: list[tuple[NDArray[Any], ...]] = []
     step, count = 0, 0
@@ -92,7 +98,9 @@ def windows_of(
             given = np.zeros(len(time)) if run.command is None else run.command[piece]
             command = held(time, given, edges)
             parts.append((force, command, step + begins, fresh, start, doubts, same))
-            window = np.where(enough[window] & _thinned(window), window + count, -1)
+            window = np.where(
+                enough[window] & _thinned(index // chunk, position / spread), window + count, -1
+            )
             noise = spread, run.part(piece).force_error()
             samples.append((step + index, place - index, position, time, window, hits, *noise))
             step, count = step + steps, count + many
@@ -162,11 +170,31 @@ def _speeds(run: Run, sigma: float, apart: float) -> Array:
     return np.asarray(speed[speed > 4 * sigma / apart])
 
 
-def _thinned(window: Integers) -> NDArray[np.bool_]:
-    """Which samples are kept: at most `MOST` of a window, evenly."""
-    place = np.arange(len(window)) - np.searchsorted(window, window)
-    each = -(-np.bincount(window, minlength=1) // MOST)
-    return np.asarray(place % np.maximum(each, 1)[window] == 0)
+def _thinned(chunk: Integers, noises: Array) -> NDArray[np.bool_]:
+    """Which samples are kept: at most `MOST` of a chunk of usual length, evenly; where the joint
+    rests, few, and of few chunks.
+
+    Args:
+        chunk: of each sample, increasing.
+        noises: positions in units of their noise.
+    """
+    _, first, count = np.unique(chunk, return_index=True, return_counts=True)
+    kept = np.zeros(len(chunk), bool)
+    rested = 0
+    for begin, many in zip(first, count, strict=True):
+        own = slice(begin, begin + many)
+        rested = rested + 1 if _rest(noises[own]) else 0
+        if rested == 0 or rested % SELDOM == 1:
+            kept[begin : begin + many : -(-many // (RESTING if rested else MOST))] = True
+    return kept
+
+
+def _rest(noises: Array) -> bool:
+    """Whether a joint rests, by its positions in units of their noise."""
+    half = len(noises) // 2
+    if not half or np.ptp(noises) > STILL:
+        return False
+    return bool(abs(noises[:half].mean() - noises[half:].mean()) < CREEPS * 2 / len(noises) ** 0.5)
 
 
 def _spread(time: Array, position: Array, sigma: float) -> Array:

@@ -17,20 +17,30 @@ from joda.measured.reading import Measured
 Array = NDArray[np.float64]
 
 
+FEW = 6
+"""Of fewer windows held out, all are in turn."""
+FOLDS = 4
+"""In so many parts."""
+
+
 class Holdout:
-    """Fits on a part of the runs, judged on the rest."""
+    """Fits on a part of the runs, judged on the rest; where that are few windows, or none that the
+    model misses, every window is held out of one of several fits (cross-validation)."""
 
     def __init__(self, asked: Asked, measured: Measured) -> None:
         """Holds windows out as `joda.diagnosis.split` does; of what these do not show, others."""
         self.asked = asked
         counts = asked.judge.counts
-        self.held = held_windows(measured, asked.judge.windows)
-        if not (counts & self.held).any():
-            self.held = np.isin(np.arange(len(counts)), np.flatnonzero(counts)[1::4])
-        if not self.held.any():
-            self.held = counts
-        self.train = replace(asked.judge, counts=counts & ~self.held)
-        self.before = self._error(asked.base.solo, asked.base.unknowns, asked.fit.x)
+        held = held_windows(measured, asked.judge.windows)
+        self.folds = [counts & held]
+        own = asked.base.solo, asked.base.unknowns, asked.fit.x
+        self.before = self._error(*own) if self.folds[0].any() else 0.0
+        every = np.flatnonzero(counts)
+        silent = self.before < measured.floor or np.count_nonzero(self.folds[0]) < FEW
+        if silent and len(every) > 1:
+            parts = (every[k::FOLDS] for k in range(min(FOLDS, len(every))))
+            self.folds = [np.isin(np.arange(len(counts)), part) for part in parts]
+            self.before = self._error(*own)
 
     def errors(self, found: Guess) -> tuple[float, float]:
         """RMS misfit of the windows held out, rad or m, without the effect and with it.
@@ -42,18 +52,21 @@ class Holdout:
         if found.hypothesis.effect == RESTITUTION:
             knocks = windows.knocks & (windows.count > 0)
             without = _misfit(windows, base.solo, self.asked.fit.x, knocks)
-            return without, _misfit(windows, make, found.fit.x, knocks)
+            return rms(without), rms(_misfit(windows, make, found.fit.x, knocks))
         return self.before, self._error(make, unknowns, found.fit.x)
 
     def _error(self, make: Make, unknowns: Unknowns, x: Array) -> float:
-        judge = self.asked.judge
-        near = self.train.fit(make, unknowns, x, self.asked.fit.start, 6)
-        return _misfit(judge.windows, make, near.x, judge.counts & self.held)
+        judge, start, missed = self.asked.judge, self.asked.fit.start, []
+        for held in self.folds:
+            train = replace(judge, counts=judge.counts & ~held)
+            near = train.fit(make, unknowns, x, start, 6)
+            missed.append(_misfit(judge.windows, make, near.x, held))
+        return rms(np.concatenate(missed))
 
 
-def _misfit(windows: Windows, make: Make, x: Array, counts: NDArray[np.bool_]) -> float:
-    """RMS misfit of some windows from their best starts, rad or m."""
+def _misfit(windows: Windows, make: Make, x: Array, counts: NDArray[np.bool_]) -> Array:
+    """Misfit of some windows from their best starts, rad or m."""
     fit = Judge(windows, counts).started(make(x))
     misfit = windows.misfit(make(x), fit.start)
     rows = windows.rows[counts]
-    return rms(misfit[rows[rows >= 0]])
+    return np.asarray(misfit[rows[rows >= 0]])

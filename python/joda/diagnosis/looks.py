@@ -1,7 +1,7 @@
 """One look at the measurements or two: the usual windows, and longer ones where these leave a
 question."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,21 +9,23 @@ import numpy as np
 from joda.diagnosis.asking import Asked, asked
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.plausible import Needs
-from joda.diagnosis.ranking import Ranking, Told, rank
+from joda.diagnosis.ranking import Ranking, Told, narrowed, rank
 from joda.diagnosis.weighing import (
     SETTINGS,
     Evidence,
     Weighed,
     decide,
     evidence,
-    excess_of,
     second_counts,
+    shows,
 )
 from joda.diagnosis.whole import FreeRuns, free_runs
 from joda.measured.reading import Measured
 
-LONGER, LONGEST = 9.0, 1.5
-"""How much longer the windows of a second look are, and at most how long, s."""
+LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5
+"""How much longer the windows of each further look are, at the least, and at most how long, s."""
+SURE = 0.9
+"""Probability from which no closer look is taken."""
 LOOSELY = 3.0
 """Strictness where the joint went one way only, which tells little."""
 
@@ -64,48 +66,74 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
 
     ranking = ranked(asked(measured))
     strictness = LOOSELY if moved_one_way(measured) else 1.0
-    found = evidence(ranking)
-    weighed = decide(found, strictness)
+    found = [evidence(ranking)]
+    weighed = decide(found[0], strictness)
     first = ranking, weighed
     free = None if weighed.likely else free_runs(measured, ranking.asked)
-    if weighed.verdict == "missing_effect":
-        return Looked(ranking, weighed, first, (found,), free)
-    again = _again(measured, first, bool(free and free.drifting), ranked)
-    if again is None:
-        return Looked(ranking, weighed, first, (found,), free)
-    more = evidence(again)
-    if measured.runs:
-        anew = decide(more, SETTINGS.strictly, wholly=True)
-    else:
-        anew = replace(decide(more, strictness), verdict="unexplained")
-    if second_counts(weighed, anew):
-        ranking, weighed = again, anew
-    return Looked(ranking, weighed, first, (found, more), free)
+    longer = _longer(measured, ranking.asked)
+    if weighed.verdict != "missing_effect":
+        drifts = bool(free and free.drifting)
+        begun = _shown(longer, first, drifts) if measured.runs else _noisier(measured, first)
+        if begun is not None:
+            again = ranked(begun)
+            found.append(evidence(again))
+            if measured.runs:
+                anew = decide(found[-1], SETTINGS.strictly, wholly=True)
+            else:
+                anew = replace(decide(found[-1], strictness), verdict="unexplained")
+            if second_counts(weighed, anew):
+                ranking, weighed = again, anew
+    for begun in longer:
+        if weighed.verdict != "missing_effect" or weighed.probabilities[0] > SURE:
+            break
+        closer = narrowed(begun, ranking, told)
+        found.append(evidence(closer))
+        anew = decide(found[-1], strictness)
+        if anew.verdict != "missing_effect" or anew.share > weighed.share:
+            break
+        ranking, weighed = closer, anew
+    return Looked(ranking, weighed, first, tuple(found), free)
 
 
-def _again(
-    measured: Measured,
-    first: tuple[Ranking, Weighed],
-    drifts: bool,
-    ranked: Callable[[Asked], Ranking],
-) -> Ranking | None:
-    """A second ranking; None where nothing shows that is to be explained, nor free runs drift.
+def _longer(measured: Measured, begun: Asked) -> Iterator[Asked]:
+    """The model fitted to longer and longer windows, while runs are longer."""
+    windows = begun.judge.windows
+    length, many = windows.length, 0
+    while measured.runs and len(windows.at) != many and length * MUCH_LONGER < LONGEST:
+        length, many = min(LONGER * length, LONGEST), len(windows.at)
+        begun = asked(measured, length, begun.fit.x)
+        windows = begun.judge.windows
+        if len(windows.at) < many:
+            yield begun
 
-    Of curves as if their noise were what the best effect usually leaves: a hand trembles, and
+
+def _shown(longer: Iterator[Asked], first: tuple[Ranking, Weighed], drifts: bool) -> Asked | None:
+    """The model in windows in which something shows that is to be explained; None where nothing
+    does.
+
+    Args:
+        longer: the model in longer and longer windows.
+        first: the ranking in usual ones, and what it says.
+        drifts: whether free runs as a whole tell that something does.
+    """
+    ranking, weighed = first
+    open_ = drifts or weighed.verdict != "adequate"
+    return next((one for one in longer if open_ or shows(ranking, one)), None)
+
+
+def _noisier(measured: Measured, first: tuple[Ranking, Weighed]) -> Asked | None:
+    """The model and curves that are asked once more; None where nothing is to be explained.
+
+    As if their noise were what the best effect usually leaves: a hand trembles, and
     friction is uneven, by more than a gauge's noise. That stays unexplained, but it no longer
     decides what is named.
     """
     ranking, weighed = first
-    calm, judge = weighed.verdict == "adequate", ranking.asked.judge
-    if measured.runs:
-        longer = asked(measured, min(LONGER * judge.windows.length, LONGEST), ranking.asked.fit.x)
-        if calm and not drifts and excess_of(longer) <= SETTINGS.noticed:
-            return None
-        return ranked(longer)
-    if calm:
+    judge = ranking.asked.judge
+    if weighed.verdict == "adequate":
         return None
     best = ranking.guesses[0].fit if ranking.guesses else ranking.asked.fit
     left = best.squares / np.maximum(judge.windows.count, 1)
     factor = max(float(np.sqrt(np.median(left[judge.counts]))), 1.0)
     noisier = measured.with_curves([curve.noisier(factor) for curve in measured.curves])
-    return ranked(asked(noisier))
+    return asked(noisier)

@@ -10,7 +10,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.asking import RESTITUTION, Asked, Rough
-from joda.diagnosis.guessing import Guess, beside
+from joda.diagnosis.baseline import joined
+from joda.diagnosis.guessing import Guess, beside, finished
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS, Fit, Judge
 from joda.profile import Profile
@@ -24,8 +25,12 @@ SEARCHED, FEW = 2, 8
 ENOUGH, FAR = 1.5, 5.0
 """Loss per sample at which nothing more can be found, and from how many times the least a rough fit
 is then left as it is."""
+NARROWED = 6
+"""How many effects are looked at again in longer windows, where the first is not sure."""
 WELLS = {"detent_internal", "bistable_mechanism_internal"}
 """Effects of which one may stand in for the other where no run went all the way."""
+TELLS, TELLS_EACH = 60.0, 0.1
+"""Gain in loss from which windows without knocks tell of an effect; the same, per sample."""
 CALM = 0.3
 """Part of the windows, the better ones, that tell the noise."""
 WORST = 1.5
@@ -85,13 +90,41 @@ def rank(
         begun = _unstuck(begun, guesses)
         others = [one.written(begun.base) for one in _best(guesses)[:1]]
         ends = begun.bouncy(bouncy, others)
-        guesses += [guess for guess in ends if not silent]
+        if not silent and not _told_within(begun, guesses):
+            guesses += ends
     there = [
         one
         for one in guesses
         if not one.vanished and possible(one.written(begun.base), one.hypothesis.effect)
     ]
     return Ranking(begun, *_scored(begun.judge, there), bouncy=silent and bool(ends))
+
+
+def narrowed(
+    begun: Asked,
+    before: Ranking,
+    heed: Told = lambda done, total, what: None,
+) -> Ranking:
+    """The best effects of a ranking again, fitted to other windows from where they were found.
+
+    Args:
+        begun: the model and its runs in other windows.
+        before: the ranking.
+        heed: told how many hypotheses are done, of how many, and the last one's name.
+    """
+    judge, base = begun.judge, begun.base
+    tried = [g for g in before.guesses if g.hypothesis.effect != RESTITUTION][:NARROWED]
+
+    def again(found: Guess) -> Guess:
+        make, _ = joined(base, found.hypothesis)
+        start = judge.started(make(found.fit.x)).start
+        return finished(judge, base, found.hypothesis, [replace(found.fit, start=start)])
+
+    with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
+        guesses = _Work(pool, heed, len(tried)).all(again, tried)
+        begun = _unstuck(begun, guesses)
+    there = [one for one in guesses if not one.vanished]
+    return Ranking(begun, *_scored(judge, there), bouncy=before.bouncy)
 
 
 @dataclass
@@ -161,6 +194,16 @@ def _searched(begun: Asked, guesses: Sequence[Guess], work: _Work) -> list[Guess
         return []
     near = [one for one in best if one.fit.loss < NEAR * least and len(one.fit.x) <= FEW]
     return work.all(begun.searched, near)
+
+
+def _told_within(begun: Asked, guesses: Sequence[Guess]) -> bool:
+    """Whether windows without knocks tell of an effect, with which only noise is left of them: then
+    how bouncy the ends are is asked once that is added."""
+    samples = begun.judge.samples
+    best = min(guesses, key=lambda one: one.score, default=None)
+    if best is None or best.fit.loss > ENOUGH * samples:
+        return False
+    return begun.fit.loss - best.fit.loss - best.cost > max(TELLS, TELLS_EACH * samples)
 
 
 def _unstuck(begun: Asked, guesses: Sequence[Guess]) -> Asked:

@@ -11,7 +11,7 @@ import numpy as np
 
 from joda.diagnosis.asking import Asked
 from joda.diagnosis.hypotheses.base import KNOWN_LAW
-from joda.diagnosis.judge import excess
+from joda.diagnosis.judge import Judge, excess
 from joda.diagnosis.ranking import WORST, Ranking, levelled
 
 Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
@@ -120,8 +120,8 @@ class Weighed:
 
     @property
     def likely(self) -> bool:
-        """Whether an effect is missing, and the first is more likely than not."""
-        return self.verdict == "missing_effect" and max(self.probabilities, default=0.0) > EVEN
+        """Whether an effect is missing, and one of those named is more likely than not."""
+        return self.verdict == "missing_effect" and sum(self.probabilities) > EVEN
 
     @property
     def share(self) -> float:
@@ -204,6 +204,21 @@ def decide(
         said = "missing_effect"
     excess = own, tuple(map(float, left))
     return Weighed(said, tuple(map(float, likely)), excess, found.effects)
+
+
+def shows(first: Ranking, longer: Asked, settings: Settings = SETTINGS) -> bool:
+    """Whether more than noise is left of longer windows, be noise what was taken for it or what the
+    best guess left of a first ranking's windows, for each degree of freedom."""
+    if excess_of(longer) > settings.noticed:
+        return True
+    best = min((guess.fit.loss for guess in first.guesses), default=first.asked.fit.loss)
+    own, its = _freedom(longer.judge), _freedom(first.asked.judge)
+    return longer.fit.loss - best * own / its > settings.least_gain
+
+
+def _freedom(judge: Judge) -> float:
+    """Samples that count, less the two numbers of each window's start."""
+    return max(judge.samples - 2 * float(judge.counts.sum()), 1.0)
 
 
 def second_counts(first: Weighed, second: Weighed, settings: Settings = SETTINGS) -> bool:

@@ -46,6 +46,9 @@ ASTRAY = 1e9
 """Error, in noises, of a replay that is not finite."""
 NEAR_BY = 3.0
 """How far a path is moved by the starts nearby that tell its slopes, in noises."""
+HELD = 1e-3
+"""Part of the other's effect that one number of a start must have to be told: the velocity of a
+joint that friction stops at once has less."""
 STUCK = 1e-9
 """Part of the motion that a force makes of a free joint, squared, below which it makes none."""
 START = 3.0
@@ -189,7 +192,7 @@ class Replayer:
             if gain > 0:
                 at, best, least = at + step, misfit, square
                 slopes = (paths[1:] - paths[0]).T
-                step = -offsets @ np.linalg.lstsq(slopes, misfit, rcond=None)[0]
+                step = -offsets @ np.linalg.lstsq(slopes, misfit, rcond=HELD)[0]
             else:
                 step = step / 4
             if abs(gain) < SETTLED * sigma**2:

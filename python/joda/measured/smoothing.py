@@ -21,8 +21,9 @@ USUAL_PACE = 0.15
 """Pace (s) from which a motion counts as usual; a faster one has narrower windows in proportion."""
 FASTEST = 0.9
 """Quantile of a motion's speeds that tells its pace."""
-CLEAR_MOTION = 10.0
-"""Displacement, in noises, that tells a speed."""
+CLEAR_MOTION, BURST = 10.0, 4
+"""Displacement, in noises, that tells a speed; so many of them tell a pace, more than an outlier
+makes."""
 LEAST = 7
 """Fewest samples in a window."""
 EXACT = 1e-3
@@ -35,6 +36,9 @@ REST = 2.0
 """Errors within which a velocity counts as zero."""
 SOON = 0.8
 """Part of the velocity soon after that a joint which begins at rest does not have at once."""
+SHOWN, GROWS = 6.0, 1.7
+"""Displacement, in noises, that is one; and in the same time again a joint that began at rest goes
+more than so many times as far: at constant acceleration three times, at constant velocity once."""
 KEPT = 0.8
 """Part of the departures, the smaller ones, that tell the noise."""
 CONFIDENCE = 1.0
@@ -227,7 +231,7 @@ def pace(time: Array, position: Array, sigma: float) -> float:
     while lag < len(time) // 2:
         moved = np.abs(position[lag:] - position[:-lag])
         clear = moved > CLEAR_MOTION * sigma
-        if clear.sum() >= LEAST:
+        if clear.sum() >= BURST:
             speed = moved[clear] / (time[lag:] - time[:-lag])[clear]
             return float(np.ptp(position) / np.quantile(speed, FASTEST))
         lag *= 2
@@ -247,7 +251,17 @@ def begins_at_rest(time: Array, position: Array, sigma: float) -> bool:
     found = smooth(time, position, np.array([time[0], soon]), sigma)
     first, later = np.abs(found.velocity)
     zero = REST * found.velocity_error
-    return bool(first < zero[0] and (later < zero[1] or first < SOON * later))
+    slow = first < zero[0] and (later < zero[1] or first < SOON * later)
+    return bool(slow and not _slows_down(position, sigma))
+
+
+def _slows_down(position: Array, sigma: float) -> bool:
+    """Whether a joint goes less and less far from the first sample on."""
+    away = np.abs(position - position[0])
+    shown = np.flatnonzero(away > SHOWN * sigma)
+    if not len(shown) or 2 * (first := shown[0]) >= len(position):
+        return False
+    return bool(abs(position[2 * first] - position[first]) < GROWS * away[first])
 
 
 def _half_widths(time: Array, position: Array, sigma: float) -> Array:
