@@ -1,5 +1,7 @@
 """What free runs as a whole tell, in which errors add up that windows cannot see."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -130,6 +132,18 @@ def test_a_true_model_follows_its_free_runs(tmp_path, rng):
         parts = free_parts(measured := thrown(folder, rng, 2, drag=1e-6))
         told.append(drifts(parts, [measured.replayer.followed(*one)[0] / one[1] for one in parts]))
     assert np.sum(np.array(told) > 0.005) >= 6
+
+
+def test_a_joint_that_friction_holds_is_followed_at_its_mean_position(tmp_path, rng):
+    """No velocity shows there: it is stopped at once."""
+    measured = thrown(tmp_path, rng, 1, drag=1e-7)
+    rests = replace(
+        measured.runs[0],
+        position=2.0 + SIGMA * rng.standard_normal(len(measured.runs[0].time)),
+    )
+    rests.position[:30] += 0.7 * SIGMA  # from where its start seems to be
+    left, _ = measured.replayer.followed(rests, SIGMA)
+    assert np.mean(left) == pytest.approx(0, abs=0.05 * SIGMA)
 
 
 def louder(measured, folder, rng, times):

@@ -14,7 +14,7 @@ from joda.diagnosis.hypotheses import Units, hypotheses
 from joda.diagnosis.hypotheses.base import KNOWN_SHAPE
 from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.judge import BEND
-from joda.diagnosis.ranking import WELLS, WORST, rank
+from joda.diagnosis.ranking import NARROWED, WELLS, WORST, _told_within, narrowed, rank
 from joda.diagnosis.verdict import diagnosed
 from joda.diagnosis.weighing import weigh
 from joda.effects import EndStopRestitution, QuadraticDamping
@@ -34,9 +34,15 @@ UNITS = Units(
 
 
 @pytest.fixture(scope="module")
-def begun():
+def measured():
     """A model that lacks an effect, two runs of the joint."""
-    return asked(read(clear_case(EFFECT))[0].changed(runs=[0, 4]))
+    return read(clear_case(EFFECT))[0].changed(runs=[0, 4])
+
+
+@pytest.fixture(scope="module")
+def begun(measured):
+    """The model fitted to them."""
+    return asked(measured)
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +78,24 @@ def test_progress_counts_and_never_exceeds_the_total(ranked, told):
     assert [done for done, _ in told] == list(range(1, len(told) + 1))
     assert all(done <= total for done, total in told)
     assert told[-1][0] > 0.8 * told[-1][1]
+
+
+def test_the_best_are_fitted_to_longer_windows_from_where_they_were(measured, begun, ranked):
+    """There the others leave a larger part of what the true one does."""
+    longer = asked(measured, 3 * begun.judge.windows.length, begun.fit.x)
+    closer = narrowed(longer, ranked)
+    names = [one.hypothesis.effect for one in ranked.guesses]
+    assert {one.hypothesis.effect for one in closer.guesses} <= set(names[:NARROWED])
+    assert closer.guesses[0].hypothesis.effect == EFFECT
+    assert closer.guesses[0].x == pytest.approx(ranked.guesses[0].x, rel=0.1)
+    assert len(longer.judge.windows.at) < len(begun.judge.windows.at)
+
+
+def test_ends_are_asked_last_where_windows_without_knocks_tell_of_an_effect(begun, ranked):
+    assert _told_within(begun, ranked.guesses)
+    assert not _told_within(begun, [])
+    poor = [replace(one, fit=replace(one.fit, loss=begun.fit.loss)) for one in ranked.guesses]
+    assert not _told_within(begun, poor)
 
 
 def test_no_excluded_effect_is_ranked(begun):

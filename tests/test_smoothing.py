@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from joda.measured.smoothing import noise, pace, pooled_noise, smooth
+from joda.measured.smoothing import begins_at_rest, noise, pace, pooled_noise, smooth
 
 SIGMA = 1e-3
 
@@ -149,3 +149,36 @@ def test_the_noise_of_a_noisy_and_quantised_position_that_mostly_rests(step, her
     runs.append((t, np.zeros(len(t))))
     true = np.hypot(SIGMA, quantum / 12**0.5)
     assert 0.7 * true < pooled_noise(runs) < 2 * true  # of 50 samples that move
+
+
+# --- a button that is flicked, let go or left alone, at 1 kHz, in steps of three noises
+FLICKED = 1e-3 * np.arange(200)
+
+
+def pressed(path: np.ndarray) -> np.ndarray:
+    rng = np.random.default_rng(4)
+    return 3e-3 * np.round((path + 1e-3 * rng.standard_normal(len(path))) / 3e-3)
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_flicked_button_does_not_begin_at_rest_and_has_its_own_pace(way):
+    """It stops after 10 ms and rests for 190."""
+    for travel in (0.05, 0.1, 0.3):
+        path = way * travel * (1 - np.clip(1 - FLICKED / 0.01, 0, None) ** 2)
+        assert not begins_at_rest(FLICKED, pressed(path), 1.3e-3)
+        assert 0.003 < pace(FLICKED, pressed(path), 1.3e-3) < 0.02
+
+
+@pytest.mark.parametrize("before", [0.0, 0.02])
+def test_what_is_let_go_or_flicked_later_begins_at_rest(before):
+    after = np.clip(FLICKED - before, 0, None)
+    let_go = np.minimum((after / 0.05) ** 2, 1.0)
+    assert begins_at_rest(FLICKED, pressed(let_go), 1.3e-3)
+    if before:
+        assert begins_at_rest(FLICKED, pressed(np.minimum(after / 0.02, 1.0)), 1.3e-3)
+
+
+def test_two_outliers_are_no_pace():
+    path = pressed(0 * FLICKED)
+    path[[60, 130]] += 1.0
+    assert pace(FLICKED, path, 1.3e-3) > 0.1

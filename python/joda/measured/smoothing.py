@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.stats import norm
 
@@ -21,9 +22,9 @@ USUAL_PACE = 0.15
 """Pace (s) from which a motion counts as usual; a faster one has narrower windows in proportion."""
 FASTEST = 0.9
 """Quantile of a motion's speeds that tells its pace."""
-CLEAR_MOTION, BURST = 10.0, 4
-"""Displacement, in noises, that tells a speed; so many of them tell a pace, more than an outlier
-makes."""
+CLEAR_MOTION, BURST = 10.0, 3
+"""Displacement, in noises, that tells a speed; so many of them one after the other and to the same
+side tell a pace: two outliers make fewer."""
 LEAST = 7
 """Fewest samples in a window."""
 EXACT = 1e-3
@@ -229,10 +230,11 @@ def pace(time: Array, position: Array, sigma: float) -> float:
     """
     lag = 2
     while lag < len(time) // 2:
-        moved = np.abs(position[lag:] - position[:-lag])
-        clear = moved > CLEAR_MOTION * sigma
-        if clear.sum() >= BURST:
-            speed = moved[clear] / (time[lag:] - time[:-lag])[clear]
+        moved = position[lag:] - position[:-lag]
+        clear = np.abs(moved) > CLEAR_MOTION * sigma
+        way = sliding_window_view(np.sign(moved) * clear, BURST)
+        if np.any(np.abs(way.sum(axis=1)) == BURST):
+            speed = np.abs(moved[clear]) / (time[lag:] - time[:-lag])[clear]
             return float(np.ptp(position) / np.quantile(speed, FASTEST))
         lag *= 2
     return np.inf
