@@ -104,10 +104,10 @@ def check_targets(paths: Iterable[Path], force: bool, inputs: Iterable[str | Pat
         force: whether what exists may be overwritten.
         inputs: files that are read meanwhile: these never are.
     """
-    read = {Path(path).resolve() for path in inputs}
+    read = {Path(os.path.realpath(path)) for path in inputs}  # also of links that go in a circle
     seen: set[Path] = set()
     for path in paths:
-        place = path.resolve()
+        place = Path(os.path.realpath(path))
         if place in read:
             raise JodaError(f"{path}: is read here; choose another name for what is written.")
         if place in seen:

@@ -5,6 +5,7 @@ python tests/benchmarks hidden                        every line, a table at the
 python tests/benchmarks hidden forced --cases 50      one line
 python tests/benchmarks hidden forced --seed 7 --out forced.jsonl    goes on where it was stopped
 python tests/benchmarks hidden families --family all --cases 2       every effect of every family
+python tests/benchmarks hidden families --family switches --free --no-add    named, not added
 
 Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
 few, families, all. `few`: one to three of the runs only, and adding what is named first. `cover`:
@@ -25,7 +26,7 @@ import sys
 import tempfile
 import time
 import traceback
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from hidden_cases import Job, case_of, job_of, read, spread
@@ -68,7 +69,7 @@ def examined(job: Job) -> dict:
         if job.runs:
             return row | few(case, train.changed(runs=job.runs), held_out)
         row |= said(train, job.exclude)
-        if job.group == "families":
+        if job.group == "families" and job.adds:
             row |= unseen(row, case, train, held_out)
         if job.group == "none" and job.family == FAMILY:
             row["floor"] = floor_of(case, held_out)
@@ -204,6 +205,8 @@ def main() -> None:
     parser.add_argument("--family", default=FAMILY, choices=[*FAMILIES, "all"])
     parser.add_argument("--cases", type=int, help="of each group; of `families`, of each effect")
     parser.add_argument("--seed", type=int, default=secrets.randbits(32))
+    parser.add_argument("--free", action="store_true", help="only cases with positions alone")
+    parser.add_argument("--no-add", action="store_true", help="of `families`: nothing is added")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
@@ -217,6 +220,7 @@ def main() -> None:
         for group in NEEDS[args.line]
         for number in range(count(group, family, args.cases))
     ]
+    jobs = [replace(job, adds=not args.no_add) for job in jobs if not (args.free and job.forced)]
     rows = bench(jobs, args.workers, path.resolve())
     if args.line == "families":
         by_effect(rows)

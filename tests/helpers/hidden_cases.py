@@ -44,7 +44,7 @@ AGAIN = 5
 @dataclass(frozen=True)
 class Job:
     """A case to be drawn and examined; `wrong` is an effect to be added on purpose, `runs` are the
-    only ones that there are."""
+    only ones that there are, `adds` tells whether what is named first is added too."""
 
     master: int
     group: str
@@ -57,6 +57,7 @@ class Job:
     wrong: str | None = None
     family: str = FAMILY
     runs: tuple[int, ...] = ()
+    adds: bool = True
 
 
 def dice(master: int, *what) -> np.random.Generator:

@@ -3,13 +3,14 @@ question."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
 from joda.diagnosis.asking import Asked, asked
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.plausible import Needs
-from joda.diagnosis.ranking import Ranking, Told, narrowed, rank
+from joda.diagnosis.ranking import WORST, Ranking, Told, narrowed, rank
 from joda.diagnosis.weighing import (
     SETTINGS,
     Evidence,
@@ -24,6 +25,8 @@ from joda.measured.reading import Measured
 
 LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5
 """How much longer the windows of each further look are, at the least, and at most how long, s."""
+FURTHER = 2
+"""How many looks longer those are that follow where something is unexplained."""
 SURE = 0.9
 """Probability from which no closer look is taken."""
 LOOSELY = 3.0
@@ -86,6 +89,8 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
     for begun in longer:
         if weighed.verdict != "missing_effect" or weighed.probabilities[0] > SURE:
             break
+        if ranking.level > WORST:  # what is wrong besides only adds up
+            break
         closer = narrowed(begun, ranking, told)
         found.append(evidence(closer))
         anew = decide(found[-1], strictness)
@@ -117,8 +122,9 @@ def _shown(longer: Iterator[Asked], first: tuple[Ranking, Weighed], drifts: bool
         drifts: whether free runs as a whole tell that something does.
     """
     ranking, weighed = first
-    open_ = drifts or weighed.verdict != "adequate"
-    return next((one for one in longer if open_ or shows(ranking, one)), None)
+    if drifts or weighed.verdict != "adequate":  # what usual windows leave open needs much longer
+        return next(reversed(tuple(islice(longer, FURTHER))), None)
+    return next((one for one in longer if shows(ranking, one)), None)
 
 
 def _noisier(measured: Measured, first: tuple[Ranking, Weighed]) -> Asked | None:
