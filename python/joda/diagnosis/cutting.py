@@ -98,8 +98,11 @@ def windows_of(
             given = np.zeros(len(time)) if run.command is None else run.command[piece]
             command = held(time, given, edges)
             parts.append((force, command, step + begins, fresh, start, doubts, same))
+            acted = run.command is not None or bool(np.any(run.force[piece]))
             window = np.where(
-                enough[window] & _thinned(index // chunk, position / spread), window + count, -1
+                enough[window] & _thinned(index // chunk, position / spread, not acted),
+                window + count,
+                -1,
             )
             noise = spread, run.part(piece).force_error()
             samples.append((step + index, place - index, position, time, window, hits, *noise))
@@ -170,20 +173,21 @@ def _speeds(run: Run, sigma: float, apart: float) -> Array:
     return np.asarray(speed[speed > 4 * sigma / apart])
 
 
-def _thinned(chunk: Integers, noises: Array) -> NDArray[np.bool_]:
+def _thinned(chunk: Integers, noises: Array, free: bool) -> NDArray[np.bool_]:
     """Which samples are kept: at most `MOST` of a chunk of usual length, evenly; where the joint
-    rests, few, and of few chunks.
+    rests, few, and of few chunks, if no force tells how much holds it.
 
     Args:
         chunk: of each sample, increasing.
         noises: positions in units of their noise.
+        free: whether no force acts.
     """
     _, first, count = np.unique(chunk, return_index=True, return_counts=True)
     kept = np.zeros(len(chunk), bool)
     rested = 0
     for begin, many in zip(first, count, strict=True):
         own = slice(begin, begin + many)
-        rested = rested + 1 if _rest(noises[own]) else 0
+        rested = rested + 1 if free and _rest(noises[own]) else 0
         if rested == 0 or rested % SELDOM == 1:
             kept[begin : begin + many : -(-many // (RESTING if rested else MOST))] = True
     return kept

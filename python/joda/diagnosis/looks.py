@@ -52,7 +52,8 @@ class Looked:
 
 
 def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
-    """Ranks what may be missing; once more in longer windows, where what is weak shows.
+    """Ranks what may be missing; once more in longer windows, where these leave a question, and the
+    best in longer and longer ones, while none is sure.
 
     Args:
         measured: the joint and its runs or curves.
@@ -86,11 +87,7 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
                 anew = replace(decide(found[-1], strictness), verdict="unexplained")
             if second_counts(weighed, anew):
                 ranking, weighed = again, anew
-    for begun in longer:
-        if weighed.verdict != "missing_effect" or weighed.probabilities[0] > SURE:
-            break
-        if ranking.level > WORST:  # what is wrong besides only adds up
-            break
+    while _unsure(ranking, weighed) and (begun := next(longer, None)):
         closer = narrowed(begun, ranking, told)
         found.append(evidence(closer))
         anew = decide(found[-1], strictness)
@@ -98,6 +95,13 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
             break
         ranking, weighed = closer, anew
     return Looked(ranking, weighed, first, tuple(found), free)
+
+
+def _unsure(ranking: Ranking, weighed: Weighed) -> bool:
+    """Whether a closer look at the best effects is worth it: none is sure, and only noise is left,
+    as what is wrong besides adds up in longer windows."""
+    calm = ranking.level <= WORST
+    return calm and weighed.verdict == "missing_effect" and weighed.probabilities[0] <= SURE
 
 
 def _longer(measured: Measured, begun: Asked) -> Iterator[Asked]:
