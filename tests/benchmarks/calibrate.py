@@ -18,7 +18,15 @@ from pathlib import Path
 import numpy as np
 from hidden_figures import SURE, hides
 
-from joda.diagnosis.weighing import SETTINGS, Evidence, Settings, Weighed, decide, second_counts
+from joda.diagnosis.weighing import (
+    SETTINGS,
+    Evidence,
+    Settings,
+    Weighed,
+    closer_counts,
+    decide,
+    second_counts,
+)
 
 FACTORS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 """By which a setting is tried to be changed."""
@@ -46,7 +54,7 @@ def decided(row: dict, settings: Settings) -> Weighed:
         said = again if second_counts(said, again, settings) else said
     for closer in more:
         anew = decide(closer, settings=settings)
-        if anew.verdict != "missing_effect" or anew.share > said.share:
+        if not closer_counts(said, anew):
             break
         said = anew
     return said

@@ -1,5 +1,5 @@
-"""One look at the measurements or two: the usual windows, and longer ones where these leave a
-question."""
+"""Looks at the measurements: in the usual windows, and in longer ones where these leave a question
+or name no effect for sure."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
@@ -13,8 +13,10 @@ from joda.diagnosis.plausible import Needs
 from joda.diagnosis.ranking import WORST, Ranking, Told, narrowed, rank
 from joda.diagnosis.weighing import (
     SETTINGS,
+    SURE,
     Evidence,
     Weighed,
+    closer_counts,
     decide,
     evidence,
     second_counts,
@@ -27,8 +29,6 @@ LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5
 """How much longer the windows of each further look are, at the least, and at most how long, s."""
 FURTHER = 2
 """How many looks longer those are that follow where something is unexplained."""
-SURE = 0.9
-"""Probability from which no closer look is taken."""
 LOOSELY = 3.0
 """Strictness where the joint went one way only, which tells little."""
 
@@ -91,7 +91,7 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
         closer = narrowed(begun, ranking, told)
         found.append(evidence(closer))
         anew = decide(found[-1], strictness)
-        if anew.verdict != "missing_effect" or anew.share > weighed.share:
+        if not closer_counts(weighed, anew):
             break
         ranking, weighed = closer, anew
     return Looked(ranking, weighed, first, tuple(found), free)

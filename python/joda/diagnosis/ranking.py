@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.asking import RESTITUTION, Asked, Rough
 from joda.diagnosis.baseline import joined
-from joda.diagnosis.guessing import Guess, beside, finished
+from joda.diagnosis.guessing import Guess, beside
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS, Fit, Judge
 from joda.profile import Profile
@@ -112,13 +112,13 @@ def narrowed(
         before: the ranking.
         heed: told how many hypotheses are done, of how many, and the last one's name.
     """
-    judge, base = begun.judge, begun.base
+    judge = begun.judge
     tried = [g for g in before.guesses if g.hypothesis.effect != RESTITUTION][:NARROWED]
 
     def again(found: Guess) -> Guess:
-        make, _ = joined(base, found.hypothesis)
+        make, _ = joined(begun.base, found.hypothesis)
         start = judge.started(make(found.fit.x)).start
-        return finished(judge, base, found.hypothesis, [replace(found.fit, start=start)])
+        return begun.finished(Rough(found.hypothesis, (replace(found.fit, start=start),)))
 
     with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
         guesses = _Work(pool, heed, len(tried)).all(again, tried)

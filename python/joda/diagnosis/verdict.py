@@ -31,7 +31,7 @@ from joda.diagnosis.ranking import Ranking, Told
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import BOUNCY, SAME, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
-from joda.diagnosis.weighing import LITTLE, MUCH, Evidence, Verdict, Weighed, weigh
+from joda.diagnosis.weighing import LITTLE, MUCH, SURE, Evidence, Verdict, Weighed, weigh
 from joda.diagnosis.whole import BEYOND, CHANCE, FreeRuns, worst
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
@@ -45,8 +45,6 @@ FALLEN = 0.95
 """Part of an error held out that an effect leaves at most, where only a second look knows of it."""
 SLOWEST = 0.02
 """Part of the range per second that a motion is proposed at, at the least."""
-SURE = 0.9
-"""Probability from which no further experiment is proposed."""
 TOO_SHORT = "The measurements are too short to tell anything."
 RECORD_MORE = (
     "Record more: move the joint through its whole range in both directions, slowly and fast, with "

@@ -61,8 +61,9 @@ class Settings:
 
 
 SETTINGS = Settings()
-EVEN = 0.5
-"""Probability above which an answer is more likely than not."""
+EVEN, SURE = 0.5, 0.9
+"""Probabilities above which an answer is more likely than not, and sure: then neither a closer look
+is taken nor a further experiment proposed."""
 LITTLE, LEFT, MUCH = SETTINGS.little, SETTINGS.left, SETTINGS.much
 
 
@@ -219,6 +220,12 @@ def shows(first: Ranking, longer: Asked, settings: Settings = SETTINGS) -> bool:
 def _freedom(judge: Judge) -> float:
     """Samples that count, less the two numbers of each window's start."""
     return max(judge.samples - 2 * float(judge.counts.sum()), 1.0)
+
+
+def closer_counts(before: Weighed, closer: Weighed) -> bool:
+    """Whether a look at the best effects in longer windows tells more: one is still missing, and
+    what the first leaves is no larger a part."""
+    return closer.verdict == "missing_effect" and closer.share <= before.share
 
 
 def second_counts(first: Weighed, second: Weighed, settings: Settings = SETTINGS) -> bool:
