@@ -17,7 +17,7 @@ from joda.diagnosis.given import FAITHFUL, SHARED, Departures, departures, resto
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.judge import BLAS
 from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
-from joda.diagnosis.reshaping import Trials, Tried, checked
+from joda.diagnosis.reshaping import Trials, Tried, checked, likeliest
 from joda.diagnosis.share import overlap
 from joda.measured.errors import Errors, errors, known
 from joda.measured.misfit import rms
@@ -155,11 +155,10 @@ def mend(
         return Mended(train.profile, None, before, before, NOTHING_LEFT if silent else reason)
     departs = departures(given, first.profile, effect, near)
     if departs.sentences:
-        told("the same, nearer to what was given")
         parts = departs.parts
         with threadpool_limits(1, BLAS):
             back = restored(first.profile, given, parts)
-            tried += trials.holding(back, parts) if parts else ()
+            tried += trials.holding(back, parts, told) if parts else []
         count = len(departs.sentences)
         found = [(one, departures(given, one.profile, effect, near)) for one in tried]
         other, error_then, _ = best(one for one, own in found if len(own.sentences) < count)
@@ -170,8 +169,8 @@ def mend(
         told("the model's own numbers without the effect")
         own = checked(begun.base.written(begun.fit.x))
         with threadpool_limits(1, BLAS):
-            without = min(one.unseen for one in trials.reshaped(own, effect, told))
-        if not _clearly(first.unseen, without):
+            without = likeliest(trials.reshaped(own, effect, told))
+        if not _clearly(first.unseen, without.unseen):
             return Mended(train.profile, None, before, before, OWN)
     return Mended(first.profile, effect, before, after, departs=departs)
 

@@ -5,7 +5,7 @@ rising, what falls falling, so that a magnet stays a magnet. Windows of the runs
 what is right in short ones is a good start for longer ones.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,8 +29,12 @@ Array = NDArray[np.float64]
 
 LONGER = (1 / 3, 1.0, 3.0)
 """Lengths of windows, in units of the diagnosis' own."""
+LAST, LONGEST = (3.0, 9.0, 27.0), 1.5
+"""Those of the last fits, of the likeliest profile, and the longest, s."""
 FINER = 2
 """How often control points are doubled."""
+FACTORS, LEAPS, CLEARLY = (0.5, 0.7, 1.4, 2.0), 3, 10.0
+"""By what one size is changed at a time, how often at most, and the least gain in score."""
 ROUNDS = 6
 """Iterations with each length, while windows that are far off count, and after."""
 NUDGE = 0.004
@@ -83,6 +87,8 @@ class Trials:
         longer = LONGER if train.runs else (1.0,)  # curves' windows are all alike
         usual_length = windows_for(train).length
         self.lengths = [factor * usual_length for factor in longer]
+        most = max(LONGEST, self.lengths[-1])
+        self.last = sorted({min(factor * usual_length, most) for factor in LAST if train.runs})
 
     def tried(self, profile: Profile) -> Tried:
         """A profile, scored."""
@@ -90,9 +96,7 @@ class Trials:
         price = PRICE * sum(len(part.x) for part in _parts(profile))
         return Tried(profile, loss, self.seen.loss(profile) + loss + price)
 
-    def reshaped(
-        self, profile: Profile, effect: str, told: Callable[[str], None]
-    ) -> Iterator[Tried]:
+    def reshaped(self, profile: Profile, effect: str, told: Callable[[str], None]) -> list[Tried]:
         """A profile, and what fits of all its numbers make of it.
 
         Args:
@@ -100,28 +104,77 @@ class Trials:
             effect: label of the components that may get more control points.
             told: what is being done.
         """
-        yield self.tried(profile)
+        found = self._leaps(self.tried(profile), told)
+        profile = found[-1].profile
         for finer in range(FINER + 1):
             profile = resolved(profile, effect) if finer else profile
             points = sum(len(part.x) for part in _parts(profile) if part.label == effect)
             if finer and not points:
-                return
-            for length in self.lengths:
-                pace = f", windows of {length:.2g} s" if self.train.runs else ""
-                told(f"all numbers, {points} control points of the effect{pace}")
-                profile = refitted(self.train, profile, length)
-                yield self.tried(profile)
+                break
+            what = f"all numbers, {points} control points of the effect"
+            found += self._fits(profile, self.lengths, told, what)
+            profile = found[-1].profile
+        found += self._leaps(likeliest(found), told)
+        what = "all numbers once more"
+        return found + self._fits(likeliest(found).profile, self.last, told, what)
 
-    def holding(self, profile: Profile, parts: Collection[Moved]) -> Iterator[Tried]:
+    def holding(
+        self, profile: Profile, parts: Collection[Moved], told: Callable[[str], None]
+    ) -> list[Tried]:
         """What fits of all other numbers make of a profile, while some parts stay as they are.
 
         Args:
             profile: to be fitted.
             parts: that stay.
+            told: what is being done.
         """
-        for length in self.lengths:
+        return self._fits(profile, self.lengths, told, "the same, nearer to what was given", parts)
+
+    def _fits(
+        self,
+        profile: Profile,
+        lengths: Sequence[float],
+        told: Callable[[str], None],
+        what: str,
+        parts: Collection[Moved] = (),
+    ) -> list[Tried]:
+        """Fits in longer and longer windows, each from what the one before found."""
+        found = []
+        for length in lengths:
+            told(what + (f", windows of {length:.2g} s" if self.train.runs else ""))
             profile = refitted(self.train, profile, length, parts)
-            yield self.tried(profile)
+            found.append(self.tried(profile))
+        return found
+
+    def _leaps(self, best: Tried, told: Callable[[str], None]) -> list[Tried]:
+        """A profile, and better and better ones, each with one size much more or less: where runs
+        go over a barrier, or up to a stop, or just not, no fit gets there step by step."""
+        found = [best]
+        for _ in range(LEAPS):
+            told("sizes that fits do not reach")
+            leapt = likeliest([self.tried(one) for one in self._resized(found[-1].profile)])
+            if leapt.score > found[-1].score - CLEARLY:
+                break
+            found.append(leapt)
+        return found
+
+    def _resized(self, profile: Profile) -> Iterator[Profile]:
+        """The profile as it is, and with one size much more or less."""
+        yield profile
+        kinds: tuple[Kind, ...] = ("sizes", "effects")
+        parameters = Parameters(checked(profile), kinds, inertia=self.train.single.inertia)
+        must = parameters.constraints
+        for k, slot in enumerate(parameters.slots):
+            for factor in FACTORS:
+                theta = parameters.start.copy()
+                theta[k] = np.log(factor) if slot.kind == "sizes" else factor * theta[k]
+                if np.all(must.G @ theta >= must.h):
+                    yield parameters.written(theta)
+
+
+def likeliest(found: Sequence[Tried]) -> Tried:
+    """The one with the least score."""
+    return min(found, key=lambda one: one.score)
 
 
 def _parts(profile: Profile) -> list[Component]:

@@ -33,6 +33,8 @@ NARROWEST, LEAST_WIDTH = 0.005, 1e-4
 """Least width of an interval, in normalised position, of a fit and of all that it tries. Points of
 a curve that are closer than the first are an edge, of which runs tell no shape."""
 
+NOTHING = 1e-5
+"""Part of a curve's largest value, below which a value or a rise is one that a fit held at zero."""
 SIGNED = ("sin", "cos", "force")
 """Numbers of effects that may have either sign."""
 LARGEST = {"breakaway": 1.0, "restitution": 0.95, "share": 0.99}
@@ -270,6 +272,7 @@ def _values(
     foot of a steep edge."""
     y = np.array(component.y)
     scale = float(np.abs(y).max()) or 1.0
+    y[np.abs(y) < NOTHING * scale] = 0.0
     a, b = component.interval
     steep = np.diff(component.x) * (b - a) < NARROWEST
     foot = np.append(steep, False) | np.insert(steep, 0, False)
@@ -283,10 +286,26 @@ def _values(
             rows.append(({at[index]: sign or 1.0}, 0.0))
         slots.append(Slot("values", channel, number, index))
         start.append(value / scale)
-    for index, rise in enumerate(np.diff(y)):
-        if keep_shape and rise:
-            ends = ((index, -np.sign(rise)), (index + 1, np.sign(rise)))
+    for index, way in enumerate(_ways(y, NOTHING * scale)):
+        if keep_shape and way:
+            ends = ((index, -way), (index + 1, way))
             rows.append(({at[k]: float(sign) for k, sign in ends if k in at}, 0.0))
+
+
+def _ways(y: Array, least: float) -> Array:
+    """Which way a curve goes between control points, -1, 0 or 1, shape (n - 1,).
+
+    What rises or falls by less than the least is flat. Between two parts that go one way it is one
+    of them, as a fit that was held by a bound leaves it so; a plateau is neither.
+    """
+    rise = np.diff(y)
+    ways = np.where(np.abs(rise) < least, 0.0, np.sign(rise))
+    (there,) = np.nonzero(ways)
+    for k in np.flatnonzero(ways == 0):
+        before, after = there[there < k], there[there > k]
+        if len(before) and len(after) and ways[before[-1]] == ways[after[0]]:
+            ways[k] = ways[after[0]]
+    return ways
 
 
 def _effect_scale(effect: Effect, key: str) -> float:
