@@ -162,7 +162,7 @@ def mend(
         count = len(departs.sentences)
         found = [(one, departures(given, one.profile, effect, near)) for one in tried]
         other, error_then, _ = best(one for one, own in found if len(own.sentences) < count)
-        if other and not _clearly(first.unseen, other.unseen):
+        if other and _as_good(other, first):
             first, after = other, error_then
             departs = departures(given, first.profile, effect, near)
     if departs.parts:
@@ -186,6 +186,11 @@ def _less(before: Error, after: Error) -> bool:
 def _clearly(loss: float, than: float) -> bool:
     """Whether a loss is less by enough not to be by chance."""
     return loss < min(NEARLY * than, than - LIKELIER)
+
+
+def _as_good(other: Tried, first: Tried) -> bool:
+    """Whether a profile is as good as the likeliest, on what was held out and on all runs."""
+    return other.score < first.score + LIKELIER and not _clearly(first.unseen, other.unseen)
 
 
 def _starts(

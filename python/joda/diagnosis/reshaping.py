@@ -17,11 +17,11 @@ from joda.diagnosis.baseline import LEAST, as_it_is, usable, windows_for
 from joda.diagnosis.given import DOUBT, EFFECTS, Moved
 from joda.diagnosis.guessing import usual
 from joda.diagnosis.judge import BEND, Judge, Unknowns
+from joda.effects import EndStopRestitution
 from joda.field import evaluate
 from joda.joints.parameters import DOUBT as USUAL
 from joda.joints.parameters import NARROWEST, Kind, Parameters
 from joda.measured.reading import Measured
-from joda.measured.replay import WINDOW
 from joda.measured.visited import unvisited
 from joda.profile import CHANNELS, Channel, Channels, Profile
 
@@ -31,6 +31,8 @@ LONGER = (1 / 3, 1.0, 3.0)
 """Lengths of windows, in units of the diagnosis' own."""
 LAST, LONGEST = (3.0, 9.0, 27.0), 1.5
 """Those of the last fits, of the likeliest profile, and the longest, s."""
+SCORED = 1.5
+"""Length of the windows in which profiles are compared, s: as long as those of the last fits."""
 FINER = 2
 """How often control points are doubled."""
 FACTORS, LEAPS, CLEARLY = (0.5, 0.7, 1.4, 2.0), 3, 10.0
@@ -50,7 +52,7 @@ class Likelihood:
 
     def __init__(self, measured: Measured) -> None:
         """Cuts the runs into windows."""
-        self.single, self.windows = as_it_is(measured), windows_for(measured, WINDOW, fine=False)
+        self.single, self.windows = as_it_is(measured), windows_for(measured, SCORED, fine=False)
         self.judge = Judge(self.windows, self.windows.count >= LEAST)
         self.given = measured.profile
         self.own = replace(self.single, friction_row=measured.single.friction_row)
@@ -226,7 +228,8 @@ def refitted(
         parts: whose numbers stay as they are.
     """
     windows = windows_for(train, length, fine=False)  # at the scene's own step
-    judge = Judge(windows, usable(windows))
+    bounces = any(isinstance(effect, EndStopRestitution) for effect in profile.effects)
+    judge = Judge(windows, windows.count >= LEAST if bounces else usable(windows))
     if not judge.counts.any():
         return profile
     kinds: tuple[Kind, ...] = ("values", "intervals", "effects")

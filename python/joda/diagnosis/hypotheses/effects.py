@@ -23,7 +23,7 @@ from joda.diagnosis.hypotheses.base import (
     unit_of,
     unknowns_of,
 )
-from joda.diagnosis.hypotheses.intervals import felt
+from joda.diagnosis.hypotheses.intervals import GRID, WHOLE, felt
 from joda.effects import (
     AddedInertia,
     AnyEffect,
@@ -48,6 +48,8 @@ RAISED = 0.1
 """Part of its rise above its least value from which a free curve is told to act."""
 VARIED = 0.5
 """How much a curve varies at least that differs along the way, in units of its mean."""
+LEVEL = 0.25
+"""By how much it is off its median where it is level, in units of that."""
 KEPT = 3
 """Rough fits of a load behind a play that are fitted to the end: each knock may be or not."""
 JAMMED = 1.0
@@ -85,6 +87,13 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
         y = tuple(np.pad(x - np.min(x) + TINY, beyond, mode="edge"))
         return felt(Component(label=effect, interval=(0, 1), x=knots, y=y), RAISED, to_ends=False)
 
+    def level(x: Array) -> bool:
+        """Whether it is the same on so much of the range that it is called constant."""
+        y = np.interp(np.linspace(0, 1, GRID), knots, np.pad(x, beyond, mode="edge"))
+        usual = float(np.median(y))
+        near = np.abs(y - usual) <= LEVEL * usual
+        return usual > VARIED * float(y.max()) and bool(np.mean(near) >= WHOLE)
+
     return Hypothesis(
         effect,
         "both",
@@ -95,7 +104,7 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
         lambda x: unit * float(np.ptp(x)),
         unit_of(units, power),
         remains=FREE_CURVE,
-        itself=lambda x: bool(np.ptp(x) > VARIED * np.mean(x)),
+        itself=lambda x: bool(np.ptp(x) > VARIED * np.mean(x)) and not level(x),
     )
 
 
@@ -195,21 +204,29 @@ def _resistances(units: Units) -> Iterator[Hypothesis]:
 
 
 def _presliding(units: Units) -> Hypothesis:
-    """Bristles by how far they give way, and how they are damped."""
+    """Bristles by how far they give way, how they are damped, and when they begin to slide."""
     soft = units.friction / units.span
 
     def make(x: Array) -> PreslidingFriction:
         stiffness = soft * float(np.exp(x[0]))
         damping = float(x[1]) * (stiffness * units.inertia) ** 0.5
-        return PreslidingFriction(stiffness=stiffness, damping=damping, breakaway=0.0)
+        return PreslidingFriction(stiffness=stiffness, damping=damping, breakaway=float(x[2]))
 
     return _effect(
         "presliding_friction",
-        [(np.log(20.0), np.log(5e3), 0.05, np.log(4.0), np.log(5e3)), (0.0, 1.5, 0.02)],
-        [(np.log(1 / part), 0.0) for part in (0.001, 0.003, 0.01, 0.03)],
+        [
+            (np.log(20.0), np.log(5e3), 0.05, np.log(4.0), np.log(5e3)),
+            (0.0, 1.5, 0.02),
+            (0.0, 0.95, 0.03),
+        ],
+        [
+            (np.log(1 / part), 0.0, begin)
+            for part, begin in product((0.001, 0.003, 0.01, 0.03), (0.0, 0.6))
+        ],
         make,
         lambda x: soft * float(np.exp(x[0])),
         "N·m/rad" if units.hinge else "N/m",
+        remains=KNOWN_SHAPE,
     )
 
 

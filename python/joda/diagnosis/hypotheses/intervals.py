@@ -13,6 +13,8 @@ NARROWEST = 0.02
 FELT = 0.2
 """Part of its largest force from which a force is felt: where an effect that runs out slowly
 ends."""
+WHOLE = 0.8
+"""Part of the range from which on a resistance is called constant."""
 GRID = 401
 """Points on which that is looked for."""
 END = (0.0, 1.0, 0.004)
@@ -41,6 +43,8 @@ def places(place: str, widest: float = 1.0) -> tuple[Bounds, list[tuple[float, .
         return [(NARROWEST, widest, 0.004)], [(w,) for w in widths]
     if place == "high":
         return [(1 - widest, 1 - NARROWEST, 0.004)], [(1 - w,) for w in widths]
+    if place == "most":
+        return [END, END], [(0.04, 0.96), (0.0, 0.92), (0.08, 1.0)]
     begins = [(float(a), w) for w in WIDTHS for a in np.arange(0, 1 - w + 1e-9, w / 3)]
     return [END, END], [(a, a + w) for a, w in begins]
 

@@ -19,7 +19,7 @@ from joda.diagnosis.hypotheses.base import (
     unit_of,
     unknowns_of,
 )
-from joda.diagnosis.hypotheses.intervals import FELT, ends, felt, places
+from joda.diagnosis.hypotheses.intervals import FELT, WHOLE, ends, felt, places
 from joda.profile import Profile
 from joda.template import Template
 
@@ -40,7 +40,6 @@ LOCAL = {
     "constant_damping_hinge": "position_dependent_damping",
 }
 """What a constant resistance is called that acts on less than `WHOLE` of the range."""
-WHOLE = 0.8
 TAIL = 0.5
 """Force halfway between a well's largest and its end, in units of that."""
 RARE = 3.0
@@ -270,7 +269,7 @@ def _bistable(units: Units, name: str) -> Hypothesis:
 
 
 def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesis]:
-    """A constant in one channel, all over the range or on a part of it."""
+    """A constant in one channel, all over the range, on most or on a part of it."""
     channel, sign = next(
         (c, np.sign(curve.y[0]))
         for c in ("conservative", "friction", "damping")
@@ -280,7 +279,7 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
 
     def one(place: str) -> Hypothesis:
         whole = place == "whole"
-        label = name if whole else LOCAL.get(name, name)
+        label = LOCAL.get(name, name) if place == "anywhere" else name
 
         def write(profile: Profile, x: Array) -> Profile:
             y, interval = float(unit * x[0]), ends(place, x)
@@ -294,9 +293,9 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
             return profile.with_component(channel, part)
 
         def itself(x: Array) -> bool:
-            """Whether it is not the same as the whole range's."""
+            """Whether it is called so where it acts."""
             a, b = between(x)
-            return label == name or b - a < WHOLE
+            return name not in LOCAL or (b - a >= WHOLE) == (label == name)
 
         def between(x: Array) -> tuple[float, float]:
             """From the middle of one edge to that of the other."""
@@ -323,3 +322,5 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
 
     yield one("whole")
     yield one("anywhere")
+    if name in LOCAL:
+        yield one("most")
