@@ -170,7 +170,7 @@ def mend(
         own = checked(begun.base.written(begun.fit.x))
         with threadpool_limits(1, BLAS):
             without = likeliest(trials.reshaped(own, effect, told))
-        if not _clearly(first.unseen, without.unseen):
+        if _as_good(without, first):
             return Mended(train.profile, None, before, before, OWN)
     return Mended(first.profile, effect, before, after, departs=departs)
 
