@@ -33,7 +33,7 @@ std::array<const char*, joda::kTexts> Pointers(const Texts& texts) {
 }
 
 py::array_t<double> Coefficients(const joda::PiecewiseCubic& channel) {
-  const auto& pieces = channel.coefficients();
+  const auto pieces = channel.Cubics();
   py::array_t<double> out({py::ssize_t{4}, static_cast<py::ssize_t>(pieces.size())});
   for (size_t k = 0; k < pieces.size(); ++k) {
     for (size_t i = 0; i < 4; ++i) out.mutable_at(i, k) = pieces[k][i];
@@ -130,7 +130,8 @@ Raises:
       .def_property_readonly(
           "knots",
           [](const joda::PiecewiseCubic& channel) {
-            return py::array_t<double>(channel.knots().size(), channel.knots().data());
+            const auto knots = channel.Knots();
+            return py::array_t<double>(knots.size(), knots.data());
           },
           "Breakpoints in s, shape (n + 1,).")
       .def_property_readonly("coefficients", &Coefficients,

@@ -57,7 +57,7 @@ bool Check(Random& random, const Accepted& accepted) {
   for (const auto& c : accepted.components) alone.push_back({{c}, Combine::kSum});
   const double tolerance = 1e-6 * accepted.bound;
   bool good = std::isfinite(accepted.channel.MaxDescent());
-  for (const double s : Places(random, accepted.channel.knots())) {
+  for (const double s : Places(random, accepted.channel.Knots())) {
     std::vector<Sample> samples;
     for (size_t k = 0; k < alone.size(); ++k) {
       const double inside = std::clamp(s, 0.0, 1.0);

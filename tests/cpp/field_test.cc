@@ -94,8 +94,8 @@ TEST_CASE("a sum of lines is exact in closed form") {
 TEST_CASE("a maximum of lines changes over exactly at their crossing") {
   const PiecewiseCubic max({Line(0, 1, 0, 4), Line(0, 1, 3, 0)}, Combine::kMax);
   const double crossing = 3.0 / 7;
-  REQUIRE(max.knots().size() == 3);
-  CHECK(max.knots()[1] == doctest::Approx(crossing).epsilon(1e-15));
+  REQUIRE(max.Knots().size() == 3);
+  CHECK(max.Knots()[1] == doctest::Approx(crossing).epsilon(1e-15));
   CHECK(max(0.25).value == 2.25);
   CHECK(max(0.25).slope == -3);
   CHECK(max(0.5).value == 2);
