@@ -12,6 +12,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
+#include <locale>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -61,6 +64,20 @@ inline std::string Quote(std::string_view text) {
   return "\"" + std::string(text.substr(0, end)) + (end < text.size() ? "...\"" : "\"");
 }
 
+// Whether all of the word is a number, which `value` then is; infinities and NaN are or are not.
+inline bool ReadNumber(std::string_view word, double* value) {
+#ifdef __cpp_lib_to_chars
+  const char* end = word.data() + word.size();
+  const auto result = std::from_chars(word.data(), end, *value);
+  return result.ec == std::errc() && result.ptr == end;
+#else  // LLVM's library, before 20, reads only integers so
+  if (word.find_first_not_of("0123456789+-.eE") != word.npos || word.front() == '+') return false;
+  std::istringstream stream{std::string(word)};
+  stream.imbue(std::locale::classic());
+  return stream >> *value && stream.peek() == EOF;
+#endif
+}
+
 }  // namespace internal
 
 // Numbers separated by white space; throws for anything else, infinities and NaN included.
@@ -68,9 +85,7 @@ inline std::vector<double> ParseNumbers(std::string_view text) {
   std::vector<double> out;
   for (const std::string_view word : internal::Words(text)) {
     double value;
-    const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (result.ec != std::errc() || result.ptr != word.data() + word.size() ||
-        !std::isfinite(value)) {
+    if (!internal::ReadNumber(word, &value) || !std::isfinite(value)) {
       throw std::invalid_argument(internal::Quote(word) + " is not a finite number");
     }
     out.push_back(value);
