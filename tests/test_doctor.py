@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import mujoco
@@ -100,6 +101,16 @@ def test_modules_that_are_missing_and_broken(tmp_path):
     assert "jax is torn" in mjx["found"]
     assert "'scipy>=" in libraries["remedy"]
     assert found["key: Claude"]["state"] == "missing"
+
+
+def test_it_says_which_joda_this_is():
+    found = {check.what: check.found for check in doctor._versions()}
+    assert found["joda"] == f"{joda.__version__}, {Path(joda.__file__).resolve().parent}"
+
+
+def test_every_extra_that_has_packages_is_looked_at():
+    extras = set(metadata.metadata("joda").get_all("Provides-Extra"))
+    assert set(doctor.EXTRAS) == extras - {"all", "docs", "test"}
 
 
 def test_what_is_left_in_the_cache(tmp_path):

@@ -24,7 +24,15 @@ from joda.plugin import PLUGIN, plugin_path
 
 State = Literal["ok", "missing", "broken"]
 
-EXTRAS = {"mjx": ("jax", "mujoco.mjx"), "vlm": ("anthropic", "openai")}
+EXTRAS = {
+    "mjx": ("jax", "mujoco.mjx"),
+    "warp": ("warp", "mujoco_warp"),
+    "vlm": ("anthropic", "openai"),
+    "studio": ("nicegui",),
+    "import": ("pyarrow", "rosbags"),
+    "export": ("pxr",),
+    "ray": ("ray",),
+}
 """What each extra lets one import."""
 LIBRARIES = "numpy", "scipy", "pydantic", "matplotlib", "PIL", "rich", "typer"
 RENDERERS = {
@@ -109,7 +117,7 @@ def doctor() -> list[Check]:
 def _versions() -> list[Check]:
     return [
         Check("Python", "ok", f"{platform.python_version()}, {sys.executable}"),
-        Check("joda", "ok", f"{metadata.version('joda')}, {Path(__file__).resolve().parent}"),
+        Check("joda", "ok", f"{metadata.version('joda')}, {Path(__file__).resolve().parents[1]}"),
         _mujoco(),
         Check("cores", "ok", str(_cores())),
     ]
