@@ -22,7 +22,7 @@ from warp_parity import CLOSE, CONFIGURATIONS, RANGES, SPANS, by_plugin, by_warp
 
 import joda.warp  # noqa: E402
 from joda.component import Component  # noqa: E402
-from joda.effects import LoadDependentFriction  # noqa: E402
+from joda.effects import LoadDependentFriction, PreslidingFriction  # noqa: E402
 from joda.profile import Channel, Channels, Joint, Profile, Resistance  # noqa: E402
 from joda.warp.bench import bench  # noqa: E402
 
@@ -82,6 +82,27 @@ def test_each_effect_alone_moves_as_with_the_plugin():
     for name, wrong, large in zip(kinds, error, change, strict=True):
         assert wrong < CLOSE, f"{name}: {wrong}"
         assert large > 10 * CLOSE or name.startswith("added_inertia"), f"{name}: {large}"
+
+
+def test_soft_bristles_move_as_with_the_plugin():
+    """To and fro beyond their break-away, however soft, all the way."""
+    variants = [
+        {
+            name: flat(
+                name,
+                friction=friction,
+                effects=(PreslidingFriction(stiffness=k * friction, breakaway=breakaway),),
+            )
+            for name, friction in (("arm", 0.2), ("drawer", 2.0))
+        }
+        for breakaway in (0.0, 0.6, 1.0)
+        for k in (100, 500, 2500)
+    ]
+    pushes = warp_parity.forces() * [0.7, 0.35]
+    expected = by_plugin(variants, pushes, gravity="0 0 0") / SPANS
+    m, d, _ = prepared(variants, gravity="0 0 0")
+    assert np.abs(by_warp(m, d, pushes) / SPANS - expected).max() < CLOSE
+    assert (np.ptp(expected, axis=0) > 0.05).all()
 
 
 def test_motors_and_contacts_load_a_joint_as_with_the_plugin():

@@ -197,7 +197,7 @@ def remember(
         damping = force_of(profiles, int(Row.DAMPING), w, j, forces)
         limit = force_of(profiles, int(Row.LIMIT), w, j, forces)
         own = psi + damping + state[int(State.STOP_SIDE), w, j] * limit
-        state[int(State.FRICTION), w, j] = psi
+        state[int(State.FRICTION), w, j] = psi + state[int(State.BESIDE_ROW), w, j]
         state[int(State.UNKNOWN_LOAD), w, j] = constraint - own - actuator
         gap = float(state[int(State.NEXT_GAP), w, j])
         speed = float(state[int(State.NEXT_SPEED), w, j])
@@ -360,6 +360,7 @@ def act(
     drag = against[0] + h * stiffness
     dry = wp.where(v < 0.0, against[2], against[1])
 
+    beside = float(0.0)
     if row >= 0:
         bound = 0.5 * (against[1] + against[2])
         psi = wp.clamp(held, -bound, bound)
@@ -372,17 +373,19 @@ def act(
             if joint.damps != 0:
                 rate = n[int(Number.PRESLIDING_FRICTION_DAMPING), w, j]
                 drag += passage.resistance * rate * left
-            # near slip a soft row would cost so much that float32 loses the others beside it: the
-            # bound is what the bristles will have reached by then, and the row is stiffer
+            # near slip a soft row that holds so much would cost so much that float32 loses the
+            # others: what it held acts beside it, and the row adds what the bristles still can
             ahead = v + h * qacc_warmstart[w, dof]
             if psi * ahead < 0.0 and bound * bound > D * laws.MOST_COST:
-                bound = wp.min(bound, wp.abs(psi) + D * wp.abs(ahead) / h)
-                D = bound * bound / laws.MOST_COST
+                beside = psi
+                bound -= wp.abs(psi)
+                psi = 0.0
         efc_D[w, row] = D
         efc_aref[w, row] = psi / D - v / h
         efc_frictionloss[w, row] = bound
-        force += 0.5 * (against[2] - against[1])  # as the row is symmetric
+        force += beside + 0.5 * (against[2] - against[1])  # as the row is symmetric
         dry = 0.0
+    profiles.state[int(State.BESIDE_ROW), w, j] = beside
     if damping_row >= 0:
         efc_D[w, damping_row] = wp.max(h * drag, laws.IDLE_ROW * inertia)
         efc_aref[w, damping_row] = -v / h

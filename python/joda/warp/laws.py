@@ -9,8 +9,8 @@ from joda.scenes.limits import IMPEDANCE, STIFFNESS
 
 STILL = wp.constant(1e-6)
 """Speed below which a joint counts as still: float32's rounding, larger than in cpp/effects.h."""
-MOST_COST = wp.constant(3e4)
-"""Largest bound² / D of a row of bristles: what the solver's cost resolves in float32."""
+MOST_COST = wp.constant(1e3)
+"""Largest bound² / D of a row of bristles: beside it float32 still resolves the others' cost."""
 LEAST_BRISTLE = wp.constant(1e-6)
 """As kLeastBristle in cpp/effects.h, and so on."""
 LEAST_IN_ROW = wp.constant(0.05)

@@ -74,6 +74,8 @@ class State(IntEnum):
     the last step, N·m or N."""
     STOP_SIDE = 8
     """In the step being computed: 1 where the low end of the range is near, -1 the high one."""
+    BESIDE_ROW = 9
+    """In the step being computed: friction that is not in the row's force, N·m or N."""
 
 
 class Row(IntEnum):
