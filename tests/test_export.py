@@ -335,6 +335,8 @@ def test_mistakes_are_one_sentence(scene, tmp_path):
         export(tmp_path / "plain.xml", "sdf", tmp_path / "o.sdf")
     with pytest.raises(joda.JodaError, match="exists already"):
         export(scene, "sdf", tmp_path / "plain.xml")
+    with pytest.raises(joda.JodaError, match="written as text; let the file's name end in"):
+        export(scene, "usd", tmp_path / "o.usdc")
     code = (
         "import sys; sys.modules['pxr'] = None\nimport joda\n"
         f"try: joda.export({str(scene)!r}, 'usd', {str(tmp_path / 'o.usda')!r})\n"

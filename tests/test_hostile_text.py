@@ -636,6 +636,10 @@ WORDS = {
         ["context", "\x1b[2J\r.xml"],
         r"joda: \u001b[2J\r.xml: no such file",
     ),
+    "a format that joda has not": (
+        ["export", "oven.xml", "-o", "new", "--to", "obj"],
+        "joda: Invalid value for '--to': 'obj' is not one of 'native', 'urdf', 'sdf', 'usd'. Try",
+    ),
     "a command that acts": (["\x1b[2J"], r"No such command '\x1b[2J'. Try --help."),
 }
 

@@ -111,7 +111,8 @@ def _explain(error: BaseException) -> int:
     if isinstance(error, JodaError):
         return _fail(str(error))
     if isinstance(error, typer.TyperException):
-        return _fail(error.format_message().rstrip(".") + ". Try --help.")
+        told = error.format_message().replace("Value error, ", "")  # as pydantic begins its own
+        return _fail(told.rstrip(".") + ". Try --help.")
     if isinstance(error, OSError):
         where = error.filename or "what is printed"
         _silence()

@@ -49,9 +49,11 @@ def export(scene: str | Path, to: Format, output: str | Path, *, force: bool = F
 
     Raises:
         JodaError: the scene cannot be loaded, carries no profile or holds what the format cannot;
-            a file cannot be written; usd-core is not installed.
+            a file cannot be written, or not under that name; usd-core is not installed.
     """
     scene, output = Path(scene), Path(output)
+    if to == "usd" and output.suffix not in (".usda", ".usd"):
+        raise JodaError(f"{output}: USD is written as text; let the file's name end in .usda.")
     check_target(output, force)
     spec, model = load(scene)
     profiles = profiles_of(model)
