@@ -26,6 +26,9 @@ NEAR = 0.005
 PATIENCE = 0.5
 """How long (s) a hand goes on that pulls with all its strength in vain."""
 
+IMPATIENCE = 3.0
+"""Within so long (s) a hand comes to its full strength if it has taken twice the usual time."""
+
 LONGEST = 10.0
 """A hand gives up after so many times what the way would take at its speed, and 10 s."""
 
@@ -55,8 +58,9 @@ def finest(inertia: float, stiffness: float) -> float:
 class Hand:
     """A hand that takes a joint to one position after the other; acts on a scene, see `play`.
 
-    The target sets out gently and moves at the hand's speed until the joint has arrived, or the
-    hand's strength is exhausted; it never goes further beyond the range than the strength reaches.
+    The target sets out gently and moves at the hand's speed, faster once it has taken twice the
+    time that the way takes, until the joint has arrived, or the hand's strength is exhausted; it
+    never goes further beyond the range than the strength reaches.
     """
 
     def __init__(self, model: mujoco.MjModel, joint: int, to: Sequence[float], grip: Grip) -> None:
@@ -97,13 +101,13 @@ class Hand:
         inertia = inertia_at(model, data, self._dof)
         self._stiffness = min(grip.stiffness, FIRMEST * inertia / model.opt.timestep**2)
         self._damping = 2 * math.sqrt(self._stiffness * inertia)
-        reach = grip.strength / self._stiffness
-        self._bounds = self._range[0] - reach, self._range[1] + reach
+        self._reach = grip.strength / self._stiffness
+        self._bounds = self._range[0] - self._reach, self._range[1] + self._reach
 
     def _set_out(self, now: float, position: float) -> None:
         """For the next position."""
         to = self._left.pop(0)
-        self._stage = _Going(now, self._target, position, to, self._grip)
+        self._stage = _Going(now, self._target, position, to, self._grip, self._reach)
 
     def _pull(self, now: float, position: float, velocity: float) -> float:
         """The force towards the target, which goes on."""
@@ -138,11 +142,15 @@ class _Resting:
 class _Going:
     """On the way to a position."""
 
-    def __init__(self, now: float, target: float, position: float, to: float, grip: Grip) -> None:
+    def __init__(
+        self, now: float, target: float, position: float, to: float, grip: Grip, reach: float
+    ) -> None:
         self._since, self._from, self._to = now, target, to
         self._way, self._sign = abs(to - position), float(np.sign(to - position))
         self._pace = self._sign * grip.speed
+        self._hurry = self._sign * reach / IMPATIENCE
         self._grip = grip
+        self._usual = 2 * self._way / grip.speed
         self._longest = LONGEST * self._way / grip.speed + 10.0
         self._least = self._way
         self._spent = 0.0
@@ -152,7 +160,9 @@ class _Going:
         """The target and its speed."""
         time = now - self._since
         speed = self._pace * (1 - math.exp(-time / SET_OUT))
-        return self._from + self._pace * time - SET_OUT * speed, speed
+        target = self._from + self._pace * time - SET_OUT * speed
+        late = time - self._usual
+        return (target + self._hurry * late, speed + self._hurry) if late > 0 else (target, speed)
 
     def rest(self, now: float, target: float) -> _Resting:
         """What comes after it."""

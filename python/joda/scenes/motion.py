@@ -95,18 +95,19 @@ def play(
     felt = felt or outside
     out: list[tuple[float, float, float, float]] = []
     going = True
-    while True:
-        if going:
-            going = act(data)
-            if not going and steps is not None:
-                data.qfrc_applied[dof] = 0.0
-        state = data.time, data.qpos[qpos], data.qvel[dof]
-        watch(data)
-        if len(out) == steps or not (going or steps):
+    with unheard():
+        while True:
+            if going:
+                going = act(data)
+                if not going and steps is not None:
+                    data.qfrc_applied[dof] = 0.0
+            state = data.time, data.qpos[qpos], data.qvel[dof]
+            watch(data)
+            if len(out) == steps or not (going or steps):
+                out.append((*state, felt(model, data, dof)))
+                return Motion(*np.array(out).T)
+            _advance(model, data, stride)
             out.append((*state, felt(model, data, dof)))
-            return Motion(*np.array(out).T)
-        _advance(model, data, stride)
-        out.append((*state, felt(model, data, dof)))
 
 
 @contextmanager
@@ -123,10 +124,9 @@ def unheard() -> Iterator[None]:
 
 
 def _advance(model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
-    """Steps the scene; raises JodaError if it is unstable, of which MuJoCo says nothing then."""
+    """Steps the scene; raises JodaError if it is unstable; `unheard` goes around it."""
     before = data.time
-    with unheard():
-        mujoco.mj_step(model, data, steps)
+    mujoco.mj_step(model, data, steps)
     if data.time > before:
         return  # else MuJoCo has begun anew
     dofs = [data.warning[kind].lastinfo for kind in _BAD if data.warning[kind].number]
@@ -218,12 +218,13 @@ def settle(model: mujoco.MjModel, joint: int, position: float, patience: float) 
     out = [(0.0, position, 0.0, 0.0)]
     pause = max(round(0.25 / model.opt.timestep), 1)
     stride = max(pause // 25, 1)
-    while data.time < patience:
-        _advance(model, data, stride)
-        out.append((data.time, data.qpos[qpos], data.qvel[dof], 0.0))
-        recent = [row[1] for row in out[-(pause // stride + 1) :]]
-        if len(recent) > pause // stride and max(recent) - min(recent) < 1e-4 * span:
-            break
+    with unheard():
+        while data.time < patience:
+            _advance(model, data, stride)
+            out.append((data.time, data.qpos[qpos], data.qvel[dof], 0.0))
+            recent = [row[1] for row in out[-(pause // stride + 1) :]]
+            if len(recent) > pause // stride and max(recent) - min(recent) < 1e-4 * span:
+                break
     return Motion(*np.array(out).T)
 
 
