@@ -557,7 +557,7 @@ def test_the_key_is_told_nobody(name, server, tmp_path, caplog):
     caplog.set_level(logging.DEBUG)
     server.script[:] = [LEAKS[name]]
     model = Path(__file__).parents[1] / "models" / "refrigerator.xml"
-    session = Session.start(tmp_path / "out", model, "door", pictured=False)
+    session = Session.start(tmp_path / "out", model, "door", pictures=0)
     proposer, told = Anthropic("claude-test", server.url), ""
     try:
         session.ask(proposer)

@@ -306,7 +306,7 @@ def test_the_key_is_told_nobody(name, server, tmp_path, caplog, monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     caplog.set_level(logging.DEBUG)
     server.script[:] = [LEAKS[name]]
-    session = Session.start(tmp_path / "out", MODELS / "refrigerator.xml", "door", pictured=False)
+    session = Session.start(tmp_path / "out", MODELS / "refrigerator.xml", "door", pictures=0)
     asking, told = OpenAI("qwen-test", server.address), ""
     try:
         session.ask(asking)

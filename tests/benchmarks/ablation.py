@@ -116,7 +116,7 @@ def loop(name: str, key: str) -> Loop:
     joint, wanted = OBJECTS[name]
     with TemporaryDirectory() as folder:
         model = MODELS / f"{name}.xml"
-        session = Session.start(Path(folder), model, joint, "", key=key, pictured=False)
+        session = Session.start(Path(folder), model, joint, "", key=key, pictures=0)
         propose(session, Offline(key), MOST)
     found, turns = session.context, session.turns
     first, last = turns[0], turns[-1]

@@ -60,7 +60,7 @@ def try_case(case: Case, key: str, folder: Path) -> Tried:
         JodaError: the folder cannot be written.
     """
     model = bundled(case.model)
-    session = Session.start(folder, model, case.joint, case.describe, key=key, pictured=False)
+    session = Session.start(folder, model, case.joint, case.describe, key=key, pictures=0)
     run(session, Offline(key), ROUNDS)
     found, trial = session.context, case.trial
     proposed = [turn.profile for turn in session.turns]

@@ -14,7 +14,7 @@ from joda.proposal import Proposal
 from joda.propose import Proposer
 from joda.propose.asking import Effort
 from joda.propose.history import History
-from joda.propose.session import Progress, Session, relative, silent
+from joda.propose.session import PICTURES, Progress, Session, relative, silent
 from joda.scenes.model import find_joint, joint_name, joint_type, load_model
 from joda.template import read_templates
 
@@ -123,10 +123,11 @@ def begin(
     key: str,
     resume: bool,
     progress: Progress = silent,
+    pictures: int = PICTURES,
 ) -> Session:
     """The session that a folder holds, if it is to be resumed, or a new one; raises JodaError."""
     if not resume or not (folder / "history.json").is_file():
-        return Session.start(folder, model, joint, describe, templates, key, progress)
+        return Session.start(folder, model, joint, describe, templates, key, progress, pictures)
     history = History.read(folder / "history.json")
     if history.model != relative(model, folder) or not _same(model, joint, history.joint):
         raise JodaError(

@@ -12,7 +12,8 @@ from joda.errors import JodaError
 from joda.files import file_name, make_folder, read_text, write_text
 from joda.propose import Ask, BatchProposer, Proposer
 from joda.propose.asking import Effort
-from joda.propose.session import Session
+from joda.propose.offline import Offline
+from joda.propose.session import PICTURES, Session
 from joda.propose.sheet import Entry, sheet
 from joda.scenes.model import load_model
 
@@ -21,6 +22,9 @@ Results = dict[str, Generated | JodaError]
 
 SHEET = "sheet.html"
 """The contact sheet."""
+
+BOTH_ENDS = 2
+"""Pictures of a joint that nobody looks at but the sheet."""
 
 MODELS = (".xml", ".urdf")
 """How names of models end."""
@@ -91,11 +95,15 @@ def generate_all(
     make_folder(target)
     further = [Path(path) for path in templates]
     sessions: dict[str, Session] = {}
+    pictures = BOTH_ENDS if isinstance(chosen, Offline) else PICTURES
     batched = chosen if isinstance(chosen, BatchProposer) else None
     for number, (label, job) in enumerate(jobs.items()):
         progress(number, len(jobs), label)
         try:
-            session = begin(job.folder, job.model, job.joint, describe, further, key, resume)
+            session = begin(
+                *(job.folder, job.model, job.joint, describe, further, key, resume),
+                pictures=pictures,
+            )
             if batched is None:
                 own = choose(proposer, session.history.key, vlm, base_url, effort)
                 run(session, own, rounds, force)

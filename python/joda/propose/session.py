@@ -39,6 +39,8 @@ from joda.scenes.context import Context, context
 from joda.template import read_templates
 
 PICTURES = 5
+"""Of the joint, at so many positions, for whoever looks at them."""
+
 SURE = 0.5
 """How sure it must be what a joint is, before somebody's proposal is doubted for its force."""
 
@@ -61,13 +63,20 @@ class Session:
         notes: what the user should be told, a sentence each.
     """
 
-    def __init__(self, folder: Path, history: History, progress: Progress = silent) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        history: History,
+        progress: Progress = silent,
+        pictures: int = PICTURES,
+    ) -> None:
         """Opens a session, and writes what its folder lacks.
 
         Args:
             folder: where everything is; made if missing.
             history: of a new session, without rounds, or of one to go on with.
             progress: told what is being done.
+            pictures: how many pictures of the joint, where there are none yet.
 
         Raises:
             JodaError: the model, the joint or the templates are not to be had; nothing is written.
@@ -98,7 +107,7 @@ class Session:
         self.task = Task(
             self.context,
             library,
-            self._pictures(),
+            self._pictures(pictures),
             history.description,
             archetypes,
         )
@@ -115,11 +124,11 @@ class Session:
         templates: Sequence[Path] = (),
         key: str = "",
         progress: Progress = silent,
-        pictured: bool = True,
+        pictures: int = PICTURES,
     ) -> "Session":
         """A new session in a folder that is made if missing; raises JodaError.
 
-        Not `pictured`: without pictures of the joint, which rules do not look at.
+        With 0 `pictures` there are none of the joint, which rules do not look at.
         """
         try:
             history = History(
@@ -128,11 +137,11 @@ class Session:
                 description=description,
                 templates=tuple(relative(path, folder) for path in templates),
                 key=key,
-                pictures=None if pictured else (),
+                pictures=None if pictures else (),
             )
         except ValidationError as error:
             raise JodaError(describe(error)) from None
-        return cls(folder, history, progress)
+        return cls(folder, history, progress, pictures)
 
     @classmethod
     def resume(cls, folder: Path, progress: Progress = silent) -> "Session":
@@ -381,7 +390,7 @@ class Session:
         self.notes += [note for note in said if note not in self.notes]
         write_text(self.folder / "composed.json", turn.profile.to_json())  # last, see _finished
 
-    def _pictures(self) -> list[bytes]:
+    def _pictures(self, count: int) -> list[bytes]:
         """The joint at several positions, those of before or made now; none where none can be."""
         names = self.history.pictures
         paths = [self.folder / "pictures" / name for name in names or ()]
@@ -389,7 +398,7 @@ class Session:
             self.progress("picturing the joint")
             folder = self.folder / "pictures"
             try:
-                paths = render(self.model, self.history.joint, folder, count=PICTURES, force=True)
+                paths = render(self.model, self.history.joint, folder, count=count, force=True)
             except JodaError as error:
                 paths = []
                 self.notes.append(f"No pictures, the proposer goes by the text: {error}")
