@@ -34,6 +34,16 @@ def test_a_door_covers_a_cavity_and_a_panel_on_a_block_does_not(tmp_path):
     assert scene(tmp_path, WALL.replace('pos="0 .14 .2"', 'pos="0 5 .2"')).shape.covers == 0
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.002, 0.004])
+def test_a_lid_on_a_solid_base_covers_nothing(tmp_path, gap):
+    """As a laptop's: between lid and base is a slit, and no cavity."""
+    base = '<geom type="box" size=".12 .17 .01" pos="0 0 .01"/>'
+    lid = '<geom type="box" size=".12 .17 .004" pos=".12 0 .004" mass=".5"/>'
+    hinge = '<joint name="j" axis="0 -1 0" range="0 2"/>'
+    found = scene(tmp_path, base, hinge, lid, at=f"-.12 0 {0.02 + gap}")
+    assert found.shape.covers == 0
+
+
 @pytest.mark.parametrize("turn", ["0 0 0", "0 0 .7", "0 0 -2.2"])
 def test_how_an_object_stands_changes_nothing(tmp_path, turn):
     first, other = scene(tmp_path).shape.model_dump(), scene(tmp_path, turn=turn).shape.model_dump()

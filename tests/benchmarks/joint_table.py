@@ -83,6 +83,10 @@ REAL: dict[str, dict[str, Expected]] = {
     "drawer:window_horiz": {"window_slide": {"half": "stays", "force": (2, 100)}},
     "drawer:buttonbox": {"btnbox_joint": {"opens": "-", **BUTTON}},
     "drawer:coffeemachine": {"goal_slidey": {"opens": "+", **BUTTON}},
+    "drawer:doorlockA": {"#0": KNOB},
+    "drawer:handle_press": {"#0": {"opens": "-", "force": (1, 60)}},
+    "drawer:lever": {"LeverAxis": {"half": "stays", "force": (1, 30)}},
+    "drawer:hammerblock": {"NailSlideJoint": {"half": "stays"}},
 }  # fmt: skip
 """Other people's joints: "asset", or "asset:another file beside it"."""
 

@@ -52,17 +52,19 @@ def view(model: mujoco.MjModel, data: mujoco.MjData, point: Array, reach: float)
     return View(np.where(none, -1, geoms), np.where(none, np.inf, distances), within & ~none)
 
 
-def covered(shut: View, open_: View, own: NDArray[np.intp]) -> float:
+def covered(shut: View, open_: View, own: NDArray[np.intp], deep: float) -> float:
     """The share of a point's view that a part takes, if all else in view is wall; else 0.
 
     Args:
         shut: with the part where it may cover a cavity.
         open_: with the part at the other end; what is as near then was no cover.
         own: the geoms of the part.
+        deep: how far away (m) half of the wall is at least: what is nearer is a slit, no cavity.
     """
     part = np.isin(shut.geoms, own)
     wall = ((shut.geoms >= 0) & ~shut.within)[~part]
     walled = len(wall) == 0 or float(np.mean(wall)) >= WALLED
+    walled = walled and float(np.median(shut.distances[~part] if len(wall) else [np.inf])) >= deep
     frees = open_.distances > shut.distances + FREED
     return float(np.mean(part & frees)) if walled else 0.0
 

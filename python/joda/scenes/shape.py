@@ -34,6 +34,9 @@ ALIKE = 0.03
 """Parts whose sizes differ by no more than this share are of equal shape."""
 LEVEL = 0.15
 """A part that rises by less than this share of its size neither falls open nor shut."""
+SLIT = 0.015
+"""Walls nearer than this share of a part's size make a slit: a lid that lies on its base has one
+behind it, and covers nothing."""
 OUT, NEARLY = 0.12, 0.03
 """A part that is so much farther out of its object (in its own sizes) at one end is open there: one
 that slides, against the model's reference position; any, where that tells nothing."""
@@ -254,7 +257,7 @@ class _Look:
             shut = [view(model, data, place, reach) for place in places]
             data_at(model, data, joint, ends[1])
             covers = sorted(
-                covered(one, view(model, data, place, reach), own)
+                covered(one, view(model, data, place, reach), own, SLIT * float(box.size.max()))
                 for one, place in zip(shut, places, strict=True)
             )[-WITNESSES]
         return cls(points, box, others, anchor, axis, outward, _up(model), covers, holds, room)
