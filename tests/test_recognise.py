@@ -249,6 +249,27 @@ def test_somebody_elses_implausible_force_is_doubted(tmp_path):
     assert "looks like a refrigerator door" in note and "16 CFR 1750" in note
 
 
+@pytest.mark.parametrize(("factor", "told"), [(1, False), (5, True), (0.001, True)])
+def test_a_scale_that_the_names_belie_is_told(tmp_path, factor, told):
+    """PartNet-Mobility's own files are scaled to unit size: a laptop's lid of 1.7 m."""
+
+    def size(*lengths):
+        return " ".join(f"{factor * length:g}" for length in lengths)
+
+    path = tmp_path / "a.xml"
+    path.write_text(
+        f'<mujoco model="laptop"><worldbody><geom type="box" size="{size(0.12, 0.17, 0.01)}"/>'
+        f'<body name="lid" pos="{size(-0.12, 0, 0.02)}"><joint axis="0 -1 0" range="0 130"/>'
+        f'<geom type="box" size="{size(0.12, 0.17, 0.004)}" pos="{size(0.12, 0, 0)}" mass="0.5"/>'
+        "</body></worldbody></mujoco>"
+    )
+    task = Task(context(path, "#0"), read_templates())
+    notes = Offline().propose(task, []).notes
+    assert len(notes) == told
+    if told:
+        assert "Names say laptop lid" in notes[0] and "mend the model's scale" in notes[0]
+
+
 def test_what_a_part_is_on_is_told_by_the_nearest_name(tmp_path):
     """A knob of an oven that stands in a kitchen of cabinets is the oven's."""
     path = tmp_path / "kitchen.xml"

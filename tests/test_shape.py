@@ -91,6 +91,16 @@ def test_the_lever_arm_goes_to_the_handle_else_to_the_farthest_edge(tmp_path):
     assert scene(tmp_path, part=PANEL + named).lever_arm == pytest.approx(0.3, abs=2e-3)
 
 
+def test_a_dial_on_a_door_is_no_handle(tmp_path):
+    """As a safe's: half-way to the edge, on a joint of its own."""
+    dial = '<geom type="cylinder" size=".03 .015" pos="0 -.015 0" euler="1.5708 0 0"/>'
+    fast = f'<body pos=".2 -.02 0">{dial}</body>'
+    turns = f'<body pos=".2 -.02 0"><joint axis="0 1 0" range="0 5"/>{dial}</body>'
+    plain = scene(tmp_path).lever_arm
+    assert scene(tmp_path, part=PANEL + fast).lever_arm == pytest.approx(0.2, abs=5e-3)
+    assert scene(tmp_path, part=PANEL + turns).lever_arm == pytest.approx(plain)
+
+
 def test_the_lever_arm_of_a_switch_does_not_count_to_a_misplaced_centre_of_mass(tmp_path):
     part = (
         '<inertial pos=".4 0 0" mass=".1" diaginertia="1e-4 1e-4 1e-4"/>'

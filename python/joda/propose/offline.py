@@ -22,7 +22,7 @@ from joda.propose.checks import FELT, SOFT, share
 from joda.propose.complaints import revise
 from joda.propose.mend import mend, rescale
 from joda.propose.parts import Part
-from joda.propose.recognise import Recognition, recognise
+from joda.propose.recognise import Recognition, recognise, scale_doubt
 from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
 from joda.scenes.context import Context
 
@@ -59,7 +59,9 @@ class Offline:
         """See `joda.propose.Proposer`."""
         kind, found = recognise(task.context, task.description, task.archetypes)
         if not turns:
-            return Answer(self._first(task, kind, found), recognised=found)
+            doubt = scale_doubt(kind, task.context, task.description)
+            first = self._first(task, kind, found)
+            return Answer(first, notes=(doubt,) if doubt else (), recognised=found)
         last = turns[-1]
         if last.complaint:
             return Answer(self._revised(task, last), recognised=found)

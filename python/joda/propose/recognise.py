@@ -33,6 +33,8 @@ OF_OBJECT = {
 }  # fmt: skip
 """Features that a part without an object does not have."""
 SUREST = 0.95
+OUTSIZE = 2.0
+"""How many times larger or smaller than such parts are something must be for a word."""
 LISTED = 0.05
 """Archetypes at least so likely are told as what it could be besides."""
 
@@ -132,6 +134,27 @@ def recognise(
         others=tuple(others),
         because=best.evidence,
         force=forces()[best.force] if best.force else None,
+    )
+
+
+def scale_doubt(one: Archetype, context: Context, description: str = "") -> str:
+    """A sentence where names say that it is one of these, and its size that the scale is wrong.
+
+    Args:
+        one: what the joint was taken for.
+        context, description: as for `recognise`.
+    """
+    words, size = _Words.of(context, description), one.shape.get("size")
+    part = (words.part | words.said_part) & set(one.part)
+    whole = not one.object or (words.object | words.said_object) & set(one.object)
+    if not (part and whole and isinstance(size, tuple) and context.shape):
+        return ""
+    (least, most), found = size, context.shape.size
+    if least / OUTSIZE <= found <= most * OUTSIZE:
+        return ""
+    return (
+        f"Names say {one.title}, such parts are {least:g} to {most:g} m large, and this one is "
+        f"{found:.3g} m: mend the model's scale, which is metres, or expect no usual forces."
     )
 
 

@@ -157,8 +157,8 @@ def grip(
 ) -> float | None:
     """Distance (m) from a hinge's axis to the grip on what it moves; None where there is none.
 
-    A grip is a geom that is called one, or one that is small and lies wholly before the outer face
-    of the largest geom.
+    A grip is a geom that is called one, or one that is small, fast on the part and lies wholly
+    before the outer face of the largest geom: what turns by itself there is a dial or a knob.
 
     Args:
         model: compiled.
@@ -185,8 +185,9 @@ def grip(
         if _GRIP.search(" ".join(texts).lower()):
             named.append(reach)
         small = geom != main and volume < _LIGHT * boxes.max()
+        fast = model.body_weldid[model.geom_bodyid[geom]] == model.body_weldid[body]
         out = own @ outward - face
-        if small and out.min() > -1e-3 * size and out.max() >= _PROUD:
+        if small and fast and out.min() > -1e-3 * size and out.max() >= _PROUD:
             seen.append(reach)
     found = named or seen
     return max(found) if found else None
