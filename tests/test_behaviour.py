@@ -2,11 +2,13 @@
 
 from itertools import pairwise
 
+import mujoco
 import numpy as np
 import pytest
 
 from joda import context
 from joda.component import Component
+from joda.interaction.hand import pull
 from joda.interaction.behaviour import AT_END, STARTS, behaviour
 from joda.interaction.pulling import GRIP, grip
 from joda.profile import Channel, Channels, Profile, Resistance
@@ -214,3 +216,15 @@ def test_every_start_belongs_to_exactly_one_stretch(tmp_path):
         sum(a - 1e-4 <= s <= b + 1e-4 for a, b in (x.start for x in found.let_go)) for s in STARTS
     ]
     assert inside == [1] * len(STARTS)
+
+
+@pytest.mark.parametrize("way", [0.002, 0.02, 0.5])
+def test_a_hand_soon_pulls_with_all_its_strength_at_what_does_not_move(way):
+    """Also at a button, whose way is short, so that its slow target would take half a minute."""
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody><body><joint type="slide" axis="1 0 0" range="0 {way}" '
+        'frictionloss="1000"/><geom size=".05" mass=".2"/></body></worldbody></mujoco>'
+    )
+    motion = pull(model, 0, 0.0, way, 60.0, 1000.0, 3.0)
+    assert motion.force.max() == pytest.approx(60.0)
+    assert motion.time[-1] < 10.5

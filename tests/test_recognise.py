@@ -44,6 +44,23 @@ def test_names_in_many_languages_and_conventions_are_understood(name, group, con
     assert concept in concepts([name], group)
 
 
+@pytest.mark.parametrize(
+    ("name", "group", "only"),
+    [
+        ("Kuehlschrank", "object", {"refrigerator"}),
+        ("dishwasher_door", "object", {"dishwasher"}),
+        ("Ventilator", "object", {"fan"}),
+        ("Ventilator", "part", {"rotor"}),
+        ("Schublade", "part", {"drawer"}),
+        ("Drehknopf", "part", {"knob"}),
+        ("Drehknopf_door", "part", {"knob", "door"}),
+    ],
+)
+def test_a_word_within_a_longer_one_says_nothing(name, group, only):
+    """A Kuehlschrank is no Schrank, a Schublade no blade, a Ventilator no Ventil."""
+    assert concepts([name], group) == only
+
+
 @pytest.mark.parametrize("name", ["link_0", "joint_3", "solid", "slide_rail", "base", "m"])
 def test_names_that_say_nothing_are_no_lids_and_no_doors(name):
     assert not concepts([name], "part") & {"lid", "door", "tap", "key"}

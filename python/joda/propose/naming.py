@@ -40,6 +40,8 @@ def _sayings() -> dict[Group, dict[str, re.Pattern[str]]]:
 def concepts(texts: Iterable[str], group: Group) -> Concepts:
     """The concepts that names speak of, such as "door" in "Kuehlschranktuer".
 
+    Within a word the longest counts: a "Kuehlschrank" is no "Schrank", a "dishwasher" no "washer".
+
     Args:
         texts: names of joints, bodies, geoms, files.
         group: of parts or of objects.
@@ -47,11 +49,12 @@ def concepts(texts: Iterable[str], group: Group) -> Concepts:
     names = [text for text in texts if text]
     words = {word for name in names for word in _words(name)}
     letters = "".join(names)
-    return frozenset(
-        concept
-        for concept, known in _vocabulary()[group].items()
-        if any(_tells(one, words, letters) for one in known)
-    )
+    meant = {one: concept for concept, known in _vocabulary()[group].items() for one in known}
+    told = [one for one in meant if not one.isascii() and one in letters]
+    for word in words:
+        parts = [one for one in meant if _tells(one, word)]
+        told += [one for one in parts if not any(one != other and one in other for other in parts)]
+    return frozenset(meant[one] for one in told)
 
 
 def said(description: str, group: Group) -> Concepts:
@@ -68,11 +71,9 @@ def _words(name: str) -> list[str]:
     return [word.lower() for word in _BREAK.split(plain) if word]
 
 
-def _tells(known: str, words: set[str], letters: str) -> bool:
-    if not known.isascii():
-        return known in letters
+def _tells(known: str, word: str) -> bool:
     if len(known) >= _LONG:
-        return any(known in word for word in words)
+        return known in word
     if len(known) == _MIDDLING:
-        return any(word.startswith(known) or word.endswith(known) for word in words)
-    return known in words or f"{known}s" in words
+        return word.startswith(known) or word.endswith(known)
+    return word in (known, f"{known}s")
