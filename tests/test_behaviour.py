@@ -8,8 +8,8 @@ import pytest
 
 from joda import context
 from joda.component import Component
-from joda.interaction.hand import pull
 from joda.interaction.behaviour import AT_END, STARTS, behaviour
+from joda.interaction.hand import pull
 from joda.interaction.pulling import GRIP, grip
 from joda.profile import Channel, Channels, Profile, Resistance
 
@@ -223,7 +223,7 @@ def test_a_hand_soon_pulls_with_all_its_strength_at_what_does_not_move(way):
     """Also at a button, whose way is short, so that its slow target would take half a minute."""
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><worldbody><body><joint type="slide" axis="1 0 0" range="0 {way}" '
-        'frictionloss="1000"/><geom size=".05" mass=".2"/></body></worldbody></mujoco>'
+        'damping="1e7"/><geom size=".05" mass=".2"/></body></worldbody></mujoco>'
     )
     motion = pull(model, 0, 0.0, way, 60.0, 1000.0, 3.0)
     assert motion.force.max() == pytest.approx(60.0)
