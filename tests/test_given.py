@@ -151,7 +151,7 @@ def test_what_is_held_stays_while_all_else_is_fitted(rubbing):
     start = without_its_own(rubbing.profile)
     parts = moved(rubbing.profile, start, ADDED)
     trials = Trials(*parted(rubbing))
-    for one in trials.holding(restored(start, rubbing.profile, parts), parts):
+    for one in trials.holding(restored(start, rubbing.profile, parts), parts, lambda what: None):
         own, added = (part.y for part in one.profile.channels.friction.components)
         assert own == pytest.approx((FRICTION, FRICTION), rel=0.01)
     assert np.mean(added) == pytest.approx(RUBS, rel=0.1)
