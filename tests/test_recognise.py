@@ -13,7 +13,7 @@ from joda.errors import JodaError
 from joda.propose import Task
 from joda.propose.archetype import Force, forces, read_archetypes
 from joda.propose.history import History
-from joda.propose.naming import concepts, said
+from joda.propose.naming import _vocabulary, concepts, said
 from joda.propose.offline import Offline
 from joda.propose.recognise import recognise
 from joda.propose.wishes import Wanted, read_wishes, state
@@ -59,6 +59,12 @@ def test_names_in_many_languages_and_conventions_are_understood(name, group, con
 def test_a_word_within_a_longer_one_says_nothing(name, group, only):
     """A Kuehlschrank is no Schrank, a Schublade no blade, a Ventilator no Ventil."""
     assert concepts([name], group) == only
+
+
+@pytest.mark.parametrize("group", ["part", "object"])
+def test_no_word_speaks_of_two_concepts(group):
+    words = [word for known in _vocabulary()[group].values() for word in known]
+    assert len(words) == len(set(words)) > 50
 
 
 @pytest.mark.parametrize("name", ["link_0", "joint_3", "solid", "slide_rail", "base", "m"])

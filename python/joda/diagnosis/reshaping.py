@@ -30,9 +30,8 @@ Array = NDArray[np.float64]
 LONGER = (1 / 3, 1.0, 3.0)
 """Lengths of windows, in units of the diagnosis' own."""
 LAST, LONGEST = (3.0, 9.0, 27.0), 1.5
-"""Those of the last fits, of the likeliest profile, and the longest, s."""
-SCORED = 1.5
-"""Length of the windows in which profiles are compared, s: as long as those of the last fits."""
+"""Those of the last fits, of the likeliest profile; and the longest, in which profiles are compared
+too, s."""
 FINER = 2
 """How often control points are doubled."""
 FACTORS, LEAPS, CLEARLY = (0.5, 0.7, 1.4, 2.0), 3, 10.0
@@ -52,7 +51,7 @@ class Likelihood:
 
     def __init__(self, measured: Measured) -> None:
         """Cuts the runs into windows."""
-        self.single, self.windows = as_it_is(measured), windows_for(measured, SCORED, fine=False)
+        self.single, self.windows = as_it_is(measured), windows_for(measured, LONGEST, fine=False)
         self.judge = Judge(self.windows, self.windows.count >= LEAST)
         self.given = measured.profile
         self.own = replace(self.single, friction_row=measured.single.friction_row)
@@ -154,15 +153,14 @@ class Trials:
         found = [best]
         for _ in range(LEAPS):
             told("sizes that fits do not reach")
-            leapt = likeliest([self.tried(one) for one in self._resized(found[-1].profile)])
+            leapt = likeliest([found[-1], *map(self.tried, self._resized(found[-1].profile))])
             if leapt.score > found[-1].score - CLEARLY:
                 break
             found.append(leapt)
         return found
 
     def _resized(self, profile: Profile) -> Iterator[Profile]:
-        """The profile as it is, and with one size much more or less."""
-        yield profile
+        """The profile with one size much more or less."""
         kinds: tuple[Kind, ...] = ("sizes", "effects")
         parameters = Parameters(checked(profile), kinds, inertia=self.train.single.inertia)
         must = parameters.constraints

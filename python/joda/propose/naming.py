@@ -26,6 +26,12 @@ def _vocabulary() -> dict[Group, dict[str, tuple[str, ...]]]:
 
 
 @cache
+def _meanings(group: Group) -> dict[str, str]:
+    """The concept that each word speaks of; no two share one."""
+    return {word: concept for concept, words in _vocabulary()[group].items() for word in words}
+
+
+@cache
 def _sayings() -> dict[Group, dict[str, re.Pattern[str]]]:
     """What a sentence calls each concept: a pattern for all its words at once."""
     return {
@@ -49,7 +55,7 @@ def concepts(texts: Iterable[str], group: Group) -> Concepts:
     names = [text for text in texts if text]
     words = {word for name in names for word in _words(name)}
     letters = "".join(names)
-    meant = {one: concept for concept, known in _vocabulary()[group].items() for one in known}
+    meant = _meanings(group)
     told = [one for one in meant if not one.isascii() and one in letters]
     for word in words:
         parts = [one for one in meant if _tells(one, word)]
