@@ -105,10 +105,13 @@ def narrowed(
     before: Ranking,
     heed: Told = lambda done, total, what: None,
 ) -> Ranking:
-    """The best effects of a ranking again, fitted to other windows from where they were found.
+    """The best effects of a ranking again, fitted to longer windows from where they were found.
+
+    Where one that left only noise of shorter windows leaves more of these, its numbers are tried
+    elsewhere too: what goes over a barrier in one window and not in another is no way for a fit.
 
     Args:
-        begun: the model and its runs in other windows.
+        begun: the model and its runs in longer windows.
         before: the ranking.
         heed: told how many hypotheses are done, of how many, and the last one's name.
     """
@@ -118,7 +121,9 @@ def narrowed(
     def again(found: Guess) -> Guess:
         make, _ = joined(begun.base, found.hypothesis)
         start = judge.started(make(found.fit.x)).start
-        return begun.finished(Rough(found.hypothesis, (replace(found.fit, start=start),)))
+        guess = begun.finished(Rough(found.hypothesis, (replace(found.fit, start=start),)))
+        stuck = _only_noise(found, before.asked.judge) and not _only_noise(guess, judge)
+        return begun.moved(guess) if stuck else guess
 
     with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
         guesses = _Work(pool, heed, len(tried)).all(again, tried)
@@ -204,6 +209,11 @@ def _told_within(begun: Asked, guesses: Sequence[Guess]) -> bool:
     if best is None or best.fit.loss > ENOUGH * samples:
         return False
     return begun.fit.loss - best.fit.loss - best.cost > max(TELLS, TELLS_EACH * samples)
+
+
+def _only_noise(guess: Guess, judge: Judge) -> bool:
+    """Whether a guess leaves no more than noise of some windows."""
+    return guess.fit.loss < ENOUGH * judge.samples
 
 
 def _unstuck(begun: Asked, guesses: Sequence[Guess]) -> Asked:
