@@ -83,6 +83,14 @@ def test_the_end_that_is_bouncy_is_named(tmp_path, low, high, place):
     assert abs(found.effects[0].magnitude - true) < 3 * found.effects[0].magnitude_error
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "sides"), [(0.1, 0.6, {1}), (0.5, 0.1, {-1}), (0.1, 0.1, set())]
+)
+def test_an_end_whose_speeds_tell_that_it_is_no_bouncier_is_not_tried(tmp_path, low, high, sides):
+    begun = asked(slide(tmp_path, low, high, np.random.default_rng()))
+    assert set(begun.knocks) == sides
+
+
 @pytest.mark.parametrize(("high", "bouncy"), [(0.6, True), (0.13, False)])
 def test_a_stop_of_another_stiffness_is_not_taken_for_a_bouncy_one(tmp_path, high, bouncy):
     """The joint's stops are rigid; the model's yield for a third of a window."""

@@ -175,7 +175,9 @@ class Knocks:
 def knocks_at(windows: Windows, base: Base, given: Single) -> dict[int, Knocks]:
     """Of each end that has knocks, -1 low and 1 high, some of them, evenly spread.
 
-    None of ends that throw back so much in the model that hardly more can be tried.
+    None of ends that throw back so much in the model that hardly more can be tried, nor of such
+    that the speeds around knocks tell to be no bouncier: what else is wrong, or falls between two
+    samples, makes a bouncier end fit better all the same.
     """
     sides, own, shortest = knocked(windows, base), rebound(base, given), SHORTEST * base.h
     times = np.geomspace(shortest, max(2 * windows.length, 2 * shortest), TIMES)
@@ -185,8 +187,12 @@ def knocks_at(windows: Windows, base: Base, given: Single) -> dict[int, Knocks]:
         if not len(numbers):
             continue
         kept = np.isin(np.arange(len(sides)), numbers[:: len(numbers) // MOST + 1])
-        seen = speed_ratios(windows, base, [side])
-        ratios = np.append(RATIOS, mean_of(seen)[0] if len(seen) else [])
+        ratios = RATIOS
+        if len(seen := speed_ratios(windows, base, [side])):
+            mean, error = mean_of(seen)
+            if mean + error < own + CLEARLY:
+                continue
+            ratios = np.append(RATIOS, mean)
         tried = np.unique(ratios[(ratios > own + CLEARLY) & (ratios <= RATIOS[-1])])
         if len(tried) < FEWEST:
             continue
