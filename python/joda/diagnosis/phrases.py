@@ -51,7 +51,10 @@ SHOWS = {
 }
 WAYS = {"positive": "towards +q", "negative": "towards \N{MINUS SIGN}q"}
 
-assert set(NAMES) >= {*EFFECTS, *CHANNEL_EFFECTS}
+UNNAMED = {"learned_force"}
+"""What a diagnosis offers only where nothing that has a name explains the data."""
+
+assert set(NAMES) >= {*EFFECTS, *CHANNEL_EFFECTS} - UNNAMED
 
 
 SUREST = 0.99

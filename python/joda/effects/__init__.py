@@ -16,6 +16,7 @@ from joda.effects.friction import (
     PreslidingFriction,
     StribeckFriction,
 )
+from joda.effects.learned import LearnedForce
 from joda.effects.mechanics import AddedInertia, Backlash, EndStopRestitution, GravityOffset
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "Effect",
     "EndStopRestitution",
     "GravityOffset",
+    "LearnedForce",
     "LoadDependentFriction",
     "PreslidingFriction",
     "QuadraticDamping",
@@ -44,6 +46,7 @@ AnyEffect = Annotated[
     | DirectionDependentDamping
     | EndStopRestitution
     | GravityOffset
+    | LearnedForce
     | LoadDependentFriction
     | PreslidingFriction
     | QuadraticDamping
@@ -64,6 +67,7 @@ EFFECTS: dict[str, type[Effect]] = {
         GravityOffset,
         EndStopRestitution,
         Backlash,
+        LearnedForce,
     )
 }
 """By name; those that a profile lists under `effects`."""

@@ -11,6 +11,8 @@ Direction = Literal["positive", "negative"]
 
 PLACES = ("direction", "end")
 """Parameters that say where an effect acts."""
+TABLE = ("interval", "positions", "velocities")
+"""What a table's text begins with; its rows follow."""
 
 
 def parameter(
@@ -89,7 +91,10 @@ class Effect(Frozen):
         fields |= dict(word.partition("=")[::2] for word in words)
         if curve.strip():
             parts = [part.split() for part in curve.split("|")]
-            fields |= dict(zip(Curve.model_fields, parts, strict=False))
+            is_table = len(parts) > len(Curve.model_fields)
+            fields |= dict(zip(TABLE if is_table else Curve.model_fields, parts, strict=False))
+            if is_table:
+                fields["y"] = parts[len(TABLE) :]
         return fields
 
 
