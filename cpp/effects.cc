@@ -2,10 +2,12 @@
 //
 //   name key=value key=value: a b | x0 x1 ... | y0 y1 ... ; name key=value ; ...
 //
-// One effect after another, separated by ';'. Only effects with a curve have the part from ':' on.
+// One effect after another, separated by ';'. Only effects with a curve have the part from ':' on,
+// or, for a learned force, a table: a b | positions | velocities | row | row | ...
 #include "effects.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -87,6 +89,20 @@ class EffectText {
       Fail("expected its curve, \": a b | x ... | y ...\", got " + internal::Quote(curve_));
     }
     return PiecewiseCubic({ParseComponent(parts[0], parts[1], parts[2], true)}, Combine::kSum);
+  }
+
+  // The table, with a row for each position.
+  Table ReadTable(bool active) const {
+    const auto parts = internal::Split(curve_, '|');
+    if (!has_curve_ || parts.size() < 4) {
+      Fail("expected its table, \": a b | positions | velocities | row | ...\", got " +
+           internal::Quote(curve_));
+    }
+    const auto ends = ParseNumbers(parts[0]);
+    if (ends.size() != 2) Fail("expected the two numbers of the interval before the first |");
+    std::vector<std::vector<double>> rows;
+    std::transform(parts.begin() + 3, parts.end(), std::back_inserter(rows), ParseNumbers);
+    return Table({ends[0], ends[1]}, ParseNumbers(parts[1]), ParseNumbers(parts[2]), rows, active);
   }
 
   void CheckNoCurve() const {
@@ -177,6 +193,29 @@ void ReadBacklash(const EffectText& text, Effects* out) {
   (side == "load" ? out->backlash.handle : out->backlash.load) = inertia;
 }
 
+// The place among `names` of the key's word; the first one where there is none.
+int ReadChoice(const EffectText& text, const std::string& key,
+               const std::vector<std::string_view>& names) {
+  if (!text.Has(key)) return 0;
+  const auto found = std::find(names.begin(), names.end(), text.Value(key));
+  if (found != names.end()) return static_cast<int>(found - names.begin());
+  std::string known;
+  for (const auto& name : names)
+    known += std::string(known.empty() ? "" : " or ") + std::string(name);
+  Fail(key + " must be " + known + ", got " + internal::Quote(text.Value(key)));
+}
+
+void ReadLearned(const EffectText& text, Effects* out) {
+  Learned& learned = out->learned;
+  constexpr Memory kMemories[] = {Memory::kNone, Memory::kPosition, Memory::kSpeed};
+  learned.memory = kMemories[ReadChoice(text, "memory", {"none", "position", "speed"})];
+  if (text.Has("time")) learned.time = text.Positive("time");
+  learned.gain = text.Number("gain", 0);
+  if (!learned.Remembers() && learned.gain != 0) Fail("gain is a memory's; give memory");
+  if (learned.memory == Memory::kPosition && learned.gain < 0) Fail("gain must not be negative");
+  learned.table = text.ReadTable(ReadChoice(text, "power", {"passive", "active"}) == 1);
+}
+
 struct Kind {
   const char* name;
   const char* keys;
@@ -203,6 +242,7 @@ constexpr Kind kKinds[] = {
      [](const EffectText& text, Effects* out) { out->added_inertia = text.Positive("inertia"); }},
     {"end_stop_restitution", "restitution end", false, false,
      [](const EffectText& text, Effects* out) { ReadRestitution(text, &out->stops); }},
+    {"learned_force", "memory time gain power", true, false, ReadLearned},
 };
 
 const Kind& FindKind(std::string_view name) {

@@ -12,6 +12,7 @@
 
 #include "end_stop.h"
 #include "field.h"
+#include "table.h"
 
 namespace joda {
 
@@ -49,6 +50,18 @@ struct Backlash {
   double share = 0;   // of the joint's friction and damping, that acts on the load
 };
 
+enum class Memory { kNone, kPosition, kSpeed };
+
+// What no formula says: a table, and one number that follows the joint's motion.
+struct Learned {
+  Table table;
+  Memory memory = Memory::kNone;
+  double time = 1;  // constant of the memory (s)
+  double gain = 0;  // of position: stiffness (N m/rad); of speed: change of the table (s/rad)
+
+  bool Remembers() const { return memory != Memory::kNone; }
+};
+
 // All effects of one joint; what it lacks is zero. Immutable after parsing.
 struct Effects {
   Directed damping;            // added to the damping while moving that way (N m s/rad)
@@ -60,6 +73,7 @@ struct Effects {
   GravityOffset gravity;       // a passive force
   Backlash backlash;           // before or behind the part
   EndStops stops;              // of the range
+  Learned learned;             // a force on the part
   double added_inertia = 0;    // that the joint's armature must hold (kg m^2)
   const char* needs_row = "";  // an effect that needs the friction row, "": none of them does
 
@@ -139,6 +153,39 @@ inline double BristleLeftInRow(double left, double h, double stiffness, double i
 inline double OffsetForce(const GravityOffset& gravity, double q) {
   if (gravity.descent == 0) return gravity.force;
   return gravity.force + gravity.sin * std::sin(q) + gravity.cos * std::cos(q);
+}
+
+// A force of which part acts implicitly: push - drag v at the end of the step.
+struct Push {
+  double push = 0, drag = 0;  // N m, N m s/rad
+};
+
+// What the learned force does in a step of h that begins at velocity v with `remembered`. Its drag
+// is at least the table's chord through rest and at least its slope: with the one a step never
+// pushes the part beyond rest, with the other it comes to a steady speed without swinging about it.
+inline Push LearnedForce(const Learned& learned, double h, double s, double v, double remembered) {
+  Sample r = learned.table(s, v);
+  if (learned.memory == Memory::kSpeed) {
+    const double factor = std::max(0.0, 1 + learned.gain * remembered);
+    r = {factor * r.value, factor * r.slope};
+  }
+  const double chord = std::abs(v) < kStill ? r.slope : r.value / v;
+  const double drag = std::max({0.0, chord, r.slope});
+  Push out = {drag * v - r.value, drag};
+  if (learned.memory == Memory::kPosition) {  // Maxwell's: -gain times the stretch after the step
+    const double gone = -std::expm1(-h / learned.time);
+    out.push -= learned.gain * (1 - gone) * remembered;
+    out.drag += learned.gain * gone * learned.time;
+  }
+  return out;
+}
+
+// What is remembered after a step of h, at whose end the part moves at v: of position the stretch
+// of a spring whose other end follows (rad), of speed its mean (rad/s).
+inline double Remember(const Learned& learned, double h, double v, double remembered) {
+  const double gone = -std::expm1(-h / learned.time);
+  const double toward = learned.memory == Memory::kPosition ? learned.time * v : std::abs(v);
+  return remembered + gone * (toward - remembered);
 }
 
 // What is loose beside the part: its position minus the part's (within +-play / 2), and its

@@ -71,6 +71,8 @@ double ResistingForce(const FrictionBounds& bounds, double drag, double v, doubl
 
 bool HasHandle(const Effects* effects) { return effects && effects->backlash.handle > 0; }
 
+bool Remembers(const Effects* effects) { return effects && effects->learned.Remembers(); }
+
 bool HasLoad(const Effects* effects) { return effects && effects->backlash.load > 0; }
 
 }  // namespace
@@ -106,11 +108,12 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
   for (Joint& mine : joints_) {
     if (mine.id != joint) continue;
     CheckProfile(m, joint, profile);
-    if (CountStates(mine.profile.effects.get()) != CountStates(profile.effects.get())) {
+    const Effects *before = mine.profile.effects.get(), *after = profile.effects.get();
+    if (CountStates(before) != CountStates(after) || Remembers(before) != Remembers(after)) {
       throw std::invalid_argument(JointName(m, joint) +
                                   " would gain or lose the effect \"backlash\" or "
-                                  "\"load_dependent_friction\", whose state needs room in the "
-                                  "model; attach the profile and compile anew");
+                                  "\"load_dependent_friction\", or a memory, whose state needs "
+                                  "room in the model; attach the profile and compile anew");
     }
     mine.profile = std::move(profile);
     mine.load = {};
@@ -172,7 +175,13 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
       spring += OffsetForce(effects->gravity, q);
       SetStops(m, step, d, joint);
     }
-    double stiffness = ImplicitStiffness(p, step.spring, h, s, v, spring, inertia);
+    double yielding = h * ImplicitStiffness(p, step.spring, h, s, v, spring, inertia);
+    if (effects && step.damper) {
+      const double remembered = Remembers(effects) ? state[MemoryState(joint)] : 0;
+      const Push learned = LearnedForce(effects->learned, h, s, v, remembered);
+      spring += learned.push;
+      yielding += learned.drag;
+    }
 
     const int friction_row = FindFrictionRow(d, joint);
     const double damping = step.damper ? p.damping(s).value : 0;
@@ -195,13 +204,13 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
       const Loose behind = {state[joint.state + 1], state[joint.state + 2]};
       const double known = external + state[joint.state + 3];
       joint.load = Meet(effects->backlash, h, m->dof_M0[joint.dof], spring + known, v, own,
-                        h * stiffness, resist(v + behind.velocity), behind);
+                        yielding, resist(v + behind.velocity), behind);
       force = joint.load.force + (joint.load.scale - 1) * known;
       spring *= joint.load.scale;
-      stiffness *= joint.load.scale;
+      yielding *= joint.load.scale;
     }
     FrictionBounds bounds = joint.load.On(own).dry;
-    double drag = joint.load.On(own).drag + h * stiffness;
+    double drag = joint.load.On(own).drag + yielding;
     if (friction_row >= 0) {
       const double bristle =
           SetFrictionRow(step, d, friction_row, joint, bounds.Bound(), state[joint.state], inertia);
@@ -214,7 +223,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
       SetRow(step, d, damping_row, std::max(h * drag, kIdleRow * inertia), 0, 0);
       drag = 0;
     } else {
-      spring /= 1 + h * h * stiffness / inertia;
+      spring /= 1 + h * yielding / inertia;
     }
 
     force += ResistingForce(bounds, drag, v, h, inertia);
@@ -233,6 +242,10 @@ void JointDynamics::Advance(const mjModel* m, mjData* d, int instance) const {
     state[joint.state] = row < 0 ? 0 : d->efc_force[row];
     const Effects* effects = joint.profile.effects.get();
     if (effects && effects->load > 0) state[LastState(joint)] = UnknownLoad(m, d, joint);
+    if (computed && Remembers(effects)) {
+      mjtNum& remembered = state[MemoryState(joint)];
+      remembered = Remember(effects->learned, m->opt.timestep, d->qvel[joint.dof], remembered);
+    }
     if (!computed || !(HasHandle(effects) || HasLoad(effects))) continue;
     const Loose loose = HasHandle(effects) ? joint.handle
                                            : Settle(effects->backlash, m->opt.timestep, joint.load,

@@ -38,8 +38,8 @@ class JointDynamics {
   // backlash has three numbers more: those of the handle or the load, and the force that was
   // applied after Compute (between mj_step1 and mj_step2, or by mjcb_control). That force reached
   // the part directly: the next step gives it to the handle and takes it back from the part, or
-  // makes up for the load's inertia. Load-dependent friction has one more: what of the load the
-  // next step cannot know before its solver has run.
+  // makes up for the load's inertia. A learned force with a memory has one more. Load-dependent
+  // friction has one more: what of the load the next step cannot know before its solver has run.
   void Advance(const mjModel* m, mjData* d, int instance) const;
 
   // Replaces the profile of a joint; throws std::invalid_argument if the instance lacks the joint
@@ -74,6 +74,11 @@ class JointDynamics {
   // Where the last number of the joint's state is.
   static int LastState(const Joint& joint) {
     return joint.state + CountStates(joint.profile.effects.get()) - 1;
+  }
+
+  // Where what a learned force remembers is.
+  static int MemoryState(const Joint& joint) {
+    return LastState(joint) - (joint.profile.effects->load > 0);
   }
 
   // Of the load, what contacts and all other constraints exert, but for the joint's own friction,

@@ -50,7 +50,8 @@ Profile ParseProfile(const std::string& prefix, double lo, double hi,
 
 int CountStates(const Effects* effects) {
   if (!effects) return 1;
-  return 1 + (effects->backlash.play > 0 ? 3 : 0) + (effects->load > 0 ? 1 : 0);
+  return 1 + (effects->backlash.play > 0 ? 3 : 0) + effects->learned.Remembers() +
+         (effects->load > 0);
 }
 
 int CountStates(const char* effects) {

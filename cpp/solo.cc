@@ -35,7 +35,8 @@ Motion Solve(double mass, double drive, const Friction& friction) {
 }
 
 bool IsFinite(const Solo::State& state) {
-  return std::isfinite(state.q + state.v + state.held + state.loose.gap + state.loose.velocity);
+  return std::isfinite(state.q + state.v + state.held + state.loose.gap + state.loose.velocity +
+                       state.remembered);
 }
 
 }  // namespace
@@ -74,18 +75,23 @@ void Solo::Advance(double h, double force, double command, State* state) const {
   const Resistance own = resist(v);
   double spring = p.conservative(s).value, pushed = force;
   if (effects) spring += OffsetForce(effects->gravity, q);
-  const double stiffness = h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
+  double yielding = h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
+  if (effects) {
+    const Push learned = LearnedForce(effects->learned, h, s, v, state->remembered);
+    spring += learned.push;
+    yielding += learned.drag;
+  }
 
   Passage behind;
   const bool has_load = effects && effects->backlash.load > 0;
   if (effects && effects->backlash.handle > 0) {
     pushed = MoveHandle(effects->backlash, h, force, v, &state->loose);
   } else if (has_load) {
-    behind = Meet(effects->backlash, h, body_.inertia, spring + weight + force, v, own, stiffness,
+    behind = Meet(effects->backlash, h, body_.inertia, spring + weight + force, v, own, yielding,
                   resist(v + state->loose.velocity), state->loose);
   }
   const FrictionBounds bounds = behind.On(own).dry;
-  double drag = behind.On(own).drag + behind.scale * stiffness;
+  double drag = behind.On(own).drag + behind.scale * yielding;
 
   const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
   const FrictionRow row =
@@ -114,6 +120,9 @@ void Solo::Advance(double h, double force, double command, State* state) const {
   state->q = q + h * state->v;
   state->held = motion.held;
   state->servo = servo;
+  if (effects && effects->learned.Remembers()) {
+    state->remembered = Remember(effects->learned, h, state->v, state->remembered);
+  }
   if (has_load) state->loose = Settle(effects->backlash, h, behind, state->v);
 }
 

@@ -45,6 +45,7 @@ class Solo {
     double held = 0;   // friction force of the step before
     double servo = 0;  // the actuator's
     Loose loose;
+    double remembered = 0;  // by a learned force
   };
 
   // Where a stretch of steps begins, and whether the joint has forgotten what was before.

@@ -91,10 +91,13 @@ bool Resist(Random& random, const Effects& e) {
   const Resistance own = {damping, bounds};
   const Passage passage = Meet(behind, h, 1, load, v, own, 0, own, {held, v});
   const Loose after = Settle(behind, h, passage, -v);
+  const Push learned = LearnedForce(e.learned, h, s, v, held);
   return damping >= 0 && std::isfinite(damping) && bounds.positive >= 0 && bounds.negative >= 0 &&
          std::isfinite(bounds.Bound()) && left > 0 && left <= 2 && std::isfinite(force) &&
          std::abs(handle.gap) <= 0.5 * backlash.play && std::isfinite(OffsetForce(e.gravity, v)) &&
          passage.scale >= 1 && passage.scale <= 1 / (1 - kHeaviestLoad) + 1e-9 &&
+         learned.drag >= 0 && std::isfinite(learned.push + learned.drag) &&
+         std::isfinite(Remember(e.learned, h, v, held)) &&
          std::isfinite(passage.force + after.velocity) && std::abs(after.gap) <= 0.5 * behind.play;
 }
 

@@ -85,6 +85,35 @@ inline std::string Positive(Random& random) {
   return Below(random, 30) ? Print(std::pow(10, 4 * Uniform(random) - 2)) : Number(random);
 }
 
+// A learned force, mostly one that only resists.
+inline std::string WriteLearned(Random& random) {
+  static const char* const heads[] = {"", " power=active", " memory=position", " memory=speed"};
+  const int way = Below(random, 4), n = 1 + Below(random, 3), half = 1 + Below(random, 4);
+  std::string out = std::string("learned_force") + heads[way];
+  if (way > 1) out += " time=" + Positive(random) + " gain=" + Positive(random);
+  std::vector<double> x = Knots(random, std::max(2, n)), v = {0};
+  x.resize(n);
+  for (int k = 0; k < half; ++k) {
+    const double gap = std::pow(10, (Below(random, 9) ? -3 : -10) * Uniform(random));
+    v.insert(v.begin(), v.front() - gap);
+    v.push_back(v.back() + 3 * gap);
+  }
+  out += ": " + Print(Below(random, 2) ? 0 : 0.3 * Uniform(random)) + " 1 |";
+  for (const double one : x) out += " " + Print(one);
+  out += " |";
+  for (const double one : v) out += " " + Print(one);
+  const double scale = std::pow(10, Below(random, 3) ? 0 : Below(random, 30) - 14);
+  for (int row = 0; row < n; ++row) {
+    out += " |";
+    for (const double one : v) {
+      const double y = scale * Uniform(random) * ((one > 0) - (one < 0));
+      out += " " +
+             (Below(random, 900) ? Print(way == 1 && Below(random, 2) ? -y : y) : Number(random));
+    }
+  }
+  return out;
+}
+
 inline std::string WriteEffect(Random& random, int kind) {
   static const char* const directions[] = {"positive", "negative", "both"};
   static const char* const ends[] = {"low", "high", "both"};
@@ -112,6 +141,8 @@ inline std::string WriteEffect(Random& random, int kind) {
              (Below(random, 2) ? " side=motor share=" + part : "");
     case 8:
       return "added_inertia inertia=" + Positive(random);
+    case 9:
+      return WriteLearned(random);
     default:
       return "end_stop_restitution restitution=" + part +
              (Below(random, 3) ? std::string(" end=") + Pick(random, ends) : "");
@@ -187,10 +218,10 @@ inline std::string Mutate(Random& random, std::string text) {
 // Some effects, mostly each once.
 inline std::string WriteEffects(Random& random) {
   std::string out;
-  for (int kind = 0; kind < 10; ++kind) {
+  for (int kind = 0; kind < 11; ++kind) {
     if (Below(random, 3) == 0) out += WriteEffect(random, kind) + "; ";
   }
-  return Below(random, 20) ? out : out + WriteEffect(random, Below(random, 10));
+  return Below(random, 20) ? out : out + WriteEffect(random, Below(random, 11));
 }
 
 // The text, or what became of it.

@@ -100,7 +100,9 @@ const Scene kEverything = {Curve("stribeck_friction velocity=0.05", "0.4") +
                                Curve("asymmetric_friction direction=negative", "0.5") +
                                "presliding_friction stiffness=300 damping=2 breakaway=0.7;"
                                "load_dependent_friction coefficient=0.02;"
-                               "gravity_offset sin=0.3 cos=0.2; backlash play=0.02 inertia=0.05",
+                               "gravity_offset sin=0.3 cos=0.2; backlash play=0.02 inertia=0.05;"
+                               "learned_force memory=position time=0.3 gain=2: 0 1 | 0 0.5 | "
+                               "-1 0 1 3 | -0.2 0 0.1 0.4 | -0.1 0 0.2 0.3",
                            "1", "0.5", kHinge, "0 0 -1"};
 
 // Positions of the joint that is pushed to and fro, from step `first` to `last`.
@@ -212,6 +214,51 @@ TEST_CASE("flags switch the effects on friction and damping off") {
   CHECK(part.Push(2, 1) == doctest::Approx(2).epsilon(1e-9));
 }
 
+TEST_CASE("a learned table holds the speed at which it resists as much as is pushed") {
+  const char* const table = "learned_force: 0 1 | 0 | -2 -1 0 1 4 | -3 -1 0 2 2";
+  for (const mjtNum h : {0.0005, 0.01, 0.2}) {
+    Simulation part({table});
+    part.m->opt.timestep = h;
+    CHECK(part.Push(-1, 60) == doctest::Approx(-1).epsilon(1e-8));
+    CHECK(part.Push(0, 60) == doctest::Approx(0));
+    part.m->opt.disableflags |= mjDSBL_DAMPER;
+    CHECK(part.Push(1, 2 * kTimestep) == doctest::Approx(2 * h));
+  }
+}
+
+TEST_CASE("a memory of position lets a part creep at F / (gain time), and draws it back") {
+  Simulation part(
+      {"learned_force memory=position gain=50 time=2: 0 1 | 0 | -1 0 1 | 0 0 0", "0", "5"});
+  CHECK(part.Push(3, 60) == doctest::Approx(3 / (50 * 2 + 5.0)).epsilon(1e-8));
+  CHECK(part.d->plugin_state[1] == doctest::Approx(2 * part.d->qvel[0]).epsilon(1e-8));
+  const double at = part.q(), stretch = part.d->plugin_state[1];
+  part.Push(0, 60);  // a spring of 50 that relaxes while a damper of 5 lets it go
+  CHECK(at - part.q() == doctest::Approx(stretch * 100 / 105).epsilon(2e-3));
+}
+
+TEST_CASE("a memory of speed fades out the table as the part works") {
+  Simulation part({"learned_force memory=speed gain=-0.1 time=1: 0 1 | 0 | -8 0 8 | -16 0 16"});
+  const double v = part.Push(4, 60);  // 2 (1 - 0.1 v) v = 4
+  CHECK(v == doctest::Approx(5 - std::sqrt(5.0)).epsilon(1e-6));
+  CHECK(part.d->plugin_state[1] == doctest::Approx(v).epsilon(1e-6));
+}
+
+TEST_CASE("a part that a steep table stops comes to rest and does not shake") {
+  for (const mjtNum h : {0.0005, 0.002, 0.01, 0.02}) {
+    CAPTURE(h);
+    Simulation part({"learned_force: 0 1 | 0 | -1 -0.01 0 0.01 1 | -3 -3 0 3 3"});
+    part.m->opt.timestep = h;
+    part.d->qvel[0] = 0.2;
+    for (int k = 0; k < 1000; ++k) {
+      const double before = part.d->qvel[0];
+      const double after = part.Push(0, kTimestep);
+      REQUIRE(after <= before + 1e-12);
+      REQUIRE(after >= -1e-12);
+    }
+    CHECK(part.d->qvel[0] < 1e-9);
+  }
+}
+
 TEST_CASE("within the play the handle flies free, then both move as one") {
   for (const int integrator : {mjINT_EULER, mjINT_IMPLICITFAST}) {
     CAPTURE(integrator);
@@ -292,11 +339,16 @@ TEST_CASE("what has a state can be replaced, but neither added nor removed") {
         "joint 'part' has armature 0, less than its effect \"added_inertia\" of 1e-09; write "
         "armature=\"1e-09\" on the joint");
   const std::string sentence =
-      "joint 'part' would gain or lose the effect \"backlash\" or \"load_dependent_friction\", "
-      "whose state needs room in the model; attach the profile and compile anew";
+      "joint 'part' would gain or lose the effect \"backlash\" or \"load_dependent_friction\", or "
+      "a memory, whose state needs room in the model; attach the profile and compile anew";
   CHECK(with.Replace("") == sentence);
   CHECK(without.Replace("backlash play=0.05 inertia=0.2") == sentence);
   CHECK(without.Replace("load_dependent_friction coefficient=0.1") == sentence);
+  const std::string learned = "learned_force memory=speed: 0 1 | 0 | -1 0 1 | -1 0 1";
+  CHECK(without.Replace(learned.c_str()) == sentence);
+  CHECK(without.Replace("learned_force: 0 1 | 0 | -1 0 1 | -1 0 1") == "");
+  Simulation rubbing({"load_dependent_friction coefficient=0.1"});
+  CHECK(rubbing.Replace(learned.c_str()) == sentence);
 }
 
 TEST_CASE("effects that the joint cannot have are refused") {
