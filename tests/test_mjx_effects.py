@@ -72,7 +72,7 @@ class Scene:
         self.model = mujoco.MjModel.from_xml_path(str(path))
         # one program for all cases; MJX runs no plugins
         self.m = mjx.put_model(self.model).replace(npluginstate=0)
-        self.fields = joda.mjx.put_fields(self.model, self.profiles, effects=NAMES)
+        self.fields = joda.mjx.put_fields(self.model, self.profiles, table=(3, 6), effects=NAMES)
 
     def start(self, part=0.4):
         """Data with both joints at this part of their range."""
@@ -80,19 +80,21 @@ class Scene:
         return joda.mjx.put_state(self.m, d, self.fields)
 
     def plugin(self, forces):
-        """Positions, shape (steps, 2), and states, shape (steps, 2, 3), by the plugin."""
+        """Positions, shape (steps, 2), and states, shape (steps, 2, 4), by the plugin."""
         d, positions, states = mujoco.MjData(self.model), [], []
         d.qpos[:] = LOW + 0.4 * SPANS
         bodies = [self.model.joint(name).bodyid[0] for name in JOINTS]
         instances = self.model.body_plugin[bodies]
-        size = 3 if self.model.plugin_statenum[instances[0]] > 3 else 1
+        size = 3 if self.has("backlash") else 1
+        behind = self.model.plugin_statenum[instances] - 1 - self.has("load_dependent_friction")
         for force in forces:
             d.qfrc_applied[:] = force
             mujoco.mj_step(self.model, d)
             positions.append(d.qpos.copy())
             first = self.model.plugin_stateadr[instances]
             parts = [d.plugin_state[k : k + size] for k in first]
-            states.append(np.pad(parts, ((0, 0), (0, 3 - size))))
+            memories = d.plugin_state[first + behind] * self.remembers()
+            states.append(np.c_[np.pad(parts, ((0, 0), (0, 3 - size))), memories])
         return np.array(positions), np.array(states)
 
     def mjx(self, forces):
@@ -102,10 +104,18 @@ class Scene:
     def told(self, q, held, handles):
         """The same of what MJX's data hold; handles without backlash have no state."""
         rows = [field.place.friction_row for field in self.fields.values()]
-        states = np.concatenate([held[:, rows, None], handles.reshape(-1, 2, 2)], axis=2)
-        if not any(e.effect == "backlash" for e in self.profiles["arm"].effects):
-            states[:, :, 1:] = 0
-        return np.array(q), states
+        loose, memories = handles[:, :4].reshape(-1, 2, 2), handles[:, 4:, None]
+        loose = loose * self.has("backlash")
+        memories = memories * self.remembers()
+        return np.array(q), np.concatenate([held[:, rows, None], loose, memories], axis=2)
+
+    def has(self, name):
+        """Whether the joints have the effect."""
+        return any(e.effect == name for e in self.profiles["arm"].effects)
+
+    def remembers(self):
+        """Whether the joints have a learned force with a memory."""
+        return any(getattr(e, "memory", "none") != "none" for e in self.profiles["arm"].effects)
 
 
 READ = partial(joda.mjx.rollout, read=lambda d: (d.qpos, d._impl.efc_force, d.userdata))
@@ -124,7 +134,7 @@ def folder(tmp_path_factory):
 def check_states(actual, expected):
     """Friction as part of a strong force, handles as part of the range and per step."""
     force = np.array(list(FORCES.values()))
-    scales = np.stack([1e3 * force, SPANS, SPANS / H], axis=1)
+    scales = np.stack([1e3 * force, SPANS, SPANS / H, SPANS], axis=1)
     assert np.abs((actual - expected) / scales).max() < 1e-6
 
 
@@ -270,7 +280,7 @@ def test_the_example_of_the_docs(folder):
     names |= {"m": scene.m, "fields": {"knob": scene.fields["arm"]}, "torque": None}
     names["rollout"] = lambda m, d, fields, torque: (d, (fields, m))
     exec(code, names)
-    assert names["d"].userdata.shape == (2,)
+    assert names["d"].userdata.shape == (3,)
     velocity = names["angle"]["knob"].effects.stribeck_friction.velocity
     np.testing.assert_array_equal(velocity, [0.05, 0.1, 0.2])
 
@@ -282,6 +292,8 @@ STOPS = ("end_stop_restitution.low[]", "end_stop_restitution.high[]")
 """Numbers of joints that do not come to their ends."""
 HANDLE, LOAD = ("backlash.handle[]",), ("backlash.load[]", "backlash.share[]")
 """Numbers of a handle and of a load behind a play, which do not go together."""
+FIXED = ("learned_force.follows[]", "table.interval[1]")
+"""The kind of memory, and an end of the interval that is the range's."""
 T = H * np.arange(250)
 SWING = np.stack([3.6 * np.sin(2 * np.pi * T) + 0.18, 4.5 * np.sin(2 * np.pi * T / 0.6)], 1)
 PUSH = np.repeat(np.array([-4.0, 4.0, 4.0, -4.0]), 60)[:, None] * list(FORCES.values())
@@ -292,7 +304,7 @@ STEADY = np.full((60, 2), 0.6) * list(FORCES.values())
 @pytest.mark.parametrize(
     ("case", "number", "forces", "place", "skip"),
     [
-        ("all", 0, SWING, 0.02, (*STOPS, *LOAD)),
+        ("all", 0, SWING, 0.02, (*STOPS, *LOAD, *FIXED)),
         ("backlash behind", 1, STEADY, 0.1, (*HANDLE, "backlash.play[]")),
         ("end_stop_restitution each", 0, PUSH, 0.3, ()),
         ("end_stop_restitution each", 1, PUSH, 0.3, ()),
@@ -333,7 +345,7 @@ def test_the_state_is_behind_the_users_own_data(folder):
     m = scene.m.replace(nuserdata=3)
     d = mjx.make_data(scene.m).replace(userdata=jnp.arange(3.0))
     d = joda.mjx.put_state(m, d, scene.fields)
-    np.testing.assert_array_equal(d.userdata, [0, 1, 2, 0, 0, 0, 0])
+    np.testing.assert_array_equal(d.userdata, [0, 1, 2, *[0] * 6])
     none = joda.mjx.put_fields(scene.model, {})
     assert joda.mjx.put_state(m, d, none).userdata.shape == (3,)
 

@@ -13,6 +13,7 @@ from joda.effects import (
     DirectionDependentDamping,
     EndStopRestitution,
     GravityOffset,
+    LearnedForce,
     LoadDependentFriction,
     PreslidingFriction,
     QuadraticDamping,
@@ -66,6 +67,9 @@ def cases(kind, force, inertia, play):
         "gravity_offset": (GravityOffset(**{k: x * force for k, x in offset.items()}),),
         "backlash": (Backlash(play=play, inertia=0.2 * inertia),),
         "backlash behind": (Backlash(play=play, inertia=0.6 * inertia, side="motor", share=0.7),),
+        "learned_force": (_learned(0.2 * force, memory="position", time=0.2, gain=0.3 * force),),
+        "learned_force speed": (_learned(force, memory="speed", time=0.5, gain=-0.3),),
+        "learned_force active": (_learned(-0.2 * force, power="active"),),
         "added_inertia": (AddedInertia(inertia=0.4 * inertia),),
         "end_stop_restitution": (EndStopRestitution(restitution=0.4),),
         "end_stop_restitution low": (EndStopRestitution(restitution=0.7, end="low"),),
@@ -75,9 +79,18 @@ def cases(kind, force, inertia, play):
         ),
     }
     left_out = ("quadratic_damping down", "dahl", "prandtl", "backlash behind")
+    left_out += ("learned_force speed", "learned_force active")
     left_out += ("end_stop_restitution low", "end_stop_restitution each")
     every = tuple(e for name, own in out.items() if name not in left_out for e in own)
     return {**out, "all": every}
+
+
+def _learned(force, **how):
+    """A table with uneven places, of which each row and each direction is another."""
+    rows = ((-0.3, -0.25, 0, 0.1, 0.2, 0.5), (-0.4, -0.1, 0, 0.3, 0.3, 0.3))
+    y = tuple(tuple(force * value for value in row) for row in (*rows, rows[0]))
+    places = {"interval": (0.15, 1.0), "positions": (0.2, 0.5, 0.7)}
+    return LearnedForce(velocities=(-1.0, -0.3, 0.0, 0.1, 0.5, 2.0), y=y, **places, **how)
 
 
 def profile_of(joint, effects, force):

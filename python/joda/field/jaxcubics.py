@@ -46,9 +46,13 @@ class Cubics:
 
 def pchip(x: Array, y: Array) -> Array:
     """Coefficients of one curve's cubics about their left knots, shape (knots - 1, 4)."""
+    return pchip_of(x, y, jnp.sum(x < 1.5))
+
+
+def pchip_of(x: Array, y: Array, n: Array) -> Array:
+    """The same where the first n knots are not filling."""
     h = jnp.diff(x)
     m = jnp.diff(y) / h
-    n = jnp.sum(x < 1.5)
     inside = _inner_slopes(h, m)
     first = _end_slope(h[0], h[1], m[0], m[1])
     p, q = n - 2, jnp.maximum(n - 3, 0)

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from joda import effects
 from joda.component import Component
-from joda.field import jaxfield
+from joda.field import jaxfield, jaxtable
 from joda.profile import Channel
 
 Array = jax.Array
@@ -87,6 +87,26 @@ class Backlash:
 
 @register
 @dataclass(frozen=True)
+class Learned:
+    """A table of resistance, and a memory.
+
+    Attributes:
+        table: the table.
+        stiffness: gain of a memory of position, N·m/rad.
+        change: gain of a memory of speed, s/rad.
+        time: of the memory, s.
+        follows: 1 for a memory of position, 0 for one of speed or none.
+    """
+
+    table: jaxtable.Table | jaxtable.Patches
+    stiffness: Array
+    change: Array
+    time: Array
+    follows: Array
+
+
+@register
+@dataclass(frozen=True)
 class EndStops:
     """Damping of the end stops with a restitution of their own, times the timestep: at least 0.
 
@@ -123,6 +143,7 @@ class Effects:
     backlash: Backlash | None = None
     added_inertia: AddedInertia | None = None
     end_stop_restitution: EndStops | None = None
+    learned_force: Learned | None = None
 
     def replace(self, **changes: Any) -> "Effects":
         """The same with other effects."""
@@ -157,6 +178,7 @@ def from_effects(
     listed: Collection[effects.Effect],
     present: Collection[str] | None = None,
     knots: int = 0,
+    table: tuple[int, int] = jaxtable.LEAST,
     dtype: Any = None,
 ) -> Effects:
     """A profile's effects as arrays.
@@ -166,6 +188,7 @@ def from_effects(
         present: names of those that are put there, also where the joint does not have them: they
             do nothing then. By default those that it has.
         knots: at least so many places for control points in each curve.
+        table: at least so many places for positions and velocities in that of a learned force.
         dtype: of the arrays; by default JAX's own.
     """
     present = {effect.effect for effect in listed} if present is None else present
@@ -185,6 +208,8 @@ def from_effects(
             return Stribeck(curve(name), **numbers(name))
         if name in NUMBERS:
             return NUMBERS[name](**numbers(name))
+        if name == "learned_force":
+            return _learned(own.get(name), table, dtype)
         if name == "end_stop_restitution":
             return EndStops(*(put(_stop(own.get(f"{name} {end}"))) for end in ENDS))
         return Directed(*(curve(f"{name} {way}", f"{name} both") for way in WAYS))
@@ -195,13 +220,24 @@ def from_effects(
 def prepare(own: Effects) -> Effects:
     """Does once what does not depend on the state."""
 
-    def is_curve(node: Any) -> bool:
-        return isinstance(node, jaxfield.Channel)
+    def is_part(node: Any) -> bool:
+        return isinstance(node, jaxfield.Channel | jaxtable.Table)
 
     def once(node: Any) -> Any:
-        return jaxfield.prepare(node) if is_curve(node) else node
+        if isinstance(node, jaxtable.Table):
+            return jaxtable.prepare(node)
+        return jaxfield.prepare(node) if is_part(node) else node
 
-    return cast(Effects, jax.tree.map(once, own, is_leaf=is_curve))
+    return cast(Effects, jax.tree.map(once, own, is_leaf=is_part))
+
+
+def _learned(effect: effects.Effect | None, size: tuple[int, int], dtype: Any) -> Learned:
+    assert effect is None or isinstance(effect, effects.LearnedForce)
+    table = jaxtable.from_effect(effect, size, dtype)
+    memory, gain, time = (effect.memory, effect.gain, effect.time) if effect else ("none", 0, 1)
+    follows = memory == "position"
+    numbers = (gain * follows, gain * (memory == "speed"), time, follows)
+    return Learned(table, *(jnp.asarray(float(number), dtype) for number in numbers))
 
 
 def _component(effect: effects.Effect) -> Component:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from joda.field import jaxfield
+from joda.field import jaxfield, jaxtable
 from joda.field.jaxeffects import (
     Backlash,
     Curve,
@@ -17,6 +17,7 @@ from joda.field.jaxeffects import (
     Effects,
     EndStops,
     GravityOffset,
+    Learned,
     Presliding,
     Stribeck,
 )
@@ -165,6 +166,47 @@ def gravity(offset: GravityOffset | None, q: Array) -> tuple[Array, Array]:
     square = offset.sin**2 + offset.cos**2
     steepest = jnp.where(square > 0, jnp.sqrt(jnp.where(square > 0, square, 1)), 0)
     return offset.sin * jnp.sin(q) + offset.cos * jnp.cos(q) + offset.force, steepest
+
+
+def learned(
+    own: Learned | None, s: Array, v: Array, remembered: Array, h: Array | float
+) -> tuple[Array, Array]:
+    """A learned force in a step: push - drag times the velocity after the step.
+
+    Args:
+        own: None: none.
+        s, v: as for `damping`.
+        remembered: see `remember`.
+        h: timestep, s.
+
+    Returns:
+        push, N·m, and drag, N·m·s/rad; why it is such: cpp/effects.h.
+    """
+    if own is None:
+        return jnp.zeros_like(v), jnp.zeros_like(v)
+    factor = jnp.maximum(0, 1 + own.change * remembered)
+    value, slope = (factor * part for part in jaxtable.resistance(own.table, s, v))
+    rests = jnp.abs(v) < STILL
+    chord = jnp.where(rests, slope, value / jnp.where(rests, 1, v))
+    drag = jnp.maximum(0, jnp.maximum(chord, slope))
+    gone = -jnp.expm1(-h / own.time)
+    push = drag * v - value - own.stiffness * (1 - gone) * remembered
+    return push, drag + own.stiffness * gone * own.time
+
+
+def remember(own: Learned | None, v: Array, remembered: Array, h: Array | float) -> Array:
+    """What a learned force remembers after a step.
+
+    Args:
+        own: None: the same as before.
+        v: velocity after the step, rad/s.
+        remembered: before the step: of position a stretch, rad; of speed its mean, rad/s.
+        h: timestep, s.
+    """
+    if own is None:
+        return remembered
+    toward = jnp.where(own.follows > 0.5, own.time * v, jnp.abs(v))
+    return remembered - jnp.expm1(-h / own.time) * (toward - remembered)
 
 
 def backlash(

@@ -13,7 +13,7 @@ theorem, whatever the solver did to get there.
 
 A joint's friction of the last step, which the plugin keeps in `plugin_state`, is read from
 `d._impl.efc_force`, and what loaded it from `d.qfrc_constraint` and `d.qfrc_actuator`. Only
-backlash needs state beyond `mjx.Data`: `put_state` makes room for it.
+backlash and a learned force need state beyond `mjx.Data`: `put_state` makes room for it.
 """
 
 from importlib import import_module

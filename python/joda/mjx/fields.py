@@ -11,9 +11,9 @@ import mujoco
 import numpy as np
 
 from joda.component import Curve
-from joda.effects import ON_FRICTION, CurveEffect
+from joda.effects import ON_FRICTION, CurveEffect, LearnedForce
 from joda.errors import JodaError
-from joda.field import jaxeffects, jaxfield
+from joda.field import jaxeffects, jaxfield, jaxtable
 from joda.field.jaxeffects import Effects, from_effects
 from joda.profile import CHANNELS, Profile
 from joda.scenes.model import find_joint
@@ -113,6 +113,7 @@ def put_fields(
     *,
     components: int = 0,
     knots: int = 0,
+    table: tuple[int, int] = jaxtable.LEAST,
     effects: Collection[str] = (),
     dtype: Any = None,
 ) -> Fields:
@@ -124,6 +125,7 @@ def put_fields(
         components: at least so many places for components in each channel, so that profiles of
             different sizes can be stacked.
         knots: at least so many places for control points in each component.
+        table: at least so many places for positions and velocities in that of a learned force.
         effects: names of effects for which there is room at least.
         dtype: of the arrays; by default JAX's own.
 
@@ -142,6 +144,11 @@ def put_fields(
     listed = [effect for profile in profiles.values() for effect in profile.effects]
     curves += [effect for effect in listed if isinstance(effect, CurveEffect)]
     knots = max([knots, *(len(curve.x) for curve in curves)])
+    tables = [effect for effect in listed if isinstance(effect, LearnedForce)]
+    size = (
+        max([table[0], *(len(one.positions) for one in tables)]),
+        max([table[1], *(len(one.velocities) for one in tables)]),
+    )
     # the added inertia is in the model
     present = {*effects, *(effect.effect for effect in listed)} - {"added_inertia"}
     fields = {}
@@ -153,7 +160,7 @@ def put_fields(
             for key in CHANNELS
         }
         limits = jnp.asarray(profile.joint.range, dtype)
-        own = from_effects(profile.effects, present, knots, dtype)
+        own = from_effects(profile.effects, present, knots, size, dtype)
         fields[name] = Field(**parts, range=limits, effects=own, place=place)
     return fields
 
@@ -247,5 +254,5 @@ def _stack(items: list[Any]) -> Any:
     except (ValueError, TypeError):
         raise JodaError(
             "the fields of the joints have different shapes; make them with one put_fields, or "
-            "give it components= and knots=."
+            "give it components=, knots= and table=."
         ) from None

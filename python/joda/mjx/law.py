@@ -8,11 +8,12 @@ import numpy as np
 from mujoco import mjx
 
 from joda.field import jaxfield
-from joda.field.jaxeffects import Backlash, EndStops
+from joda.field.jaxeffects import EndStops
 from joda.joints import laws
 from joda.joints.stiffness import IDLE_ROW, implicit_stiffness, reach, stays_beyond
 from joda.mjx.fields import Prepared
 from joda.mjx.internals import Last, Rows, Settle
+from joda.mjx.state import pack, unpack
 from joda.profile import CHANNELS
 
 Array = jax.Array
@@ -28,7 +29,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
         prepared: the fields.
 
     Returns:
-        the state, and what moves loads behind plays once the step is taken.
+        the state, and what moves loads behind plays, and memories, once the step is taken.
     """
     off, bit = m.opt.disableflags, mjx.DisableBit
     spring, damper = not off & bit.SPRING, not off & bit.DAMPER
@@ -59,6 +60,12 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     if not off & bit.FRICTIONLOSS:
         dry, _ = _each(prepared.friction, order["friction"], jaxfield.evaluate, s)
         dry = dry + m.dof_frictionloss[dof]
+    g, w, remembered = unpack(m, d, own, len(dof))
+    yielding = h * stiffness
+    if damper:
+        every = jax.vmap(laws.learned, in_axes=(0, 0, 0, 0, None))
+        push, drag = every(own.learned_force, s, v, remembered, h)
+        force, yielding = force + push, yielding + drag
     external = load = jnp.zeros_like(v)
     if own.load_dependent_friction is not None or own.backlash is not None:
         external = _external(m, d, index["joint"], dof)
@@ -74,15 +81,14 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
             whole = whole._replace(up=dry, down=dry)
         return whole
 
-    g, w = _loose(m, d, own.backlash, len(dof))
     whole, other = resistance(v), resistance(v + w)
     meet = jax.vmap(laws.meet, in_axes=(*[0] * 9, None))
     passage = meet(
-        own.backlash, g, w, v, m.dof_M0[dof], force + external, whole, h * stiffness, other, h
+        own.backlash, g, w, v, m.dof_M0[dof], force + external, whole, yielding, other, h
     )
     drag, up, down = jax.vmap(laws.Resistance.part)(whole, passage.resistance)
-    force, stiffness = passage.scale * force, passage.scale * stiffness
-    drag = drag + h * stiffness
+    force, yielding = passage.scale * force, passage.scale * yielding
+    drag = drag + yielding
 
     rows, at = Rows(d), np.flatnonzero(index["friction_row"] >= 0)
     row = index["friction_row"][at]
@@ -106,7 +112,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
         at = np.flatnonzero(index["limit_row"] >= 0)
         stops = jax.tree.map(lambda x: x[at], own.end_stop_restitution)
         _set_stops(rows, index["limit_row"][at], dof[at], stops, v[at], inertia[at], h)
-    force = jnp.where(held, force, force / (1 + h * h * stiffness / inertia))
+    force = jnp.where(held, force, force / (1 + h * yielding / inertia))
     drag = jnp.where(held, 0, drag)
 
     # what has no row becomes a force that at most stops the joint within the step
@@ -122,10 +128,9 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     after = jax.vmap(laws.settle, in_axes=(0, 0, 0, 0, 0, None))
 
     def settle(d: mjx.Data) -> mjx.Data:
-        if own.backlash is None:
-            return d
-        state = jnp.stack(after(own.backlash, passage, g, w, d.qvel[dof], h), axis=1).ravel()
-        return d.replace(userdata=d.userdata.at[m.nuserdata :].set(state))
+        loose = after(own.backlash, passage, g, w, d.qvel[dof], h)
+        recall = jax.vmap(laws.remember, in_axes=(0, 0, 0, None))
+        return pack(m, d, own, *loose, recall(own.learned_force, d.qvel[dof], remembered, h))
 
     return d, settle
 
@@ -175,14 +180,6 @@ def _carries(m: mjx.Model, body: Any) -> Any:
     for k in range(1, m.nbody):
         out[:, k] |= out[:, m.body_parentid[k]]
     return out
-
-
-def _loose(m: mjx.Model, d: mjx.Data, backlash: Backlash | None, count: int) -> tuple[Array, Array]:
-    """Places and velocities of the joints' handles or loads; 0 where there are none."""
-    if backlash is None:
-        return jnp.zeros(count), jnp.zeros(count)
-    g, w = d.userdata[m.nuserdata :].reshape(-1, 2).T
-    return g, w
 
 
 def _each(

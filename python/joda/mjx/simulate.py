@@ -26,7 +26,8 @@ def step(m: mjx.Model, d: mjx.Data, fields: Fields | Prepared) -> mjx.Data:
         the state after the step, as of `mjx.step`.
 
     Raises:
-        JodaError: the integrator is RK4, or a joint has backlash and `put_state` was not called.
+        JodaError: the integrator is RK4, or a joint has backlash or a learned force and `put_state`
+            was not called.
     """
     if m.opt.integrator not in (mjx.IntegratorType.EULER, mjx.IntegratorType.IMPLICITFAST):
         raise JodaError(
