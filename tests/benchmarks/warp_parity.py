@@ -121,6 +121,7 @@ def random_profile(name: str, rng: np.random.Generator, jumps=False) -> Profile:
         {"effect": "gravity_offset", **gravity},
         {"effect": "added_inertia", "inertia": 0.001},
         {"effect": "end_stop_restitution", "restitution": 0.4, "end": rng.choice(["low", "high"])},
+        learned(friction, rng),
         {"effect": "backlash", **play, "side": "load"},
         {"effect": "backlash", **play, "side": "motor", "share": 0.5},
     ]  # fmt: skip
@@ -136,6 +137,26 @@ def random_profile(name: str, rng: np.random.Generator, jumps=False) -> Profile:
     )
 
 
+def learned(size: float, rng: np.random.Generator) -> dict:
+    """A learned force of one to four positions, up to a size, with a memory or none."""
+    memory = rng.choice(["none", "position", "speed"])
+    gains = {"none": 0.0, "position": 2 * size, "speed": rng.uniform(-0.5, 1)}
+    n, sides = int(rng.integers(1, 5)), rng.integers(1, 4, 2)
+    velocities = [
+        *np.sort(-rng.uniform(0.02, 2, sides[0])), 0.0, *np.sort(rng.uniform(0.02, 2, sides[1]))
+    ]  # fmt: skip
+    return {
+        "effect": "learned_force",
+        "memory": memory,
+        "time": rng.uniform(0.05, 2),
+        "gain": gains[memory],
+        "interval": (rng.choice([0.0, 0.2]), 1.0),
+        "positions": tuple(np.sort(rng.uniform(0, 1, n))),
+        "velocities": tuple(velocities),
+        "y": [tuple(size * rng.uniform(0, 1) * np.sign(v) for v in velocities) for _ in range(n)],
+    }
+
+
 def draw(count: int, seed: int, jumps=False) -> list[dict[str, Profile]]:
     """Random profiles of both joints, so many times."""
     rng = np.random.default_rng(seed)
@@ -146,7 +167,7 @@ def draw(count: int, seed: int, jumps=False) -> list[dict[str, Profile]]:
 NAMES = {
     *("direction_dependent_damping", "quadratic_damping", "asymmetric_friction"),
     *("stribeck_friction", "load_dependent_friction", "presliding_friction", "gravity_offset"),
-    *("added_inertia", "end_stop_restitution", "backlash"),
+    *("added_inertia", "end_stop_restitution", "backlash", "learned_force"),
 }
 
 

@@ -12,6 +12,7 @@ from joda.effects import (
     AnyEffect,
     DirectionDependentDamping,
     GravityOffset,
+    LearnedForce,
     LoadDependentFriction,
     QuadraticDamping,
 )
@@ -185,6 +186,8 @@ class Needs:
             if isinstance(one, CurveEffect):
                 power = {DirectionDependentDamping: 1, QuadraticDamping: 2}.get(type(one), 0)
                 total += max(one.y) * self.speed**power
+            elif isinstance(one, LearnedForce):
+                total += max(abs(y) for row in one.y for y in row)
             elif isinstance(one, AddedInertia):
                 total += one.inertia * self.acceleration
             elif isinstance(one, GravityOffset):

@@ -14,10 +14,12 @@ from joda.effects import (
     DirectionDependentDamping,
     EndStopRestitution,
     GravityOffset,
+    LearnedForce,
     QuadraticDamping,
     StribeckFriction,
 )
 from joda.field import evaluate
+from joda.field.table import resistance
 from joda.profile import Channel, Profile
 
 Array = NDArray[np.float64]
@@ -127,6 +129,8 @@ def _is_kept(effect: object, to: Format) -> bool:
     """Whether the effect is in the constants, as far as their errors tell, or in the scene."""
     if isinstance(effect, (AsymmetricFriction, DirectionDependentDamping, QuadraticDamping)):
         return True
+    if isinstance(effect, LearnedForce):
+        return effect.memory == "none"
     if isinstance(effect, GravityOffset):
         return SPRING[to] > 0
     if isinstance(effect, AddedInertia):
@@ -162,12 +166,15 @@ def _friction(profile: Profile, s: Array) -> Array:
 def _drag(profile: Profile, s: Array, v: Array) -> Array:
     """The force that damping makes at speeds v, against the motion; shape (speeds, positions)."""
     rate = evaluate(profile.channels.damping, s)[0] + 0 * v
+    beside = np.zeros_like(rate)
     for effect in profile.effects:
         if isinstance(effect, (DirectionDependentDamping, QuadraticDamping)):
             ways = {"both": v != 0, "positive": v > 0, "negative": v < 0}
             speed = np.abs(v) if isinstance(effect, QuadraticDamping) else 1.0
             rate = rate + ways[effect.direction] * speed * _value(effect, s)
-    return rate * v
+        elif isinstance(effect, LearnedForce):
+            beside = beside + resistance(effect, s, v)[0]
+    return rate * v + beside
 
 
 def _spring(q: Array, force: Array, degree: int) -> tuple[tuple[float, float, float], float]:

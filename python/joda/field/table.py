@@ -27,23 +27,35 @@ def resistance(table: LearnedForce, s: ArrayLike, v: ArrayLike) -> tuple[Array, 
     at, x = np.asarray(table.velocities), np.asarray(table.positions)
     inside = np.clip(v, at[0], at[-1])
     k = np.clip(np.searchsorted(at, inside, side="right") - 1, 0, len(at) - 2)
-    h, t = np.diff(at)[k], inside - at[k]
-    rows = []
-    for row in np.asarray(table.y):
-        d = pchip_slopes(at, row)
-        m = np.diff(row)[k] / h
-        c2, c3 = (3 * m - 2 * d[k] - d[k + 1]) / h, (d[k] + d[k + 1] - 2 * m) / h**2
-        slope = d[k] + t * (2 * c2 + 3 * t * c3)
-        rows.append((row[k] + t * (d[k] + t * (c2 + t * c3)), np.where(inside == v, slope, 0.0)))
+    t = inside - at[k]
+    c0, c1, c2, c3 = np.moveaxis(cubics(table), 2, 0)[:, :, k]
+    slopes = np.where(inside == v, c1 + t * (2 * c2 + 3 * t * c3), 0.0)
     place = np.interp(s, x, np.arange(len(x)))
     low = np.minimum(place.astype(int), max(len(x) - 2, 0))
     part, high = place - low, np.minimum(low + 1, len(x) - 1)
     weight = fade(table.interval, s)
     value, slope = (
         weight * ((1 - part) * _pick(of, low) + part * _pick(of, high))
-        for of in map(np.stack, zip(*rows, strict=True))
+        for of in (c0 + t * (c1 + t * (c2 + t * c3)), slopes)
     )
     return value, slope
+
+
+def cubics(table: LearnedForce) -> Array:
+    """Coefficients of the rows' cubics about their left velocities, constant first.
+
+    Args:
+        table: the effect, with n positions and m velocities.
+
+    Returns:
+        shape (n, m - 1, 4).
+    """
+    at, y = np.asarray(table.velocities), np.asarray(table.y)
+    d = np.array([pchip_slopes(at, row) for row in y])
+    h = np.diff(at)
+    m = np.diff(y) / h
+    c2 = (3 * m - 2 * d[:, :-1] - d[:, 1:]) / h
+    return np.stack((y[:, :-1], d[:, :-1], c2, (d[:, :-1] + d[:, 1:] - 2 * m) / h**2), axis=2)
 
 
 def fade(interval: tuple[float, float], s: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.component import Component
-from joda.effects import Backlash, Effect
+from joda.effects import Backlash, Effect, LearnedForce
 from joda.effects.mechanics import HEAVIEST
 from joda.joints.least_squares import Inequalities
 from joda.profile import CHANNELS, Profile, rounded
@@ -321,7 +321,10 @@ def _effect(
     start: list[float],
     rows: Rows,
 ) -> None:
-    """An effect's numbers that are not zero, each in units of its own size."""
+    """An effect's numbers that are not zero, each in units of its own size; a learned force keeps
+    its own, which were fitted together."""
+    if isinstance(effect, LearnedForce):
+        return
     largest = dict(LARGEST)
     if isinstance(effect, Backlash):
         largest["inertia"] = HEAVIEST[effect.side] * inertia

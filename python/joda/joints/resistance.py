@@ -7,11 +7,13 @@ from joda.component import Component, Curve
 from joda.effects import (
     AsymmetricFriction,
     DirectionDependentDamping,
+    LearnedForce,
     LoadDependentFriction,
     QuadraticDamping,
     StribeckFriction,
 )
 from joda.field import merge
+from joda.field.table import resistance
 from joda.profile import Channel, Profile
 
 Array = NDArray[np.float64]
@@ -46,24 +48,29 @@ def friction_bounds(
     return both + sides["positive"], both + sides["negative"]
 
 
-def damping(profile: Profile, s: ArrayLike, v: float) -> Array:
-    """Resistance divided by speed.
+def damping(profile: Profile, s: ArrayLike, v: ArrayLike) -> Array:
+    """Resistance divided by speed; of a learned force without its memory.
 
     Args:
         profile: of the joint.
         s: normalised positions, shape (n,).
-        v: velocity, rad/s or m/s; its sign is the direction.
+        v: velocity or velocities there, rad/s or m/s; the sign is the direction.
 
     Returns:
         shape (n,), N·m·s/rad or N·s/m.
     """
     out = merge(profile.channels.damping)(s)[0]
-    direction = "positive" if v > 0 else "negative"
+    v = np.asarray(v, float)
+    up = np.where(v > 0, 1.0, 0.0)
+    ways = {"both": np.ones_like(up), "positive": up, "negative": 1 - up}
     for effect in profile.effects:
-        if isinstance(effect, DirectionDependentDamping) and effect.direction == direction:
-            out = out + _curve(effect, s)
-        elif isinstance(effect, QuadraticDamping) and effect.direction in ("both", direction):
-            out = out + _curve(effect, s) * abs(v)
+        if isinstance(effect, DirectionDependentDamping):
+            out = out + _curve(effect, s) * ways[effect.direction]
+        elif isinstance(effect, QuadraticDamping):
+            out = out + _curve(effect, s) * np.abs(v) * ways[effect.direction]
+        elif isinstance(effect, LearnedForce):
+            force, slope = resistance(effect, s, v)
+            out = out + np.where(v == 0, slope, force / np.where(v == 0, 1, v))
     return out
 
 

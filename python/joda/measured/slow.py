@@ -75,7 +75,8 @@ def as_curve(
     velocity = smoothing.smooth(run.time, run.position, at, sigma).velocity
     s = (np.interp(at, run.time, run.position) - lo) / (hi - lo)
     towards = float(np.sign(run.position[-1] - run.position[0]))
-    dynamic = inertia * np.gradient(velocity, at), damping(profile, s, towards) * velocity
+    drag = damping(profile, s, towards * np.abs(velocity))
+    dynamic = inertia * np.gradient(velocity, at), drag * velocity
     if any(np.sqrt(np.mean(one**2)) > SLOW * force for one in dynamic):
         return None
     astray = replay(run, sigma) - run.position

@@ -64,8 +64,8 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     yielding = h * stiffness
     if damper:
         every = jax.vmap(laws.learned, in_axes=(0, 0, 0, 0, None))
-        push, drag = every(own.learned_force, s, v, remembered, h)
-        force, yielding = force + push, yielding + drag
+        learned, slows = every(own.learned_force, s, v, remembered, h)
+        force, yielding = force + learned, yielding + slows
     external = load = jnp.zeros_like(v)
     if own.load_dependent_friction is not None or own.backlash is not None:
         external = _external(m, d, index["joint"], dof)

@@ -11,10 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.effects import DirectionDependentDamping, QuadraticDamping, StribeckFriction
+from joda.effects import (
+    DirectionDependentDamping,
+    LearnedForce,
+    QuadraticDamping,
+    StribeckFriction,
+)
 from joda.field.reference import evaluate
 from joda.joints.resistance import damping, friction_bounds
 from joda.pictures.bars import component_strip
+from joda.pictures.learned import SPEEDS, table_panel
 from joda.pictures.style import (
     COLOURS,
     GRAVITY,
@@ -53,8 +59,9 @@ def draw(profile: Profile, gravity: tuple[Array, Array] | None = None) -> "Figur
             balance gravity there (N·m or N), shape (n,): minus gravity's own. None: not drawn.
 
     Returns:
-        a figure with three axes: force, components, damping. Data are in SI units; tick labels
-        carry a prefix where the numbers ask for one.
+        a figure with three axes: force, components, damping; with a learned force a fourth: its
+        resistance over velocity. Data are in SI units; tick labels carry a prefix where the numbers
+        ask for one.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -63,8 +70,10 @@ def draw(profile: Profile, gravity: tuple[Array, Array] | None = None) -> "Figur
         counts = [len(getattr(profile.channels, name).components) for name in CHANNELS]
         bars = max(1, sum(counts) + len(profile.effects))
         strip = min(bars * BAR, MAX_STRIP)
-        frame = TOP + BOTTOM + 2 * GAP
-        panels = max(HEIGHT - frame - strip, MIN_PANELS)
+        learned = next((e for e in profile.effects if isinstance(e, LearnedForce)), None)
+        beside = BOTTOM + SPEEDS if learned else 0.0
+        frame = TOP + BOTTOM + beside + 2 * GAP
+        panels = max(HEIGHT + beside - frame - strip, MIN_PANELS)
         height = frame + strip + panels
         figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
         FigureCanvasAgg(figure)  # attaches itself; the labels are measured with it
@@ -73,10 +82,10 @@ def draw(profile: Profile, gravity: tuple[Array, Array] | None = None) -> "Figur
             left, wide = LEFT / WIDTH, 1 - (LEFT + RIGHT) / WIDTH
             return figure.add_axes((left, bottom / height, wide, tall / height), sharex=share)
 
-        lower = (1 - FORCE_SHARE) * panels
-        force = axes(BOTTOM + lower + strip + 2 * GAP, panels - lower)
-        middle = axes(BOTTOM + lower + GAP, strip, force)
-        damping = axes(BOTTOM, lower, force)
+        lower, bottom = (1 - FORCE_SHARE) * panels, BOTTOM + beside
+        force = axes(bottom + lower + strip + 2 * GAP, panels - lower)
+        middle = axes(bottom + lower + GAP, strip, force)
+        damping = axes(bottom, lower, force)
         lo, hi = profile.joint.range
         margin = 0.012 * (hi - lo)
         force.set_xlim(lo - margin, hi + margin)
@@ -84,6 +93,8 @@ def draw(profile: Profile, gravity: tuple[Array, Array] | None = None) -> "Figur
         _force_panel(figure, force, profile, gravity)
         component_strip(figure, middle, profile)
         _damping_panel(damping, profile)
+        if learned:
+            table_panel(axes(BOTTOM, SPEEDS), learned, profile.joint)
         _headline(figure, profile)
     return figure
 
@@ -169,7 +180,8 @@ def _damping_panel(axes: "Axes", profile: Profile) -> None:
     q, speed = lo + s * (hi - lo), f"{profile.joint.unit}/s"
     axes.plot(q, value, color=COLOURS["damping"], linewidth=1.8, label="damping")
     drawn = [value]
-    if any(isinstance(e, DirectionDependentDamping | QuadraticDamping) for e in profile.effects):
+    varied = DirectionDependentDamping | QuadraticDamping | LearnedForce
+    if any(isinstance(effect, varied) for effect in profile.effects):
         for v, line in ((1.0, "--"), (-1.0, ":")):
             there = damping(profile, s, v)
             label = f"at {number(v)} {speed}"

@@ -12,6 +12,7 @@ from joda.effects import (
     DirectionDependentDamping,
     EndStopRestitution,
     GravityOffset,
+    LearnedForce,
     LoadDependentFriction,
     PreslidingFriction,
     QuadraticDamping,
@@ -23,6 +24,20 @@ from joda.profile import Channel, Channels, Joint, Profile, Resistance
 from joda.scenes.engine import require, set_strength
 from joda.scenes.scene import DAMPING_ROW, INERT, TRACE, strip_plugin
 
+LEARNED = LearnedForce(
+    memory="speed",
+    time=3.0,
+    gain=-0.1,
+    positions=(0.0, 0.2, 0.5, 1.0),
+    velocities=(-2.0, -1.0, -0.3, -0.1, 0.0, 0.1, 0.3, 1.0, 2.0),
+    y=(
+        (-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2),
+        (-0.3, -0.2, -0.15, -0.1, 0.0, 0.05, 0.05, 0.1, 0.2),
+        (-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2),
+        (-0.4, -0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4),
+    ),
+)
+"""A table of a usual size with a memory."""
 ALL_EFFECTS = (
     AsymmetricFriction(direction="positive", y=(0.05, 0.05)),
     DirectionDependentDamping(direction="negative", y=(0.2, 0.2)),
@@ -33,6 +48,7 @@ ALL_EFFECTS = (
     GravityOffset(sin=0.1, cos=0.1),
     Backlash(play=0.01, inertia=0.001),
     EndStopRestitution(restitution=0.3, end="low"),
+    LEARNED,
 )
 """All that act in the step; the others are attributes of the scene."""
 

@@ -7,6 +7,7 @@ from joda.component import Component
 from joda.effects import (
     AsymmetricFriction,
     DirectionDependentDamping,
+    LearnedForce,
     LoadDependentFriction,
     PreslidingFriction,
     QuadraticDamping,
@@ -21,7 +22,7 @@ SPRING, FRICTION, DAMPING = "native spring", "native friction", "native damping"
 """Labels of what a joint has natively."""
 Row = tuple[tuple[float, ...], tuple[float, ...]]
 """solref and solimp of a solver's row."""
-DAMPING_EFFECTS = (DirectionDependentDamping, QuadraticDamping)
+DAMPING_EFFECTS = (DirectionDependentDamping, LearnedForce, QuadraticDamping)
 FRICTION_EFFECTS = (
     AsymmetricFriction,
     LoadDependentFriction,

@@ -14,6 +14,7 @@ from joda.profile import Profile
 from joda.scenes.model import find_joint
 from joda.scenes.scene import damping_equality
 from joda.warp.law import Profiles, forget, launch
+from joda.warp.learned import make_tables
 from joda.warp.numbers import Number, Place, Row, State
 from joda.warp.table import make_curves, numbers_of
 
@@ -120,6 +121,7 @@ def put_fields(
         place[Place.HINGE] = model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_HINGE)
     out = Profiles()
     out.curves = make_curves(variants, device)
+    out.tables = make_tables(variants, device)
     out.numbers = wp.array(np.ascontiguousarray(by_world), dtype=float, device=device)
     state = np.zeros((len(State), *shape), np.float32)
     state[State.TIME] = -1

@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 import warp as wp
 
-from joda.warp import laws
+from joda.warp import laws, learned
 from joda.warp.curves import Curves, descent, value
 from joda.warp.numbers import Curve, Number, Place, Row, State
 
@@ -30,6 +30,7 @@ class Profiles:
 
     Attributes:
         curves: of the variants; world w has variant w modulo their number.
+        tables: of their learned forces.
         numbers: shape (numbers, worlds, joints), by `Number`.
         state: shape (states, worlds, joints), by `State`.
         rows: of the last step, -1: none; shape (rows, worlds, joints), by `Row`.
@@ -38,6 +39,7 @@ class Profiles:
     """
 
     curves: Curves
+    tables: learned.Tables
     numbers: wp.array3d[float]
     state: wp.array3d[float]
     rows: wp.array3d[int]
@@ -192,6 +194,7 @@ def remember(
         state[int(State.UNKNOWN_LOAD), w, j] = 0.0
         state[int(State.GAP), w, j] = 0.0
         state[int(State.SPEED), w, j] = 0.0
+        state[int(State.REMEMBERED), w, j] = 0.0
     elif t > seen:
         psi = force_of(profiles, int(Row.FRICTION), w, j, forces)
         damping = force_of(profiles, int(Row.DAMPING), w, j, forces)
@@ -208,6 +211,13 @@ def remember(
             speed = after[1]
         state[int(State.GAP), w, j] = gap
         state[int(State.SPEED), w, j] = speed
+        state[int(State.REMEMBERED), w, j] = learned.recalled(
+            profiles.numbers[int(Number.LEARNED_FORCE_CHANGE), w, j],
+            profiles.numbers[int(Number.LEARNED_FORCE_TIME), w, j],
+            h,
+            v,
+            state[int(State.REMEMBERED), w, j],
+        )
     state[int(State.TIME), w, j] = t
 
 
@@ -300,8 +310,20 @@ def act(
         spring += n[int(Number.CONSERVATIVE_STRENGTH), w, j] * value(
             profiles.curves, joint.variant, j, int(Curve.CONSERVATIVE), joint.s
         )
-    stiffness = implicit_stiffness(profiles, joint, field, h, v, spring, inertia)
+    yielding = h * implicit_stiffness(profiles, joint, field, h, v, spring, inertia)
     if joint.damps != 0:
+        table = learned.resistance(profiles.tables, joint.variant, j, joint.s, v)
+        pushed = learned.push(
+            n[int(Number.LEARNED_FORCE_STRENGTH), w, j] * table,
+            n[int(Number.LEARNED_FORCE_STIFFNESS), w, j],
+            n[int(Number.LEARNED_FORCE_CHANGE), w, j],
+            n[int(Number.LEARNED_FORCE_TIME), w, j],
+            h,
+            v,
+            profiles.state[int(State.REMEMBERED), w, j],
+        )
+        spring += pushed[0]
+        yielding += pushed[1]
         joint.damping = n[int(Number.DAMPING_STRENGTH), w, j] * value(
             profiles.curves, joint.variant, j, int(Curve.DAMPING), joint.s
         )
@@ -345,19 +367,19 @@ def act(
             spring + external,
             v,
             own,
-            h * stiffness,
+            yielding,
             resist(profiles, joint, v + speed),
             gap,
             speed,
         )
         force = passage.force + (passage.scale - 1.0) * external
         spring *= passage.scale
-        stiffness *= passage.scale
+        yielding *= passage.scale
         profiles.state[int(State.NEXT_SIDE), w, j] = passage.side
         profiles.state[int(State.NEXT_GAP), w, j] = passage.gap
         profiles.state[int(State.NEXT_SPEED), w, j] = passage.speed
     against = passage.resistance * own
-    drag = against[0] + h * stiffness
+    drag = against[0] + yielding
     dry = wp.where(v < 0.0, against[2], against[1])
 
     beside = float(0.0)
@@ -391,15 +413,15 @@ def act(
         efc_aref[w, damping_row] = -v / h
         drag = 0.0
     else:
-        spring /= 1.0 + h * h * stiffness / inertia
+        spring /= 1.0 + h * yielding / inertia
     force += laws.resisting(dry, drag, v, h, inertia)
 
     inertia_before = n[int(Number.BACKLASH_HANDLE), w, j]
     if inertia_before > 0.0:
-        pushed = laws.handle(play, inertia_before, h, applied, v, gap, speed)
-        force += pushed[0] - applied
-        profiles.state[int(State.NEXT_GAP), w, j] = pushed[1]
-        profiles.state[int(State.NEXT_SPEED), w, j] = pushed[2]
+        moved = laws.handle(play, inertia_before, h, applied, v, gap, speed)
+        force += moved[0] - applied
+        profiles.state[int(State.NEXT_GAP), w, j] = moved[1]
+        profiles.state[int(State.NEXT_SPEED), w, j] = moved[2]
     qfrc_passive[w, dof] += spring + force
 
     damping = wp.where(side > 0.0, low, high)

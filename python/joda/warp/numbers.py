@@ -30,6 +30,12 @@ class Number(IntEnum):
     BACKLASH_SHARE = 21
     END_STOP_RESTITUTION_LOW = 22
     END_STOP_RESTITUTION_HIGH = 23
+    LEARNED_FORCE_STRENGTH = 24
+    LEARNED_FORCE_STIFFNESS = 25
+    """Gain of a memory of position; 0: there is none."""
+    LEARNED_FORCE_CHANGE = 26
+    """Gain of a memory of speed; 0: there is none."""
+    LEARNED_FORCE_TIME = 27
 
     @property
     def title(self) -> str:
@@ -76,6 +82,8 @@ class State(IntEnum):
     """In the step being computed: 1 where the low end of the range is near, -1 the high one."""
     BESIDE_ROW = 9
     """In the step being computed: friction that is not in the row's force, N·m or N."""
+    REMEMBERED = 10
+    """By a learned force: rad, m, rad/s or m/s."""
 
 
 class Row(IntEnum):

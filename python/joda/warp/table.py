@@ -14,6 +14,7 @@ from joda.effects import (
     CurveEffect,
     EndStopRestitution,
     GravityOffset,
+    LearnedForce,
     LoadDependentFriction,
     PreslidingFriction,
     StribeckFriction,
@@ -42,6 +43,7 @@ def numbers_of(profile: Profile) -> Array:
         if number.name.endswith("STRENGTH"):
             out[number] = 1
     out[[Number.STRIBECK_FRICTION_VELOCITY, Number.STRIBECK_FRICTION_EXPONENT]] = 1
+    out[Number.LEARNED_FORCE_TIME] = 1
     out[[Number.END_STOP_RESTITUTION_LOW, Number.END_STOP_RESTITUTION_HIGH]] = SCENES
     for effect in profile.effects:
         match effect:
@@ -63,6 +65,11 @@ def numbers_of(profile: Profile) -> Array:
                 out[Number.BACKLASH_HANDLE] = effect.handle
                 out[Number.BACKLASH_LOAD] = effect.load
                 out[Number.BACKLASH_SHARE] = effect.share
+            case LearnedForce():
+                out[Number.LEARNED_FORCE_TIME] = effect.time
+                position = effect.memory == "position"
+                gain = Number.LEARNED_FORCE_STIFFNESS if position else Number.LEARNED_FORCE_CHANGE
+                out[gain] = effect.gain
             case EndStopRestitution(end="low"):
                 out[Number.END_STOP_RESTITUTION_LOW] = core.stop_damping(effect.restitution)
             case EndStopRestitution(end="high"):
