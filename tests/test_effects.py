@@ -22,6 +22,7 @@ from joda.effects import (
     DirectionDependentDamping,
     EndStopRestitution,
     GravityOffset,
+    LearnedForce,
     LoadDependentFriction,
     PreslidingFriction,
     QuadraticDamping,
@@ -46,6 +47,15 @@ ALL = (
     AddedInertia(inertia=0.04),
     GravityOffset(sin=0.3, cos=-0.2),
     EndStopRestitution(restitution=0.35),
+    LearnedForce(
+        memory="position",
+        time=3.0,
+        gain=2.5,
+        interval=(0.1, 0.7),
+        positions=(0.2, 0.6),
+        velocities=(-1.0, 0.0, 0.5, 2.0),
+        y=((0.0, 0.0, 0.1, 0.3), (-0.2, 0.0, 0.0, 0.1)),
+    ),
     Backlash(play=0.02, inertia=0.003),
 )
 BEHIND = Backlash(play=0.02, inertia=0.003, side="motor", share=0.8)
@@ -74,7 +84,7 @@ def test_every_effect_of_the_formats_has_one_place():
         *("position_dependent_friction", "position_dependent_damping", "stribeck_friction"),
         *("asymmetric_friction", "direction_dependent_damping", "quadratic_damping"),
         *("presliding_friction", "load_dependent_friction", "added_inertia", "gravity_offset"),
-        *("backlash", "end_stop_restitution"),
+        *("backlash", "end_stop_restitution", "learned_force"),
     }
     assert set(EFFECTS) | set(CHANNEL_EFFECTS) == named
     assert {effect.effect for effect in ALL} == set(EFFECTS)
@@ -86,7 +96,7 @@ def test_every_effect_tells_its_law_units_and_typical_values(cls):
     for name in (*cls.parameters(), *({"y"} & set(cls.model_fields))):
         field = cls.model_fields[name]
         assert field.description, name
-        if name not in ("direction", "end", "side"):
+        if name not in ("direction", "end", "side", "memory", "power"):
             unit, typical = (field.json_schema_extra[key] for key in ("unit", "typical"))
             assert len(unit) == 2
             assert typical[0] < typical[1]

@@ -15,6 +15,7 @@ import test_load as driven
 from effect_cases import cases, profile_of, pushes
 from mujoco import mjx
 from slopes import FAST, check_slopes
+from tables import random_memory, random_table
 
 import joda
 
@@ -65,7 +66,8 @@ class Scene:
                 self.found[name] = joda.context(path, name)
             found, force = self.found[name], FORCES[name]
             lo, hi = found.joint.range
-            own = cases(kind, force, found.equivalent_inertia, 0.03 * (hi - lo))[case]
+            own = case.get(name) if isinstance(case, dict) else None
+            own = own or cases(kind, force, found.equivalent_inertia, 0.03 * (hi - lo))[case]
             self.profiles[name] = profile_of(found.joint, own, force)
             joda.attach(path, self.profiles[name], folder / f"{name}.xml", force=True)
             path = folder / f"{name}.xml"
@@ -73,6 +75,10 @@ class Scene:
         # one program for all cases; MJX runs no plugins
         self.m = mjx.put_model(self.model).replace(npluginstate=0)
         self.fields = joda.mjx.put_fields(self.model, self.profiles, table=(3, 6), effects=NAMES)
+
+    def only(self, **room):
+        """Fields that have the joints' effects and no others."""
+        return joda.mjx.put_fields(self.model, self.profiles, **room)
 
     def start(self, part=0.4):
         """Data with both joints at this part of their range."""
@@ -170,6 +176,32 @@ def check_alone(scene, forces, found):
         start = np.array([[LOW[k] + 0.4 * SPANS[k], 0.0]])
         path = solo.replay(forces[:, k], np.zeros(1, int), start, np.array([True]), H)[1]
         assert np.abs(path - found[:, k]).max() < 2e-8 * SPANS[k]
+
+
+def test_random_tables_move_as_in_the_plugin(folder):
+    """Of fresh seeds, each with another size and memory, side by side as a batch."""
+    rng, forces = np.random.default_rng(), random_forces()
+    scenes = [
+        Scene(
+            folder,
+            {
+                name: (random_table(rng, 0.3 * force, **random_memory(rng, 0.5 * force)),)
+                for name, force in FORCES.items()
+            },
+        )
+        for _ in range(6)
+    ]
+    stack = partial(jax.tree.map, lambda *leaves: jnp.stack(leaves))
+    fields = stack(*(scene.only(table=(4, 9)) for scene in scenes))
+    d = joda.mjx.put_state(scenes[0].m, mjx.make_data(scenes[0].m), scenes[0].only())
+    d = d.replace(qpos=jnp.array(LOW + 0.4 * SPANS))
+    m = scenes[0].m
+    run = jax.jit(jax.vmap(joda.mjx.rollout, in_axes=(None, None, 0, None)))
+    found = np.array(run(m, d, fields, jnp.array(forces))[1][0])
+    for path, scene in zip(found, scenes, strict=True):
+        positions, _ = scene.plugin(forces)
+        assert (np.abs(path - positions).max(0) < 1e-9 * SPANS).all(), scene.profiles
+        assert (np.ptp(positions, axis=0) > 0.2 * SPANS).all()
 
 
 @pytest.mark.long

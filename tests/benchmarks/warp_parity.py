@@ -15,6 +15,7 @@ from functools import partial
 import mujoco
 import mujoco_warp
 import numpy as np
+from tables import random_memory, random_table
 
 import joda.warp
 from joda import effects
@@ -121,7 +122,7 @@ def random_profile(name: str, rng: np.random.Generator, jumps=False) -> Profile:
         {"effect": "gravity_offset", **gravity},
         {"effect": "added_inertia", "inertia": 0.001},
         {"effect": "end_stop_restitution", "restitution": 0.4, "end": rng.choice(["low", "high"])},
-        learned(friction, rng),
+        random_table(rng, friction, **random_memory(rng, friction)).model_dump(),
         {"effect": "backlash", **play, "side": "load"},
         {"effect": "backlash", **play, "side": "motor", "share": 0.5},
     ]  # fmt: skip
@@ -135,26 +136,6 @@ def random_profile(name: str, rng: np.random.Generator, jumps=False) -> Profile:
             "effects": chosen,
         }
     )
-
-
-def learned(size: float, rng: np.random.Generator) -> dict:
-    """A learned force of one to four positions, up to a size, with a memory or none."""
-    memory = rng.choice(["none", "position", "speed"])
-    gains = {"none": 0.0, "position": 2 * size, "speed": rng.uniform(-0.5, 1)}
-    n, sides = int(rng.integers(1, 5)), rng.integers(1, 4, 2)
-    velocities = [
-        *np.sort(-rng.uniform(0.02, 2, sides[0])), 0.0, *np.sort(rng.uniform(0.02, 2, sides[1]))
-    ]  # fmt: skip
-    return {
-        "effect": "learned_force",
-        "memory": memory,
-        "time": rng.uniform(0.05, 2),
-        "gain": gains[memory],
-        "interval": (rng.choice([0.0, 0.2]), 1.0),
-        "positions": tuple(np.sort(rng.uniform(0, 1, n))),
-        "velocities": tuple(velocities),
-        "y": [tuple(size * rng.uniform(0, 1) * np.sign(v) for v in velocities) for _ in range(n)],
-    }
 
 
 def draw(count: int, seed: int, jumps=False) -> list[dict[str, Profile]]:

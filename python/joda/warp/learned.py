@@ -49,7 +49,7 @@ class Tables:
 @wp.func
 def below(knots: wp.array[float], first: int, count: int, x: float) -> int:
     """Of so many knots the last at or below x, or the first one, counted from the first."""
-    k = 0
+    k = int(0)
     while k + 1 < count and knots[first + k + 1] <= x:
         k += 1
     return k
@@ -76,7 +76,7 @@ def resistance(tables: Tables, variant: int, joint: int, position: float, v: flo
     width = ends[1] - ends[0]
     weight = fade(ends[0] == 0.0, s - ends[0], width) * fade(ends[1] == 1.0, ends[1] - s, width)
     k = below(tables.positions, place, rows, s)
-    part = 0.0
+    part = float(0.0)
     if k + 1 < rows:
         left, right = tables.positions[place + k], tables.positions[place + k + 1]
         part = wp.clamp((s - left) / (right - left), 0.0, 1.0)
