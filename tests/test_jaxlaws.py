@@ -1,11 +1,14 @@
 """The laws of effects in JAX: closed forms, and derivatives at rest."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from effect_cases import cases
 from slopes import FAST
+from tables import random_table
 
 from joda.effects import (
     AsymmetricFriction,
@@ -17,8 +20,10 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
+from joda.field.table import resistance
 
 jax.config.update("jax_enable_x64", True)
+from joda.field import jaxtable  # noqa: E402
 from joda.field.jaxeffects import NAMES, from_effects, prepare  # noqa: E402
 from joda.joints import laws  # noqa: E402
 
@@ -136,6 +141,39 @@ def test_a_joint_flies_through_its_play_and_shares_its_momentum_with_the_load():
     assert passage.side == -1
 
 
+def test_a_learned_table_is_numpys_and_filling_changes_nothing():
+    rng = np.random.default_rng()
+    for _ in range(3):
+        effect = random_table(rng, 2.0, rows=6, sides=6)
+        s, v = rng.uniform(-0.2, 1.2, 300), rng.uniform(-3, 3, 300)
+        for size in ((2, 3), (9, 15)):
+            table = jaxtable.prepare(jaxtable.from_effect(effect, size))
+            found = jax.vmap(partial(jaxtable.resistance, table))(s, v)
+            for part, expected in zip(found, resistance(effect, s, v), strict=True):
+                np.testing.assert_allclose(part, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("memory", ["position", "speed"])
+def test_a_memory_forgets_as_an_exponential(memory):
+    """After one time constant at 3 rad/s, and two of rest."""
+    time, gain = 0.5, 0.4
+    own = alone(random_table(np.random.default_rng(), 1.0, memory=memory, time=time, gain=gain))
+    held, reached = jnp.array(0.0), 3 * (1 - np.exp(-1)) * (time if memory == "position" else 1)
+    for _ in range(50):
+        held = laws.remember(own.learned_force, jnp.array(3.0), held, 0.01)
+    assert held == pytest.approx(reached)
+    push, drag = laws.learned(own.learned_force, *numbers(0.9, 0), held, 0.01)
+    lost = 1 - np.exp(-0.01 / time)
+    assert push == pytest.approx(-gain * held * (1 - lost) if memory == "position" else 0)
+    other = laws.learned(own.learned_force, *numbers(0.9, 0), 0 * held, 0.01)[1]
+    factor = 1 if memory == "position" else 1 + gain * held
+    viscous = gain * lost * time * (memory == "position")
+    assert drag - viscous == pytest.approx(factor * (other - viscous))
+    for _ in range(100):
+        held = laws.remember(own.learned_force, 0 * held, held, 0.01)
+    assert held == pytest.approx(reached * np.exp(-2))
+
+
 def test_an_effect_that_a_joint_has_not_does_nothing():
     own, none = prepare(from_effects((), NAMES)), prepare(from_effects(()))
     place = numbers(0.3, 0.2)
@@ -147,6 +185,8 @@ def test_an_effect_that_a_joint_has_not_does_nothing():
         none.presliding_friction, *row, 0.01
     )
     assert laws.backlash(own.backlash, *numbers(0, 0.1, 0.3, 7), 0.01) == (7, 0, 0.1)
+    for learned in (own.learned_force, None):
+        assert laws.learned(learned, *place, jnp.array(0.4), 0.01) == (0, 0)
     against = laws.Resistance(*numbers(1, 2, 3))
     for behind in (own.backlash, None):
         state = numbers(0.2, 0.1, 0.3)
@@ -166,7 +206,9 @@ def test_derivatives_at_rest_are_finite():
         against = laws.resistance(own, s, s, s, v, 0 * v)
         passage = laws.meet(own.backlash, *[0 * v] * 3, 1 + s, 0 * v, against, s, against, 0.01)
         moved += laws.settle(own.backlash, passage, 0 * v, 0 * v, v, 0.01)
-        parts = (laws.damping(own, s, v), up, down, *row, *moved, passage.scale, passage.force)
+        moved += (*laws.learned(own.learned_force, s, v, held, 0.01), passage.scale)
+        moved += (laws.remember(own.learned_force, v, held, 0.01),)
+        parts = (laws.damping(own, s, v), up, down, *row, *moved, passage.force)
         return sum(parts) + sum(laws.gravity(own.gravity_offset, s))
 
     run = jax.jit(jax.grad(everything, argnums=range(5)), compiler_options=FAST)

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from joda.profile import CHANNELS
-from joda.scenes.hinges import hinges, three_channels, without_plugin
+from joda.scenes.hinges import LEARNED, hinges, three_channels, without_plugin
 from joda.scenes.scene import open_scene
 
 ROUNDS = 31
@@ -61,12 +61,15 @@ def bench(
     rows = []
     progress("one hinge")
     plain, native, ours, full = (hinges(1, kind) for kind in ("plain", "native", "joda", "effects"))
+    learned = hinges(1, "joda", three_channels().with_effect(LEARNED))
     models = (plain, native, ours, full)
-    times = _measure([*((model, None) for model in models), (plain, _callback(ours))])
+    each = [*((model, None) for model in models), (plain, _callback(ours)), (learned, None)]
+    times = _measure(each)
     rows.append(_row("hinge, three channels / native elements", times[2], times[1], "<= 1.10"))
     what = "addition of a Python callback / of the plugin"
     rows.append(_row(what, times[4] - times[0], times[2] - times[0], ">= 10"))
     rows.append(_row("hinge, all effects / three channels", times[3], times[2], "<= 1.25"))
+    rows.append(_row("hinge, a learned force besides / three channels", times[5], times[2], ""))
     progress("10 and 200 hinges")
     few, many = hinges(10, "joda"), hinges(200, "joda")
     few_native, many_native = hinges(10, "native"), hinges(200, "native")
