@@ -241,8 +241,11 @@ def test_bounds_and_damping_are_the_laws():
     np.testing.assert_allclose(at_rest[1], 0.15 * 2 + 2 * partly)
     moving = friction_bounds(whole, s, -0.07)
     np.testing.assert_allclose(moving[0], partly * np.exp(-1))
-    np.testing.assert_allclose(damping(whole, s, 2.0), partly + 2 * partly)
-    np.testing.assert_allclose(damping(whole, s, -2.0), 0.5 + 2 * partly)
+    # between the rows of the learned force, beyond its velocities
+    up, down = 0.65 * 0.3 + 0.35 * 0.1, 0.35 * 0.2
+    learned = np.array([0.0, 0.5, 0.0])
+    np.testing.assert_allclose(damping(whole, s, 2.0), partly + 2 * partly + up * learned)
+    np.testing.assert_allclose(damping(whole, s, -2.0), 0.5 + 2 * partly + down * learned)
 
 
 def test_a_picture_shows_every_effect():

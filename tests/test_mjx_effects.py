@@ -347,8 +347,8 @@ def test_derivatives_by_all_numbers_are_those_of_central_differences(
 ):
     scene, name = Scene(folder, case), list(JOINTS)[number]
     scene.model.opt.tolerance = 1e-30
-    m, d = mjx.put_model(scene.model), scene.start(place)
-    fields = joda.mjx.put_fields(scene.model, scene.profiles)
+    m, fields = mjx.put_model(scene.model), scene.only()
+    d = joda.mjx.put_state(scene.m, scene.start(place), fields)
 
     def positions(effects):
         own = fields | {name: fields[name].replace(effects=effects)}

@@ -122,13 +122,15 @@ def random_profile(name: str, rng: np.random.Generator, jumps=False) -> Profile:
         {"effect": "gravity_offset", **gravity},
         {"effect": "added_inertia", "inertia": 0.001},
         {"effect": "end_stop_restitution", "restitution": 0.4, "end": rng.choice(["low", "high"])},
-        random_table(rng, friction, **random_memory(rng, friction)).model_dump(),
         {"effect": "backlash", **play, "side": "load"},
         {"effect": "backlash", **play, "side": "motor", "share": 0.5},
     ]  # fmt: skip
     chosen = [own for own in possible if rng.uniform() < 0.25]
     if sum(own["effect"] == "backlash" for own in chosen) > 1:
         chosen.pop()
+    (own,) = rng.spawn(1)
+    if own.uniform() < 0.25:
+        chosen.append(random_table(own, friction, **random_memory(own, friction)).model_dump())
     return Profile.model_validate(
         {
             "joint": {"name": name, "type": kind, "range": RANGES[name], "unit": unit},
