@@ -324,8 +324,11 @@ STOPS = ("end_stop_restitution.low[]", "end_stop_restitution.high[]")
 """Numbers of joints that do not come to their ends."""
 HANDLE, LOAD = ("backlash.handle[]",), ("backlash.load[]", "backlash.share[]")
 """Numbers of a handle and of a load behind a play, which do not go together."""
-FIXED = ("learned_force.follows[]", "table.interval[1]")
-"""The kind of memory, and an end of the interval that is the range's."""
+FIXED = (
+    *("learned_force.follows[]", "table.interval[0]", "table.interval[1]"),
+    "table.velocities[2]",
+)
+"""The kind of memory, an interval that is the range, and the velocity that must be 0."""
 T = H * np.arange(250)
 SWING = np.stack([3.6 * np.sin(2 * np.pi * T) + 0.18, 4.5 * np.sin(2 * np.pi * T / 0.6)], 1)
 PUSH = np.repeat(np.array([-4.0, 4.0, 4.0, -4.0]), 60)[:, None] * list(FORCES.values())

@@ -87,10 +87,10 @@ def cases(kind, force, inertia, play):
 
 def _learned(force, **how):
     """A table with uneven places, of which each row and each direction is another."""
-    rows = ((-0.3, -0.25, 0, 0.1, 0.2, 0.5), (-0.4, -0.1, 0, 0.3, 0.3, 0.3))
+    rows = ((-0.3, -0.25, 0, 0.1, 0.2, 0.5), (-0.4, -0.1, 0, 0.2, 0.25, 0.35))
     y = tuple(tuple(force * value for value in row) for row in (*rows, rows[0]))
-    places = {"interval": (0.15, 1.0), "positions": (0.2, 0.5, 0.7)}
-    return LearnedForce(velocities=(-1.0, -0.3, 0.0, 0.1, 0.5, 2.0), y=y, **places, **how)
+    velocities = (-3.0, -0.6, 0.0, 0.2, 1.0, 4.0)
+    return LearnedForce(positions=(0.1, 0.5, 0.8), velocities=velocities, y=y, **how)
 
 
 def profile_of(joint, effects, force):
