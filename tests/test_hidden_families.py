@@ -1,6 +1,7 @@
 """Families of joda.hidden: what each draws, and the laws that only they have, in closed form."""
 
 import hashlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -100,8 +101,30 @@ def test_a_resistance_in_a_part_of_the_range_is_called_position_dependent():
         assert (case.seal["effect"] == "constant_friction_hinge") == (b - a >= 0.8)
 
 
+def test_under_a_constant_load_friction_by_load_is_constant_friction():
+    rng = np.random.default_rng()
+    slides = (
+        draw(int(rng.integers(1 << 31)), "load_dependent_friction", False, family="switches")
+        for _ in range(60)
+    )
+    case = next(one for one in slides if one.truth.joint.kind == "slide")
+    assert case.seal["also_right"] == ["constant_friction_hinge"]
+    truth, joint = case.truth, case.truth.joint
+    (law,) = truth.hidden
+    load = np.array([joint.gravity_cos])
+    constant = truth.friction + float(law.limit(None, None, None, load, None)[0])
+    still, h = np.zeros((2001, 1)), joint.time / 1000
+    start = np.array([0.5 * (joint.lo + joint.hi)]), np.array([joint.span / joint.time])
+    paths = [
+        simulate(one, Tape(still), *start, 2000, h).position
+        for one in (truth, replace(truth, hidden=(), friction=constant))
+    ]
+    assert np.ptp(paths[0]) > 0.01 * joint.span
+    np.testing.assert_allclose(*paths, atol=1e-9 * joint.span)
+
+
 def test_the_true_joint_misses_a_quiet_run_by_the_noise():
-    case = draw(6, None, False, family="household")
+    case = draw(6, None, False, family="switches")
     assert case.achievable.together >= 0.9 * case.noise
     assert len(case.achievable.runs) == len(case.held_out)
     assert case.achievable is case.achievable

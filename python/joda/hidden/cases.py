@@ -44,6 +44,8 @@ PARTIAL = {
 """What it is called below."""
 CONSTANT = ("constant_negative_conservative_hinge", "constant_positive_conservative_hinge")
 """Forces towards the low and the high end."""
+LOADED = ("constant_friction_hinge", "load_dependent_friction")
+"""Frictions that are the same under a constant load."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,7 @@ def _attempt(
         train,
         held_out,
         clean,
-        _seal(of, bare.joint, names, hidden, visible),
+        _seal(of, bare.joint, names, hidden, visible, forced),
         encoder.sigma,
         encoder.quantised,
         min(visible, default=np.inf),
@@ -193,7 +195,12 @@ def _laws(hidden: list[Hidden]) -> tuple[Law, ...]:
 
 
 def _seal(
-    of: Family, joint: Joint, names: list[str], hidden: list[Hidden], visible: list[float]
+    of: Family,
+    joint: Joint,
+    names: list[str],
+    hidden: list[Hidden],
+    visible: list[float],
+    forced: bool,
 ) -> dict[str, Any]:
     seals: list[dict[str, Any]] = [
         {
@@ -204,7 +211,7 @@ def _seal(
             "unit": one.unit,
             "visible": round(float(seen), 2),
             "in_catalogue": name in of.known,
-            "also_right": _alike(joint, name, one),
+            "also_right": _alike(joint, name, one, forced),
         }
         for name, one, seen in zip(names, hidden, visible, strict=True)
     ]
@@ -219,10 +226,13 @@ def _called(name: str, hidden: Hidden) -> str:
     return PARTIAL.get(name, name) if b - a < WHOLE else name
 
 
-def _alike(joint: Joint, name: str, hidden: Hidden) -> list[str]:
-    """Names of the same law: a weight more on a slide is a constant force in all of the range."""
+def _alike(joint: Joint, name: str, hidden: Hidden, forced: bool) -> list[str]:
+    """Names of the same law on a slide: a weight more is a constant force in all of the range;
+    where only the weight loads it, its friction is constant."""
     if joint.kind == "hinge" or hidden.interval != (0.0, 1.0):
         return []
     if name == "gravity_offset":
         return [CONSTANT[law.constant > 0] for law in hidden.laws if isinstance(law, Tilt)]
+    if name in LOADED and not forced:
+        return [other for other in LOADED if other != name]
     return ["gravity_offset"] if name in CONSTANT else []
