@@ -80,10 +80,10 @@ class Mended:
 
 def error(measured: Measured, profile: Profile | None = None) -> Error:
     """How far the model, or another profile, is off: of runs, in MuJoCo with the plugin."""
-    return _replayed(measured, profile)[0]
+    return replayed(measured, profile)[0]
 
 
-def _replayed(measured: Measured, profile: Profile | None = None) -> tuple[Error, Errors | None]:
+def replayed(measured: Measured, profile: Profile | None = None) -> tuple[Error, Errors | None]:
     """The same, and the replays; None where there are only curves."""
     model = measured if profile is None else measured.changed(profile)
     if not model.runs:
@@ -116,7 +116,7 @@ def mend(
         told: what is being done.
         given: the profile of the model as it was given; None: the joint's as it is.
     """
-    before, replays = _replayed(held)
+    before, replays = replayed(held)
     if reason := at_rest(train) or unseen_place(train, near):
         return Mended(train.profile, None, before, before, reason)
     told("the effect's own numbers")
@@ -136,11 +136,11 @@ def mend(
         for one in sorted(some, key=lambda one: one.score):
             reason = implausible(needs, one.profile, effect)
             reason = reason or unseen_shape((train, held), one.profile, effect, train.profile)
-            if not reason and not _clearly(one.unseen, loss):
+            if not reason and not clearly(one.unseen, loss):
                 reason = NO_LESS
             if not reason:  # replays take longest
-                after, anew = _replayed(held, one.profile)
-                if not _less(before, after):
+                after, anew = replayed(held, one.profile)
+                if not fallen(before, after):
                     reason = NO_LESS
                 elif replays and anew:
                     reason = worse(replays, anew)
@@ -175,7 +175,7 @@ def mend(
     return Mended(first.profile, effect, before, after, departs=departs)
 
 
-def _less(before: Error, after: Error) -> bool:
+def fallen(before: Error, after: Error) -> bool:
     """Whether windows are missed by less, or whole runs where windows are too short to show it."""
     windows = after.window < NEARLY * before.window
     if before.whole is None or after.whole is None:
@@ -183,14 +183,14 @@ def _less(before: Error, after: Error) -> bool:
     return windows or (after.whole < FALLEN * before.whole and after.window < before.window)
 
 
-def _clearly(loss: float, than: float) -> bool:
+def clearly(loss: float, than: float) -> bool:
     """Whether a loss is less by enough not to be by chance."""
     return loss < min(NEARLY * than, than - LIKELIER)
 
 
 def _as_good(other: Tried, first: Tried) -> bool:
     """Whether a profile is as good as the likeliest, on what was held out and on all runs."""
-    return other.score < first.score + LIKELIER and not _clearly(first.unseen, other.unseen)
+    return other.score < first.score + LIKELIER and not clearly(first.unseen, other.unseen)
 
 
 def _starts(

@@ -1,0 +1,1 @@
+"""A law that no catalogue has, learned from what a model misses, and told in words."""

@@ -1,0 +1,127 @@
+"""Which terms a learned law has: those with which runs that no fit has seen are missed by less.
+
+Simple laws first. A term more is taken only if it makes those runs clearly likelier, and the law as
+a whole only by the measure of every other effect (`joda.diagnosis.mending`).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from joda.diagnosis.better import worse
+from joda.diagnosis.coverage import at_rest
+from joda.diagnosis.judge import BLAS
+from joda.diagnosis.learning.fitting import Learned, Learner
+from joda.diagnosis.learning.law import LABEL, Terms
+from joda.diagnosis.mending import NO_LESS, NO_MORE, NOTHING_LEFT, Mended, clearly, fallen, replayed
+from joda.diagnosis.plausible import Needs, implausible
+from joda.diagnosis.reshaping import Likelihood
+from joda.diagnosis.share import divided
+from joda.measured.reading import Measured
+
+LENGTHS = (0.12, 0.05, 0.025)
+"""Over which a force over position changes, normalised."""
+TIMES = (0.03, 0.1, 0.3, 1.0)
+"""Of a memory, in lengths of the longest run."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A fitted law, and the loss of the runs held out with it."""
+
+    learned: Learned
+    unseen: float
+
+
+class Learning:
+    """Fits laws to some runs and judges them by others."""
+
+    def __init__(self, train: Measured, held: Measured, told: Callable[[str], None]) -> None:
+        """Args: the joint and runs to fit; the same with runs held out; told what is done."""
+        self.learner, self.unseen, self.told = Learner(train), Likelihood(held), told
+        self.own = self.unseen.loss(train.profile)
+
+    def tried(self, terms: Terms) -> Tried:
+        """A law with these terms, fitted."""
+        self.told(f"a law of {terms}")
+        every = [
+            Tried(one, self.unseen.loss(one.profile))
+            for one in self.learner.learned(self.learner.law(terms))
+        ]
+        return min(every, key=lambda one: one.unseen)
+
+    def chosen(self) -> Tried:
+        """The law of the fewest terms that no other is clearly better than."""
+        best = self.tried(Terms())
+        for more in (self._positions, self._speeds, self._along, self._memories):
+            found = [self.tried(terms) for terms in more(best.learned.law.terms)]
+            best = self._better(best, found)
+        return best
+
+    def _better(self, best: Tried, found: Sequence[Tried]) -> Tried:
+        for one in found:
+            if clearly(one.unseen, best.unseen):
+                best = one
+        return best
+
+    def _positions(self, terms: Terms) -> Iterator[Terms]:
+        for length in LENGTHS:
+            yield replace(terms, position=length)
+
+    def _speeds(self, terms: Terms) -> Iterator[Terms]:
+        """Resistances, which may be all that there is: then no force over position is needed."""
+        if self.learner.train.runs:
+            for length in dict.fromkeys((0.0, terms.position, LENGTHS[0])):
+                yield replace(terms, position=length, speed=True)
+
+    def _along(self, terms: Terms) -> Iterator[Terms]:
+        if terms.speed:
+            yield replace(terms, along=True)
+
+    def _memories(self, terms: Terms) -> Iterator[Terms]:
+        runs = self.learner.train.runs
+        longest = max((float(np.ptp(run.time)) for run in runs), default=0.0)
+        for time in (part * longest for part in TIMES if longest):
+            yield replace(terms, memory="position", time=time)
+            if terms.speed:
+                yield replace(terms, memory="speed", time=time)
+
+
+def learn(
+    train: Measured, held: Measured, told: Callable[[str], None] = lambda what: None
+) -> tuple[Mended, Learned | None]:
+    """Adds a law of no catalogue, if runs held out are clearly better with it.
+
+    Args:
+        train: the joint, its profile as it is, and runs to fit.
+        held: the same with runs held out.
+        told: what is being done.
+
+    Returns:
+        what came of it; and the law, None if none was added.
+    """
+    before, replays = replayed(held)
+    own = train.profile
+
+    def refused(reason: str) -> tuple[Mended, None]:
+        return Mended(own, None, before, before, reason), None
+
+    if reason := at_rest(train):
+        return refused(reason)
+    loss = Likelihood(held).loss(own)
+    anew = divided(own, LABEL)[1]  # of a law that was learned before none is left
+    with threadpool_limits(1, BLAS):
+        best = Learning(train.changed(anew), held.changed(anew), told).chosen()
+    profile = best.learned.profile
+    if best.learned.law.terms == Terms() or not clearly(best.unseen, loss):
+        return refused(NOTHING_LEFT if before.window < NO_MORE * held.floor else NO_LESS)
+    if reason := implausible(Needs(train), profile, LABEL) or "":
+        return refused(reason)
+    after, later = replayed(held, profile)
+    if not fallen(before, after):
+        return refused(NO_LESS)
+    if replays and later and (reason := worse(replays, later) or ""):
+        return refused(reason)
+    return Mended(profile, LABEL, before, after), best.learned

@@ -1,0 +1,83 @@
+"""How sure a learned law is: what it would be from other windows of the same runs.
+
+Each draw takes windows with replacement (Efron and Tibshirani, An Introduction to the Bootstrap
+(1993)), and draws what was known before the data too (randomised priors: Osband, Aslanides and
+Cassirer, NeurIPS 2018), so that where no data are the draws differ by all that a law may be. The
+model is linear about the fit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._core import Solo
+from joda.diagnosis.learning.fitting import Learned, Learner
+from joda.diagnosis.learning.law import Law
+
+Array = NDArray[np.float64]
+
+DRAWS = 32
+"""Laws of an ensemble."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """A curve of the law, and one standard deviation of it over the ensemble.
+
+    Attributes:
+        at: normalised positions, or speeds in rad/s or m/s; shape (n,).
+        force: there, N·m or N, shape (n,).
+        error: one standard deviation, shape (n,).
+    """
+
+    at: Array
+    force: Array
+    error: Array
+
+
+def drawn(learner: Learner, learned: Learned, seed: int = 0) -> Array:
+    """Numbers of the law as other windows would have told them, shape (DRAWS, k).
+
+    Args:
+        learner: of the joint.
+        learned: the fitted law.
+        seed: of the draws.
+    """
+    law, judge, fit = learned.law, learned.judge, learned.fit
+    unknowns = learner.unknowns(law)
+
+    def make(x: Array) -> Solo:
+        return learner.solo(law, x, judge.windows.h)
+
+    H, slopes = judge.linear(make, unknowns, fit.x, fit.start).normals()
+    rng = np.random.default_rng(seed)
+    counted = np.flatnonzero(judge.counts)
+    prior = unknowns.doubt**-2.0
+    out = []
+    for _ in range(DRAWS):
+        times = np.bincount(rng.choice(counted, len(counted)), minlength=len(H))
+        known = unknowns.mean + unknowns.doubt * rng.standard_normal(len(fit.x))
+        A = np.tensordot(times, H, 1) + np.diag(prior)
+        b = times @ slopes + prior * (fit.x - known)
+        out.append(fit.x - np.linalg.solve(A, b))
+    return np.array(out)[:, learner.base.count :]
+
+
+def over_position(law: Law, x: Array, draws: Array) -> Band | None:
+    """The force over position; None if it has none."""
+    if not law.terms.position:
+        return None
+    return _band(law.places, law.force_at(x), [law.force_at(one) for one in draws])
+
+
+def over_speed(law: Law, x: Array, draws: Array) -> Band | None:
+    """What resists the motion over the speed, in the mean along the way; None if nothing does."""
+    if not law.terms.speed:
+        return None
+    return _band(law.speeds, law.resistance(x), [law.resistance(one) for one in draws])
+
+
+def _band(at: Array, force: Array, others: Sequence[Array]) -> Band:
+    return Band(at, force, np.asarray(np.std(others, axis=0)))

@@ -1,0 +1,218 @@
+"""A law of no catalogue: what it is made of, its numbers, and the profile that it makes.
+
+Force over position, friction, and a resistance over position and velocity that may remember, each
+as smooth as a Gaussian process (`joda.diagnosis.learning.smooth`). Where no run has been there is
+none of it, and faster than any run it grows no more.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.component import Component
+from joda.diagnosis.judge import Unknowns
+from joda.diagnosis.learning.smooth import modes_of, nearness
+from joda.effects import LearnedForce
+from joda.joints.least_squares import Inequalities
+from joda.profile import Profile
+
+Array = NDArray[np.float64]
+Memory = Literal["none", "position", "speed"]
+
+LABEL = "learned_force"
+"""Of the components that are a learned law's part, and name of the effect that is the rest."""
+PER_LENGTH = 3.0
+"""Control points of a curve over position in the length over which it changes."""
+SPEEDS = np.linspace(0, 1, 9)[1:]
+"""Roots of the table's speeds, in units of the highest one's: close where friction begins."""
+SPEED_LENGTH, ALONG_LENGTH = 0.5, 0.15
+"""Over which root of the speed, and which part of the range, a resistance changes."""
+ROWS = 9
+"""Positions of a table that differs along the way."""
+ALIKE = 0.8
+"""Correlation of the resistances of both directions."""
+STEP = 0.02
+"""Of a number, for differences; before the data it is 0 ± 1."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What a law is made of.
+
+    Attributes:
+        position: length over which its force over position changes, normalised; 0: no such force.
+        speed: whether it resists motion: dry friction, and a resistance over the speed, either
+            direction its own.
+        along: whether what resists differs along the way.
+        memory: "position": a spring whose far end follows in `time`; "speed": the resistance over
+            the speed grows or falls with the speed's mean over that time.
+        time: s.
+    """
+
+    position: float = 0.0
+    speed: bool = False
+    along: bool = False
+    memory: Memory = "none"
+    time: float = 1.0
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law with unknown numbers, which are 0 ± 1 before the data.
+
+    Attributes:
+        terms: what it is made of.
+        interval: where runs have been, normalised.
+        span: of the joint's range, rad or m.
+        fastest: highest speed of the runs, rad/s or m/s.
+        force: usual force, N·m or N.
+    """
+
+    terms: Terms
+    interval: tuple[float, float]
+    span: float
+    fastest: float
+    force: float
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """The numbers: of the force over position, the friction, the table and the memory."""
+        n, bound = sum(self._counts), np.full(sum(self._counts), np.inf)
+        low = -bound
+        if self.terms.memory == "position":
+            low[-1] = 0.0
+        starts = np.cumsum((0, *self._counts))
+        rows = []
+        for modes, first in ((self._friction, starts[1]), (self._resists, starts[2])):
+            G = np.zeros((len(modes), n))
+            G[:, first : first + modes.shape[1]] = modes / self.force
+            rows.append(G)
+        G = np.concatenate(rows)
+        must = Inequalities(G, np.zeros(len(G))) if len(G) else None
+        return Unknowns(low, bound, np.full(n, STEP), np.zeros(n), np.ones(n), must)
+
+    def written(self, profile: Profile, x: Array) -> Profile:
+        """A profile with the law beside what it has."""
+        position, friction, table, memory = self._split(x)
+        made = profile
+        if len(position):
+            made = _with(made, "conservative", self._curve(self.force_at(x)))
+        if len(friction):
+            rubs = np.maximum(self._friction @ friction, 0.0)
+            made = _with(made, "friction", self._curve(rubs))
+        if len(table) or len(memory):
+            effect = self._effect(self._table @ table, self.gain(x))
+            made = made.model_copy(update={"effects": (*made.effects, effect)})
+        return made
+
+    @cached_property
+    def places(self) -> Array:
+        """Control points of the force over position, normalised."""
+        a, b = self.interval
+        count = max(round(PER_LENGTH * (b - a) / self.terms.position), 4)
+        return np.linspace(a, b, count + 1)
+
+    @cached_property
+    def speeds(self) -> Array:
+        """Velocities of the table, rad/s or m/s, without rest."""
+        v = self.fastest * SPEEDS**2
+        return np.concatenate([-v[::-1], v])
+
+    def force_at(self, x: Array) -> Array:
+        """The force over position with some numbers, at `places`, N·m or N."""
+        return np.asarray(self._position @ self._split(x)[0])
+
+    def resistance(self, x: Array) -> Array:
+        """The force that resists at `speeds`, in the mean along the way, without a memory; N·m or
+        N, signed as the velocity."""
+        _, friction, table, _ = self._split(x)
+        size = np.maximum(self._table @ table, 0.0).reshape(len(self._rows), -1).mean(axis=0)
+        rubs = np.maximum(self._friction @ friction, 0.0).mean()
+        return np.asarray(np.sign(self.speeds) * (size + rubs))
+
+    def gain(self, x: Array) -> float:
+        """Of the memory, in its effect's unit."""
+        unit = {"none": 0.0, "position": self.force / self.span, "speed": 1 / self.fastest}
+        return float(self._split(x)[3].sum()) * unit[self.terms.memory]
+
+    def _split(self, x: Array) -> list[Array]:
+        return np.split(x, np.cumsum(self._counts)[:-1])
+
+    @property
+    def _counts(self) -> tuple[int, ...]:
+        """Of the numbers of each part."""
+        own = self._position, self._friction, self._table
+        return (*(part.shape[1] for part in own), int(self.terms.memory != "none"))
+
+    @cached_property
+    def _position(self) -> Array:
+        """Modes of the force over position at its control points, N·m or N."""
+        if not (length := self.terms.position):
+            return np.zeros((0, 0))
+        return self.force * modes_of(nearness(self.places, length))
+
+    @cached_property
+    def _friction(self) -> Array:
+        """Modes of the friction at its control points, N·m or N."""
+        if not self.terms.speed:
+            return np.zeros((0, 0))
+        if not self.terms.along:
+            return self.force * np.ones((2, 1))
+        return self.force * modes_of(1 + nearness(self._rows, ALONG_LENGTH))
+
+    @cached_property
+    def _rows(self) -> Array:
+        """Positions of the table, normalised."""
+        a, b = self.interval
+        return np.linspace(a, b, ROWS) if self.terms.along else np.array([a])
+
+    @cached_property
+    def _table(self) -> Array:
+        """Modes of the resistance at the table's points, N·m or N, positive where it resists;
+        position by position, in each the negative velocities first."""
+        if not self.terms.speed:
+            return np.zeros((2 * len(SPEEDS) * len(self._rows), 0))
+        u = np.concatenate([-SPEEDS[::-1], SPEEDS])
+        either = np.where(u[:, None] * u > 0, 1.0, ALIKE)
+        size = np.abs(u)
+        speed = either * size[:, None] * size * nearness(size, SPEED_LENGTH)
+        along = 1 + nearness(self._rows, ALONG_LENGTH) if self.terms.along else np.ones((1, 1))
+        return self.force * modes_of(np.kron(along, speed))
+
+    @property
+    def _resists(self) -> Array:
+        """The same where it must not drive; nothing where there is no such resistance."""
+        return self._table if self._table.shape[1] else np.zeros((0, 0))
+
+    def _curve(self, y: Array) -> Component:
+        x = np.linspace(0, 1, len(y))
+        return Component.model_construct(
+            label=LABEL, interval=self.interval, x=tuple(map(float, x)), y=tuple(map(float, y))
+        )
+
+    def _effect(self, table: Array, gain: float) -> LearnedForce:
+        """The table with its memory."""
+        size = np.maximum(table.reshape(len(self._rows), -1), 0.0)
+        signed = np.sign(self.speeds) * size
+        half = len(SPEEDS)
+        y = np.insert(signed, half, 0.0, axis=1)
+        return LearnedForce.model_construct(
+            memory=self.terms.memory,
+            time=self.terms.time,
+            gain=gain,
+            interval=self.interval,
+            positions=tuple(map(float, self._rows)),
+            velocities=tuple(map(float, np.insert(self.speeds, half, 0.0))),
+            y=tuple(tuple(map(float, row + 0.0)) for row in y),
+        )
+
+
+def _with(profile: Profile, channel: str, component: Component) -> Profile:
+    """The profile with one more component, unchecked."""
+    old = getattr(profile.channels, channel)
+    new = old.model_copy(update={"components": (*old.components, component)})
+    channels = profile.channels.model_copy(update={channel: new})
+    return profile.model_copy(update={"channels": channels})
