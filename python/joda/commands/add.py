@@ -8,6 +8,11 @@ from typing import Any
 
 from joda.commands.diagnose import check_effect
 from joda.diagnosis.findings import read_diagnosis
+from joda.diagnosis.learning.account import Account, account, learned_picture
+from joda.diagnosis.learning.account import sentences as law_sentences
+from joda.diagnosis.learning.choosing import learn
+from joda.diagnosis.learning.fitting import Learned
+from joda.diagnosis.learning.law import LABEL
 from joda.diagnosis.mending import Error, Mended, error, mend
 from joda.diagnosis.outcome import (
     beside,
@@ -47,6 +52,7 @@ class Added:
             sentences.
         changes: a line per changed component.
         notes: what the user should be told, a sentence each.
+        learned: the law, where one was learned.
     """
 
     scene: Path | None
@@ -64,6 +70,7 @@ class Added:
     departures: tuple[str, ...]
     changes: tuple[str, ...]
     notes: tuple[str, ...]
+    learned: Account | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The same for JSON, which has no paths."""
@@ -89,7 +96,7 @@ def add(
     Of four or more runs every fourth is held out of the fit, of fewer every fourth block in which
     the joint moves; of fewer quasi-static curves, where there are no runs, every fourth stretch.
     The effect is added only if it is plausible and clearly lowers the error there; else nothing is
-    written.
+    written. With the effect learned_force a law that no catalogue has is learned from the runs.
 
     Args:
         model: MJCF or URDF, with or without a profile on the joint.
@@ -118,20 +125,29 @@ def add(
     if told.get("joint", own.name) != own.name:
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
     train, held = parted(measured)
+    law: Learned | None = None
     if reason := _no_help(told, name) or (None if effect else _in_doubt(told)):
         before = error(held)
         mended = Mended(train.profile, None, before, before, reason)
+    elif name == LABEL:
+        mended, law = learn(train, held, progress)
     else:
         mended = mend(train, held, name, direction, near, progress)
+    told_law = account(train, law) if law else None
     notes: list[str] = []
     if mended.effect:
-        there = places(mended.profile, name, measured.profile)[0]
-        if away := extrapolated(unvisited_part(measured, there)).strip():
-            notes.append(away)
+        if not told_law:  # of a learned law nothing is where no run was
+            there = places(mended.profile, name, measured.profile)[0]
+            notes += filter(None, [extrapolated(unvisited_part(measured, there)).strip()])
         progress("drawing")
         files, more = scene_files(Path(model), mended.profile, target, composed)
         notes += more
-        write_together(files | {picture: png(mended_picture(held, mended.profile))})
+        drawn = (
+            learned_picture(held, mended.profile, told_law)
+            if told_law
+            else mended_picture(held, mended.profile)
+        )
+        write_together(files | {picture: png(drawn)})
     added = mended.effect is not None
     return Added(
         scene=target if added else None,
@@ -149,6 +165,7 @@ def add(
         departures=mended.departs.sentences,
         changes=tuple(changes(measured.profile, mended.profile)),
         notes=(*measured.notes, *notes),
+        learned=told_law,
     )
 
 
@@ -166,7 +183,8 @@ def sentences(added: Added) -> list[str]:
             f"noise {added.noise_floor:.2g} {added.unit}). Nothing was written."
         ]
     told = parting(added.after, added.noise_floor, added.blocks) if added.added else []
-    return [*out, *told, *added.departures, *added.changes, *added.notes]
+    law = law_sentences(added.learned) if added.learned else []
+    return [*out, *law, *told, *added.departures, *added.changes, *added.notes]
 
 
 def _chosen(
@@ -178,7 +196,8 @@ def _chosen(
         if told.get("verdict") in ("adequate", "unexplained") or not found:
             verdict = told.get("verdict", "no effect")
             raise JodaError(
-                f"{path}: names no effect to add (verdict: {verdict}); choose one with --effect."
+                f"{path}: names no effect to add (verdict: {verdict}); choose one with --effect "
+                f"({LABEL} learns a law from the runs)."
             )
         effect = told["effects"][0]["effect"]
     check_effect(effect)

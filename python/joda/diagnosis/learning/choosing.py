@@ -4,7 +4,7 @@ Simple laws first. A term more is taken only if it makes those runs clearly like
 a whole only by the measure of every other effect (`joda.diagnosis.mending`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,8 +23,12 @@ from joda.measured.reading import Measured
 
 LENGTHS = (0.12, 0.05, 0.025)
 """Over which a force over position changes, normalised."""
-TIMES = (0.03, 0.1, 0.3, 1.0)
-"""Of a memory, in lengths of the longest run."""
+TIMES = (0.03, 0.12, 0.5)
+"""From which a memory's time is sought, in lengths of the longest run."""
+
+WORTH = 0.9
+"""Part of the loss to which one of several more terms must bring runs held out: the best of many
+that say nothing brings it to less, too."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +61,12 @@ class Learning:
         best = self.tried(Terms())
         for more in (self._positions, self._speeds, self._along, self._memories):
             found = [self.tried(terms) for terms in more(best.learned.law.terms)]
-            best = self._better(best, found)
-        return best
-
-    def _better(self, best: Tried, found: Sequence[Tried]) -> Tried:
-        for one in found:
-            if clearly(one.unseen, best.unseen):
-                best = one
+            for one in found:
+                if _worth(one, best):
+                    best = one
+        for terms in self._fewer(best.learned.law.terms):
+            if not _worth(best, one := self.tried(terms)):
+                return one
         return best
 
     def _positions(self, terms: Terms) -> Iterator[Terms]:
@@ -85,8 +88,23 @@ class Learning:
         longest = max((float(np.ptp(run.time)) for run in runs), default=0.0)
         for time in (part * longest for part in TIMES if longest):
             yield replace(terms, memory="position", time=time)
-            if terms.speed:
-                yield replace(terms, memory="speed", time=time)
+            yield replace(terms, memory="speed", time=time, speed=True)
+
+    def _fewer(self, terms: Terms) -> Iterator[Terms]:
+        """Without what may have stood in for a memory before there was one."""
+        if terms.memory == "none":
+            return
+        if terms.along:
+            yield replace(terms, position=0.0, along=False)
+        if terms.position and terms.speed and terms.memory == "position":
+            yield replace(terms, position=0.0, speed=False, along=False)
+        if terms.position:
+            yield replace(terms, position=0.0)
+
+
+def _worth(more: Tried, less: Tried) -> bool:
+    """Whether a law is better by so much that its further terms are worth it."""
+    return more.unseen < WORTH * less.unseen and clearly(more.unseen, less.unseen)
 
 
 def learn(

@@ -24,17 +24,31 @@ DRAWS = 32
 
 @dataclass(frozen=True)
 class Band:
-    """A curve of the law, and one standard deviation of it over the ensemble.
+    """A curve of the law, and one standard deviation of it over the ensemble; n numbers each.
 
     Attributes:
-        at: normalised positions, or speeds in rad/s or m/s; shape (n,).
-        force: there, N·m or N, shape (n,).
-        error: one standard deviation, shape (n,).
+        at: normalised positions, or velocities in rad/s or m/s.
+        force: there, N·m or N.
+        error: one standard deviation.
     """
 
-    at: Array
-    force: Array
-    error: Array
+    at: tuple[float, ...]
+    force: tuple[float, ...]
+    error: tuple[float, ...]
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """The largest force, and its standard deviation."""
+        k = int(np.argmax(np.abs(self.force)))
+        return abs(self.force[k]), self.error[k]
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number, and one standard deviation of it over the ensemble."""
+
+    value: float
+    error: float
 
 
 def drawn(learner: Learner, learned: Learned, seed: int = 0) -> Array:
@@ -79,5 +93,14 @@ def over_speed(law: Law, x: Array, draws: Array) -> Band | None:
     return _band(law.speeds, law.resistance(x), [law.resistance(one) for one in draws])
 
 
+def of_memory(law: Law, x: Array, draws: Array) -> tuple[Number, Number]:
+    """The memory's gain in its effect's unit, and its time, s."""
+    gain, time = (
+        Number(of(x), float(np.std([of(one) for one in draws]))) for of in (law.gain, law.time)
+    )
+    return gain, time
+
+
 def _band(at: Array, force: Array, others: Sequence[Array]) -> Band:
-    return Band(at, force, np.asarray(np.std(others, axis=0)))
+    error = np.std(others, axis=0)
+    return Band(*(tuple(map(float, values)) for values in (at, force, error)))

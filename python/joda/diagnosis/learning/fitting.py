@@ -92,8 +92,9 @@ class Learner:
 
     def written(self, law: Law, x: Array) -> Profile:
         """The whole profile with a law."""
-        n = self.base.count
-        return law.written(self.base.written(x[:n]), x[n:])
+        n, bounds = self.base.count, self.base.unknowns
+        own = np.clip(x[:n], bounds.low, bounds.high)  # constraints hold but nearly
+        return law.written(self.base.written(own), x[n:])
 
     def solo(self, law: Law, x: Array, h: float) -> Solo:
         """The joint with a law."""

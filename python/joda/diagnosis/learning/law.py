@@ -34,6 +34,10 @@ ROWS = 9
 """Positions of a table that differs along the way."""
 ALIKE = 0.8
 """Correlation of the resistances of both directions."""
+SLOWER = 2.0
+"""Largest logarithm of a memory's time in that from which it is sought."""
+NO_FRICTION = 1e-6
+"""Dry friction up to which there is none, in usual forces."""
 STEP = 0.02
 """Of a number, for differences; before the data it is 0 ± 1."""
 
@@ -49,7 +53,7 @@ class Terms:
         along: whether what resists differs along the way.
         memory: "position": a spring whose far end follows in `time`; "speed": the resistance over
             the speed grows or falls with the speed's mean over that time.
-        time: s.
+        time: about which that is, s.
     """
 
     position: float = 0.0
@@ -79,11 +83,13 @@ class Law:
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """The numbers: of the force over position, the friction, the table and the memory."""
-        n, bound = sum(self._counts), np.full(sum(self._counts), np.inf)
-        low = -bound
-        if self.terms.memory == "position":
-            low[-1] = 0.0
+        """The numbers: of the force over position, the friction, the table; and of the memory how
+        much it does and the logarithm of its time."""
+        n = sum(self._counts)
+        low, high = np.full(n, -np.inf), np.full(n, np.inf)
+        if self.terms.memory != "none":
+            low[-2] = -np.inf if self.terms.memory == "speed" else 0.0
+            low[-1], high[-1] = -SLOWER, SLOWER
         starts = np.cumsum((0, *self._counts))
         rows = []
         for modes, first in ((self._friction, starts[1]), (self._resists, starts[2])):
@@ -92,7 +98,7 @@ class Law:
             rows.append(G)
         G = np.concatenate(rows)
         must = Inequalities(G, np.zeros(len(G))) if len(G) else None
-        return Unknowns(low, bound, np.full(n, STEP), np.zeros(n), np.ones(n), must)
+        return Unknowns(low, high, np.full(n, STEP), np.zeros(n), np.ones(n), must)
 
     def written(self, profile: Profile, x: Array) -> Profile:
         """A profile with the law beside what it has."""
@@ -100,11 +106,11 @@ class Law:
         made = profile
         if len(position):
             made = _with(made, "conservative", self._curve(self.force_at(x)))
-        if len(friction):
-            rubs = np.maximum(self._friction @ friction, 0.0)
+        rubs = np.maximum(self._friction @ friction, 0.0)
+        if np.any(rubs > NO_FRICTION * self.force):
             made = _with(made, "friction", self._curve(rubs))
         if len(table) or len(memory):
-            effect = self._effect(self._table @ table, self.gain(x))
+            effect = self._effect(self._table @ table, self.gain(x), self.time(x))
             made = made.model_copy(update={"effects": (*made.effects, effect)})
         return made
 
@@ -135,8 +141,18 @@ class Law:
 
     def gain(self, x: Array) -> float:
         """Of the memory, in its effect's unit."""
-        unit = {"none": 0.0, "position": self.force / self.span, "speed": 1 / self.fastest}
-        return float(self._split(x)[3].sum()) * unit[self.terms.memory]
+        if self.terms.memory == "none":
+            return 0.0
+        gain = float(self._split(x)[3][0])
+        if self.terms.memory == "speed":
+            return gain / self.fastest
+        return max(gain, 0.0) * self.force / self.span  # bounds hold but nearly
+
+    def time(self, x: Array) -> float:
+        """Of the memory, s."""
+        if self.terms.memory == "none":
+            return self.terms.time
+        return self.terms.time * float(np.exp(self._split(x)[3][1]))
 
     def _split(self, x: Array) -> list[Array]:
         return np.split(x, np.cumsum(self._counts)[:-1])
@@ -145,7 +161,7 @@ class Law:
     def _counts(self) -> tuple[int, ...]:
         """Of the numbers of each part."""
         own = self._position, self._friction, self._table
-        return (*(part.shape[1] for part in own), int(self.terms.memory != "none"))
+        return (*(part.shape[1] for part in own), 2 * (self.terms.memory != "none"))
 
     @cached_property
     def _position(self) -> Array:
@@ -193,7 +209,7 @@ class Law:
             label=LABEL, interval=self.interval, x=tuple(map(float, x)), y=tuple(map(float, y))
         )
 
-    def _effect(self, table: Array, gain: float) -> LearnedForce:
+    def _effect(self, table: Array, gain: float, time: float) -> LearnedForce:
         """The table with its memory."""
         size = np.maximum(table.reshape(len(self._rows), -1), 0.0)
         signed = np.sign(self.speeds) * size
@@ -201,7 +217,7 @@ class Law:
         y = np.insert(signed, half, 0.0, axis=1)
         return LearnedForce.model_construct(
             memory=self.terms.memory,
-            time=self.terms.time,
+            time=time,
             gain=gain,
             interval=self.interval,
             positions=tuple(map(float, self._rows)),

@@ -1,0 +1,142 @@
+"""A learned law told: its curves with their bands, its memory, in numbers, words and a picture."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from joda.diagnosis.learning.ensemble import (
+    Band,
+    Number,
+    drawn,
+    of_memory,
+    over_position,
+    over_speed,
+)
+from joda.diagnosis.learning.fitting import Learned, Learner
+from joda.diagnosis.learning.law import Memory
+from joda.diagnosis.outcome import draw_mended
+from joda.measured.reading import Measured
+from joda.pictures.style import COLOURS, EFFECTS, house_style, note
+from joda.profile import Profile
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+REMEMBERS = {
+    "position": (
+        "a spring whose far end follows: stiffness {gain.value:.3g} ± {gain.error:.1g} {force}/"
+        "{unit}, {time.value:.3g} ± {time.error:.1g} s until 63 % of its pull are gone"
+    ),
+    "speed": (
+        "a memory of speed: the resistance over the speed changes by {percent:+.0f} % for each "
+        "{fastest:.2g} {unit}/s of the mean speed over {time.value:.3g} ± {time.error:.1g} s"
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Account:
+    """What a learned law is.
+
+    Attributes:
+        position: its force over position; None if it has none.
+        speed: what resists over the velocity, in the mean along the way; None if nothing does.
+        along: whether that differs along the way.
+        memory: what it remembers.
+        gain, time: of the memory, see `joda.effects.LearnedForce`; None without one.
+        unit, force_unit: of the joint's position, and of a force on it.
+    """
+
+    position: Band | None
+    speed: Band | None
+    along: bool
+    memory: Memory
+    gain: Number | None
+    time: Number | None
+    unit: str
+    force_unit: str
+
+
+def account(train: Measured, learned: Learned) -> Account:
+    """What a law is that was learned from runs."""
+    learner, law = Learner(train), learned.law
+    x, draws = learned.fit.x[learner.base.count :], drawn(learner, learned)
+    remembers = law.terms.memory != "none"
+    gain, time = of_memory(law, x, draws) if remembers else (None, None)
+    return Account(
+        position=over_position(law, x, draws),
+        speed=over_speed(law, x, draws),
+        along=law.terms.along,
+        memory=law.terms.memory,
+        gain=gain,
+        time=time,
+        unit=train.profile.joint.unit,
+        force_unit=train.profile.joint.force_unit,
+    )
+
+
+def sentences(told: Account) -> list[str]:
+    """A law for a person."""
+    parts = []
+    if told.position:
+        size, error = told.position.largest
+        a, b = told.position.at[0], told.position.at[-1]
+        parts.append(
+            f"a force over position, up to {size:.3g} ± {error:.1g} {told.force_unit}, from "
+            f"s = {a:.2f} to {b:.2f}"
+        )
+    if told.speed:
+        size, error = told.speed.largest
+        way = ", different along the way" if told.along else ""
+        parts.append(
+            f"a resistance up to {size:.3g} ± {error:.1g} {told.force_unit} at "
+            f"{max(told.speed.at):.2g} {told.unit}/s{way}"
+        )
+    if told.gain and told.time:
+        fastest = max(told.speed.at) if told.speed else 1.0
+        parts.append(
+            REMEMBERS[told.memory].format(
+                gain=told.gain,
+                time=told.time,
+                percent=100 * told.gain.value * fastest,
+                fastest=fastest,
+                force=told.force_unit,
+                unit=told.unit,
+            )
+        )
+    return [f"Learned: {'; '.join(parts)}. Where no run was there is none of it."]
+
+
+def learned_picture(held: Measured, after: Profile, told: Account) -> "Figure":
+    """The joint before and after, and the law with its band."""
+    from matplotlib.figure import Figure
+
+    joint = after.joint
+    with house_style():
+        figure = Figure(figsize=(12, 10), dpi=110, layout="constrained")
+        above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=[7, 3])[:, 0]
+        draw_mended(above, held, after)
+        left, right = below.subplots(1, 2)
+        lo, hi = joint.range
+        _band(left, told.position, lo, hi - lo, COLOURS["conservative"])
+        left.set(xlabel=f"joint position ({joint.unit})", ylabel=f"force ({joint.force_unit})")
+        _band(right, told.speed, 0.0, 1.0, EFFECTS)
+        right.set(xlabel=f"velocity ({joint.unit}/s)", ylabel=f"resists with ({joint.force_unit})")
+        what = "what was learned, ± 2 standard deviations of an ensemble"
+        below.suptitle(what, x=0.02, ha="left", fontsize=10)
+        return figure
+
+
+def _band(axes: "Axes", band: Band | None, begin: float, span: float, colour: str) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.axhline(0, color="#cccccc", lw=0.8)
+    if band is None:
+        axes.set(xticks=[], yticks=[])
+        note(axes, "nothing that the runs support")
+        return
+    at, force, error = (np.array(x) for x in (band.at, band.force, band.error))
+    at = begin + span * at
+    axes.fill_between(at, force - 2 * error, force + 2 * error, color=colour, alpha=0.2, lw=0)
+    axes.plot(at, force, color=colour, lw=1.6)
