@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.better import worse
 from joda.diagnosis.coverage import at_rest
-from joda.diagnosis.judge import BLAS
+from joda.diagnosis.judge import BLAS, excess
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import LABEL, Terms
 from joda.diagnosis.mending import NO_LESS, NO_MORE, NOTHING_LEFT, Mended, clearly, fallen, replayed
@@ -23,9 +23,11 @@ from joda.measured.reading import Measured
 
 LENGTHS = (0.12, 0.05, 0.025)
 """Over which a force over position changes, normalised."""
-TIMES = (0.03, 0.12, 0.5)
+TIMES = (0.05, 0.3)
 """From which a memory's time is sought, in lengths of the longest run."""
 
+LITTLE = 0.02
+"""Excess of the loss per sample, beyond what noise makes, that no term need explain."""
 WORTH = 0.9
 """Part of the loss to which one of several more terms must bring runs held out: the best of many
 that say nothing brings it to less, too."""
@@ -38,6 +40,11 @@ class Tried:
     learned: Learned
     unseen: float
 
+    @property
+    def terms(self) -> Terms:
+        """Of the law."""
+        return self.learned.law.terms
+
 
 class Learning:
     """Fits laws to some runs and judges them by others."""
@@ -47,12 +54,15 @@ class Learning:
         self.learner, self.unseen, self.told = Learner(train), Likelihood(held), told
         self.own = self.unseen.loss(train.profile)
 
-    def tried(self, terms: Terms) -> Tried:
-        """A law with these terms, fitted."""
-        self.told(f"a law of {terms}")
+    def tried(self, terms: Terms, near: Tried | None = None) -> Tried:
+        """A law with these terms, fitted; from one that only lacks the memory, if that is near."""
+        law = self.learner.law(terms)
+        self.told(f"learning {law.told()}")
+        begin = None
+        if near and terms == replace(near.terms, memory=terms.memory, time=terms.time):
+            begin = np.append(near.learned.fit.x, law.unremembering)
         every = [
-            Tried(one, self.unseen.loss(one.profile))
-            for one in self.learner.learned(self.learner.law(terms))
+            Tried(one, self.unseen.loss(one.profile)) for one in self.learner.learned(law, begin)
         ]
         return min(every, key=lambda one: one.unseen)
 
@@ -60,14 +70,25 @@ class Learning:
         """The law of the fewest terms that no other is clearly better than."""
         best = self.tried(Terms())
         for more in (self._positions, self._speeds, self._along, self._memories):
-            found = [self.tried(terms) for terms in more(best.learned.law.terms)]
-            for one in found:
-                if _worth(one, best):
-                    best = one
-        for terms in self._fewer(best.learned.law.terms):
+            if self.nothing_left(best):
+                break
+            best = self._best(best, more(best.terms))
+        for terms in self._fewer(best.terms):
             if not _worth(best, one := self.tried(terms)):
                 return one
         return best
+
+    def _best(self, best: Tried, others: Iterator[Terms]) -> Tried:
+        """One, or the best of others with more terms that are worth it."""
+        for terms in others:
+            one = self.tried(terms, best if terms.memory != "none" else None)
+            if _worth(one, best):
+                best = one
+        return best
+
+    def nothing_left(self, found: Tried) -> bool:
+        """Whether what was held out is missed by no more than noise."""
+        return excess(found.unseen, max(self.unseen.judge.samples, 1.0)) < LITTLE
 
     def _positions(self, terms: Terms) -> Iterator[Terms]:
         for length in LENGTHS:
@@ -133,7 +154,7 @@ def learn(
     with threadpool_limits(1, BLAS):
         best = Learning(train.changed(anew), held.changed(anew), told).chosen()
     profile = best.learned.profile
-    if best.learned.law.terms == Terms() or not clearly(best.unseen, loss):
+    if best.terms == Terms() or not clearly(best.unseen, loss):
         return refused(NOTHING_LEFT if before.window < NO_MORE * held.floor else NO_LESS)
     if reason := implausible(Needs(train), profile, LABEL) or "":
         return refused(reason)

@@ -1,6 +1,7 @@
 """Fits a law to windows of measured runs, together with the strengths of the model's own parts.
 
-First in short windows, which a force's error hardly bends, then in longer ones.
+First in short windows and long steps, as a force's error hardly bends a short motion, then in
+longer windows at the scene's own step.
 """
 
 from collections.abc import Iterator
@@ -22,7 +23,7 @@ from joda.profile import Profile
 
 Array = NDArray[np.float64]
 
-ROUNDS = 6
+ROUNDS = 4
 """Iterations in windows of each length, while windows that are far off count, and after."""
 AT_END = 0.02
 """Of the range: what was measured as near to its end goes to the end."""
@@ -58,6 +59,8 @@ class Learner:
         lengths = [factor * usual_length for factor in LONGER] if train.runs else [usual_length]
         # at the scene's own step
         self.windows = [windows_for(train, length, fine=False) for length in lengths]
+        if train.runs:
+            self.windows[0] = self.windows[0].coarser()
 
     @cached_property
     def base(self) -> Base:

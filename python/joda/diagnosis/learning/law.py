@@ -114,6 +114,24 @@ class Law:
             made = made.model_copy(update={"effects": (*made.effects, effect)})
         return made
 
+    @property
+    def unremembering(self) -> Array:
+        """The memory's numbers with which it does nothing."""
+        return np.zeros(self._counts[3])
+
+    def told(self) -> str:
+        """What it is made of, for a person who waits."""
+        terms = self.terms
+        parts = [f"a force over position, smooth over {terms.position:g} of the range"] * bool(
+            terms.position
+        )
+        way = ", along the way" * terms.along
+        parts += [f"a resistance over the speed{way}"] * terms.speed
+        parts += [f"a memory of {terms.memory}, about {terms.time:.2g} s"] * (
+            terms.memory != "none"
+        )
+        return ", ".join(parts) or "the model's own numbers"
+
     @cached_property
     def places(self) -> Array:
         """Control points of the force over position, normalised."""
@@ -152,7 +170,7 @@ class Law:
         """Of the memory, s."""
         if self.terms.memory == "none":
             return self.terms.time
-        return self.terms.time * float(np.exp(self._split(x)[3][1]))
+        return float(self.terms.time * np.exp(self._split(x)[3][1]))
 
     def _split(self, x: Array) -> list[Array]:
         return np.split(x, np.cumsum(self._counts)[:-1])

@@ -1,0 +1,133 @@
+"""Laws of no catalogue are learned from runs: planted truths are recovered, and noise is not."""
+
+import json
+
+import numpy as np
+import pytest
+
+from joda import add
+from joda.commands.add import sentences
+from joda.diagnosis.learning.account import account
+from joda.diagnosis.learning.choosing import Learning, learn
+from joda.diagnosis.learning.law import Terms
+from joda.diagnosis.learning.smooth import modes_of, nearness
+from joda.diagnosis.mending import error
+from joda.diagnosis.split import parted
+from joda.hidden import draw, write
+from joda.measured.reading import read_measured
+
+
+def planted(folder, effect):
+    """A fresh joint that hides a law: the case, its runs to learn from, and those nobody sees."""
+    case = draw(int(np.random.default_rng().integers(1_000_000)), effect)
+    write(case, folder)
+    train, unseen = (
+        read_measured(folder / "model.xml", case.joint, [folder / run.name for run in runs])
+        for runs in (case.train, case.held_out)
+    )
+    return case, train, unseen
+
+
+def learned(measured, terms):
+    """A law with some terms, fitted to three quarters of the runs."""
+    train, held = parted(measured)
+    return Learning(train, held, lambda what: None).tried(terms).learned
+
+
+def numbers(found):
+    """Of the law, without the model's own factors."""
+    return found.fit.x[-len(found.law.unknowns.mean) :]
+
+
+def test_modes_have_the_covariance_they_are_made_of():
+    covariance = nearness(np.linspace(0, 1, 40), 0.2)
+    L = modes_of(covariance)
+    assert L.shape[1] < 20
+    assert np.abs(L @ L.T - covariance).max() < 0.01
+
+
+def test_a_drag_by_the_root_of_the_speed_is_learned(tmp_path):
+    case, measured, unseen = planted(tmp_path, "square_root_damping")
+    (law,) = case.truth.hidden
+    found = learned(measured, Terms(speed=True))
+    profile, v = found.profile, found.law.speeds[-6:-1]
+    rubs, drag = (
+        sum(c.y[0] for c in getattr(profile.channels, name).components if "native" in c.label)
+        for name in ("friction", "damping")
+    )
+    resists = rubs + drag * v + found.law.resistance(numbers(found))[-6:-1]
+    true = case.truth.friction + case.truth.damping * v + law.size * np.sqrt(v)
+    assert resists == pytest.approx(true, rel=0.1)
+    assert error(unseen, profile).window < 0.3 * error(unseen).window
+    told = account(parted(measured)[0], found)
+    assert told.position is None
+    at, error_there = np.array(told.speed.at), np.array(told.speed.error)
+    assert np.all(error_there[np.abs(at) > 0.05 * at.max()] > 0)
+
+
+def test_a_period_over_position_is_learned(tmp_path):
+    case, measured, _ = planted(tmp_path, "cogging")
+    (law,) = case.truth.hidden
+    found = learned(measured, Terms(position=0.025))
+    s = found.law.places[3:-3]
+    true = law.force(s, s, 0 * s, 0 * s)
+    force = found.law.force_at(numbers(found))[3:-3]
+    assert np.sqrt(np.mean((force - true) ** 2)) < 0.35 * np.sqrt(np.mean(true**2))
+
+
+def test_a_spring_whose_end_follows_is_learned(tmp_path):
+    case, measured, unseen = planted(tmp_path, "maxwell_relaxation")
+    (law,) = case.truth.hidden
+    found = learned(measured, Terms(memory="position", time=0.12 * np.ptp(measured.runs[0].time)))
+    assert found.law.gain(numbers(found)) == pytest.approx(law.stiffness, rel=0.15)
+    assert found.law.time(numbers(found)) == pytest.approx(law.time, rel=0.3)
+    assert error(unseen, found.profile).window < 0.3 * error(unseen).window
+
+
+def test_what_falls_as_a_joint_warms_up_is_learned_in_part(tmp_path):
+    _, measured, unseen = planted(tmp_path, "warming_up")
+    longest = max(np.ptp(run.time) for run in measured.runs)
+    found = learned(measured, Terms(speed=True, memory="speed", time=0.3 * longest))
+    assert found.law.gain(numbers(found)) < 0
+    assert error(unseen, found.profile).window < 0.7 * error(unseen).window
+
+
+def test_outside_what_was_visited_there_is_no_law(tmp_path):
+    _, measured, _ = planted(tmp_path, "cogging")
+    found = learned(measured, Terms(position=0.12))
+    a, b = found.law.interval
+    component = found.profile.channels.conservative.components[-1]
+    assert component.label == "learned_force"
+    assert component.interval == (a, b)
+    lo, hi = measured.profile.joint.range
+    s = (np.concatenate([run.position for run in measured.runs]) - lo) / (hi - lo)
+    assert s.min() - 0.02 <= a
+    assert b <= s.max() + 0.02
+
+
+def test_where_nothing_is_missing_nothing_is_learned(tmp_path):
+    _, measured, _ = planted(tmp_path, None)
+    mended, law = learn(*parted(measured))
+    assert law is None
+    assert mended.reason
+    assert mended.profile == measured.profile
+
+
+@pytest.mark.long
+def test_the_command_adds_it(tmp_path):
+    case, _, unseen = planted(tmp_path, "square_root_damping")
+    said = tmp_path / "said.json"
+    said.write_text(json.dumps({"verdict": "unexplained", "effects": []}))
+    runs = [tmp_path / run.name for run in case.train]
+    model, new = tmp_path / "model.xml", tmp_path / "new.xml"
+    found = add(model, case.joint, said, runs, new, effect="learned_force")
+    assert found.added
+    told = sentences(found)
+    assert told[0].startswith("Added a law learned from the runs.")
+    assert told[1].startswith("Learned: ")
+    assert {"position", "speed", "memory"} <= json.loads(json.dumps(found.as_json()))[
+        "learned"
+    ].keys()
+    held = [tmp_path / run.name for run in case.held_out]
+    after = read_measured(new, case.joint, held)
+    assert error(after).window < 0.5 * error(unseen).window
