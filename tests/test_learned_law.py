@@ -59,7 +59,8 @@ def test_a_drag_by_the_root_of_the_speed_is_learned(tmp_path):
     true = case.truth.friction + case.truth.damping * v + law.size * np.sqrt(v)
     assert resists == pytest.approx(true, rel=0.1)
     assert error(unseen, profile).window < 0.3 * error(unseen).window
-    told = account(parted(measured)[0], found)
+    train, held = parted(measured)
+    told = account(train, held, found, error(held, profile).window)
     assert told.position is None
     at, error_there = np.array(told.speed.at), np.array(told.speed.error)
     assert np.all(error_there[np.abs(at) > 0.05 * at.max()] > 0)

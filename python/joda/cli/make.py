@@ -64,6 +64,9 @@ def demo(
     position_only: Annotated[
         bool, typer.Option("--position-only", help="hidden-effect: no force is recorded.")
     ] = False,
+    alien: Annotated[
+        bool, typer.Option("--alien", help="hidden-effect: a law of no catalogue, to be learned.")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -78,11 +81,14 @@ def demo(
     """
     if what == "hidden-effect":
         _hidden_effect(
-            output, as_json, seed=seed, reveal=reveal, position_only=position_only, force=force
-        )
+            output, as_json, seed=seed, reveal=reveal, position_only=position_only, alien=alien,
+            force=force,
+        )  # fmt: skip
         return
-    if seed is not None or reveal or position_only:
-        raise JodaError("--seed, --reveal and --position-only go with joda demo hidden-effect.")
+    if seed is not None or reveal or position_only or alien:
+        raise JodaError(
+            "--seed, --reveal, --position-only and --alien go with joda demo hidden-effect."
+        )
     from joda import demo as run
 
     with spinner("demo") as progress:

@@ -133,7 +133,7 @@ def add(
         mended, law = learn(train, held, progress)
     else:
         mended = mend(train, held, name, direction, near, progress)
-    told_law = account(train, law) if law else None
+    told_law = account(train, held, law, mended.after.window) if law else None
     notes: list[str] = []
     if mended.effect:
         if not told_law:  # of a learned law nothing is where no run was

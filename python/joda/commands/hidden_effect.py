@@ -13,6 +13,8 @@ from joda.commands.compare import compare
 from joda.commands.diagnose import diagnose
 from joda.commands.diagnose import sentences as of_diagnosis
 from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.learning.account import sentences as law_sentences
+from joda.diagnosis.learning.law import LABEL
 from joda.diagnosis.phrases import named, percent
 from joda.diagnosis.share import overlap
 from joda.errors import JodaError
@@ -22,6 +24,10 @@ from joda.hidden.cases import PUSHED, VISIBLE
 from joda.measured.comparison import Comparison
 from joda.measured.comparison import sentences as of_comparison
 
+ALIENS = ("square_root_damping", "cogging", "maxwell_relaxation", "warming_up")
+"""Laws of no catalogue that are drawn, each of another kind: over speed, position, and what was."""
+HALF = 0.5
+"""Part of the error on unseen windows that a learned law may leave."""
 PLACED = 0.5
 """Least overlap (intersection over union) of the place said and the true one."""
 
@@ -56,6 +62,7 @@ def hidden_effect(
     *,
     seed: int | None = None,
     position_only: bool = False,
+    alien: bool = False,
     reveal: bool = False,
     force: bool = False,
     say: Callable[[str], None] = lambda sentence: None,
@@ -69,6 +76,7 @@ def hidden_effect(
             joda_hidden_effect, or the first of joda_hidden_effect_2, ... that does not exist.
         seed: of the joint, its effect and the runs; by default another one each time.
         position_only: the force is not recorded: the joint is let go or flicked.
+        alien: the law is of no catalogue, and is learned from the runs.
         reveal: say at the beginning what is hidden.
         force: overwrite what an earlier demo left there.
         say: told what is done and what was found, sentence by sentence.
@@ -79,13 +87,16 @@ def hidden_effect(
     Raises:
         JodaError: the folder cannot be written, or holds files already.
     """
+    if alien and position_only:
+        raise JodaError("--alien needs the force; leave --position-only out.")
     folder = Path(output) if output is not None else fresh("joda_hidden_effect")
     if occupied(folder) and not force:
         raise JodaError(f"{folder}: exists already; choose another folder with -o or add --force.")
     make_folder(folder)
     if seed is None:
         seed = int(np.random.default_rng().integers(1_000_000))
-    names = [name for name in EFFECTS if not (position_only and name in PUSHED)]
+    known = [name for name in EFFECTS if not (position_only and name in PUSHED)]
+    names = ALIENS if alien else known
     effect = str(np.random.default_rng(seed).choice(names))
     say(f"Seed {seed}: simulating a joint that has one effect more than its model.")
     case = draw(seed, effect, forced=not position_only)
@@ -96,7 +107,7 @@ def hidden_effect(
         f"{model}: the model, a {case.truth.joint.kind}. {len(runs)} runs to learn from, "
         f"{len(unseen)} to judge by, {'positions only' if position_only else 'with the force'}."
     )
-    truth = f"{named(case.seal['effect'])}, {_where(case.seal)}, {_size(case.seal)}"
+    truth = f"{_called(case.seal)}, {_where(case.seal)}, {_size(case.seal)}"
     say(f"Hidden is {truth}." if reveal else "What is hidden is sealed in sealed.json.")
 
     say("")
@@ -112,11 +123,14 @@ def hidden_effect(
     for sentence in of_diagnosis(diagnosis):
         say(sentence)
     before, after = compare(model, joint, unseen), None
-    if diagnosis.effects:
+    if diagnosis.effects or alien:
         say("")
-        say(f"3. Add it. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
-        added = add(model, joint, written, runs, folder / "new.xml", force=True)
-        for sentence in (of_added(added)[0], *added.departures):
+        what = "Learn the law from the runs" if alien else "Add it"
+        say(f"3. {what}. (add, {folder / 'new.xml'}, {folder / 'new.png'})")
+        chosen = LABEL if alien else None
+        added = add(model, joint, written, runs, folder / "new.xml", effect=chosen, force=True)
+        law = law_sentences(added.learned) if added.learned else []
+        for sentence in (of_added(added)[0], *law, *added.departures):
             say(sentence)
         if added.scene:
             say("")
@@ -126,9 +140,10 @@ def hidden_effect(
             say(_unseen(before, after))
     say("")
     say("The seal is opened:")
-    judgement, right = _judged(diagnosis, case.seal, before, after)
+    judge = _judged_law if alien else _judged
+    judgement, right = judge(diagnosis, case.seal, before, after)
     say(f"  hidden: {truth}")
-    for one in diagnosis.effects[:1]:
+    for one in () if alien else diagnosis.effects[:1]:
         doubt = f" \u00b1 {one.magnitude_error:.2g}"
         say(f"  said:   {named(one.effect)}, {_where(vars(one))}, {_size(vars(one), doubt)}")
     say(judgement)
@@ -144,6 +159,12 @@ def hidden_effect(
         right=right,
         judgement=judgement,
     )
+
+
+def _called(seal: dict[str, Any]) -> str:
+    """The effect in words, also one that no catalogue has."""
+    name = seal["effect"]
+    return named(name) if seal["in_catalogue"] else name.replace("_", " ")
 
 
 def _where(told: dict[str, Any]) -> str:
@@ -190,6 +211,23 @@ def _judged(
         share = percent(one.probability)
         return f"Wrong: the hidden effect was named too, with {share}.", False
     return "Wrong: the hidden effect was not among those named.", False
+
+
+def _judged_law(
+    diagnosis: Diagnosis, seal: dict[str, Any], before: Comparison, after: Comparison | None
+) -> tuple[str, bool]:
+    """The same of a law that has no name: a sentence, and whether it was told to be unknown and
+    unseen runs are missed by much less with what was learned."""
+    known = diagnosis.verdict != "unexplained"
+    said = f"It has no name, and was taken for {named(diagnosis.effects[0].effect)}. " * (
+        known and bool(diagnosis.effects)
+    )
+    if after is None or not before.rmse_window or not after.rmse_window:
+        return f"{said}Missed: nothing was learned.", False
+    part = after.rmse_window / before.rmse_window
+    learned = part < HALF
+    told = f"{said}What was learned leaves {100 * part:.2g} % of the error on unseen runs."
+    return told, learned and not known
 
 
 def _off(

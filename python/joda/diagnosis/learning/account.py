@@ -14,6 +14,7 @@ from joda.diagnosis.learning.ensemble import (
     over_speed,
 )
 from joda.diagnosis.learning.fitting import Learned, Learner
+from joda.diagnosis.learning.formula import Formula, formula
 from joda.diagnosis.learning.law import Memory
 from joda.diagnosis.outcome import draw_mended
 from joda.measured.reading import Measured
@@ -46,6 +47,7 @@ class Account:
         along: whether that differs along the way.
         memory: what it remembers.
         gain, time: of the memory, see `joda.effects.LearnedForce`; None without one.
+        formula: few terms that do as well, beside the memory; None if none do.
         unit, force_unit: of the joint's position, and of a force on it.
     """
 
@@ -55,12 +57,20 @@ class Account:
     memory: Memory
     gain: Number | None
     time: Number | None
+    formula: Formula | None
     unit: str
     force_unit: str
 
 
-def account(train: Measured, learned: Learned) -> Account:
-    """What a law is that was learned from runs."""
+def account(train: Measured, held: Measured, learned: Learned, unseen: float) -> Account:
+    """What a law is that was learned from runs.
+
+    Args:
+        train: the joint and runs that were fitted.
+        held: the same with runs held out.
+        learned: the law.
+        unseen: its error on these, in windows.
+    """
     learner, law = Learner(train), learned.law
     x, draws = learned.fit.x[learner.base.count :], drawn(learner, learned)
     remembers = law.terms.memory != "none"
@@ -72,6 +82,7 @@ def account(train: Measured, learned: Learned) -> Account:
         memory=law.terms.memory,
         gain=gain,
         time=time,
+        formula=formula(train, held, learned, unseen),
         unit=train.profile.joint.unit,
         force_unit=train.profile.joint.force_unit,
     )
@@ -106,7 +117,16 @@ def sentences(told: Account) -> list[str]:
                 unit=told.unit,
             )
         )
-    return [f"Learned: {'; '.join(parts)}. Where no run was there is none of it."]
+    out = [f"Learned: {'; '.join(parts)}. Where no run was there is none of it."]
+    if found := told.formula:
+        beside = " beside this memory" if told.gain else ""
+        out.append(
+            f"In a formula{beside}: {found.text}; what was held out is missed by "
+            f"{found.unseen:.2f} times what the learned curves miss it by."
+        )
+    elif told.position or told.speed:
+        out.append("No formula of few terms is as good and stable.")
+    return out
 
 
 def learned_picture(held: Measured, after: Profile, told: Account) -> "Figure":

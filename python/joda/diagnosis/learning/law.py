@@ -92,7 +92,7 @@ class Law:
             low[-1], high[-1] = -SLOWER, SLOWER
         starts = np.cumsum((0, *self._counts))
         rows = []
-        for modes, first in ((self._friction, starts[1]), (self._resists, starts[2])):
+        for modes, first in ((self.friction_modes, starts[1]), (self._resists, starts[2])):
             G = np.zeros((len(modes), n))
             G[:, first : first + modes.shape[1]] = modes / self.force
             rows.append(G)
@@ -106,11 +106,11 @@ class Law:
         made = profile
         if len(position):
             made = _with(made, "conservative", self._curve(self.force_at(x)))
-        rubs = np.maximum(self._friction @ friction, 0.0)
+        rubs = np.maximum(self.friction_modes @ friction, 0.0)
         if np.any(rubs > NO_FRICTION * self.force):
             made = _with(made, "friction", self._curve(rubs))
         if len(table) or len(memory):
-            effect = self._effect(self._table @ table, self.gain(x), self.time(x))
+            effect = self._effect(self.table_modes @ table, self.gain(x), self.time(x))
             made = made.model_copy(update={"effects": (*made.effects, effect)})
         return made
 
@@ -147,14 +147,14 @@ class Law:
 
     def force_at(self, x: Array) -> Array:
         """The force over position with some numbers, at `places`, N·m or N."""
-        return np.asarray(self._position @ self._split(x)[0])
+        return np.asarray(self.position_modes @ self._split(x)[0])
 
     def resistance(self, x: Array) -> Array:
         """The force that resists at `speeds`, in the mean along the way, without a memory; N·m or
         N, signed as the velocity."""
         _, friction, table, _ = self._split(x)
-        size = np.maximum(self._table @ table, 0.0).reshape(len(self._rows), -1).mean(axis=0)
-        rubs = np.maximum(self._friction @ friction, 0.0).mean()
+        size = np.maximum(self.table_modes @ table, 0.0).reshape(len(self._rows), -1).mean(axis=0)
+        rubs = np.maximum(self.friction_modes @ friction, 0.0).mean()
         return np.asarray(np.sign(self.speeds) * (size + rubs))
 
     def gain(self, x: Array) -> float:
@@ -178,18 +178,18 @@ class Law:
     @property
     def _counts(self) -> tuple[int, ...]:
         """Of the numbers of each part."""
-        own = self._position, self._friction, self._table
+        own = self.position_modes, self.friction_modes, self.table_modes
         return (*(part.shape[1] for part in own), 2 * (self.terms.memory != "none"))
 
     @cached_property
-    def _position(self) -> Array:
+    def position_modes(self) -> Array:
         """Modes of the force over position at its control points, N·m or N."""
         if not (length := self.terms.position):
             return np.zeros((0, 0))
         return self.force * modes_of(nearness(self.places, length))
 
     @cached_property
-    def _friction(self) -> Array:
+    def friction_modes(self) -> Array:
         """Modes of the friction at its control points, N·m or N."""
         if not self.terms.speed:
             return np.zeros((0, 0))
@@ -204,7 +204,7 @@ class Law:
         return np.linspace(a, b, ROWS) if self.terms.along else np.array([a])
 
     @cached_property
-    def _table(self) -> Array:
+    def table_modes(self) -> Array:
         """Modes of the resistance at the table's points, N·m or N, positive where it resists;
         position by position, in each the negative velocities first."""
         if not self.terms.speed:
@@ -219,7 +219,7 @@ class Law:
     @property
     def _resists(self) -> Array:
         """The same where it must not drive; nothing where there is no such resistance."""
-        return self._table if self._table.shape[1] else np.zeros((0, 0))
+        return self.table_modes if self.table_modes.shape[1] else np.zeros((0, 0))
 
     def _curve(self, y: Array) -> Component:
         x = np.linspace(0, 1, len(y))
