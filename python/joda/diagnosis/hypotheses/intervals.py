@@ -30,8 +30,8 @@ def ends(place: str, x: Array) -> tuple[float, float]:
     if place == "high":
         return min(float(x[-1]), 1.0 - NARROWEST), 1.0
     a, b = sorted((float(x[-2]), float(x[-1])))
-    a = min(a, 1.0 - NARROWEST)
-    return a, max(b, a + NARROWEST)
+    a = min(max(a, 0.0), 1.0 - NARROWEST)  # a rough trial may begin outside the range
+    return a, min(max(b, a + NARROWEST), 1.0)
 
 
 def places(place: str, widest: float = 1.0) -> tuple[Bounds, list[tuple[float, ...]]]:
