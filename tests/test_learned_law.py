@@ -9,7 +9,9 @@ from joda import add
 from joda.commands.add import sentences
 from joda.diagnosis.learning.account import account
 from joda.diagnosis.learning.choosing import Learning, learn
+from joda.diagnosis.learning.formula import _period, _sets, _solved
 from joda.diagnosis.learning.law import Terms
+from joda.diagnosis.learning.library import of_speed
 from joda.diagnosis.learning.smooth import modes_of, nearness
 from joda.diagnosis.mending import error
 from joda.diagnosis.split import parted
@@ -62,6 +64,9 @@ def test_a_drag_by_the_root_of_the_speed_is_learned(tmp_path):
     train, held = parted(measured)
     told = account(train, held, found, error(held, profile).window)
     assert told.position is None
+    if told.formula:  # where two terms are as good as a root, none is stable
+        resists = [one for one in told.formula.terms if one.term == "sign(v) √|v|"]
+        assert [-one.factor for one in resists] == pytest.approx([law.size], rel=0.3)
     at, error_there = np.array(told.speed.at), np.array(told.speed.error)
     assert np.all(error_there[np.abs(at) > 0.05 * at.max()] > 0)
 
@@ -132,3 +137,16 @@ def test_the_command_adds_it(tmp_path):
     held = [tmp_path / run.name for run in case.held_out]
     after = read_measured(new, case.joint, held)
     assert error(after).window < 0.5 * error(unseen).window
+
+
+def test_the_root_of_a_speed_is_told_from_all_other_terms():
+    v = np.linspace(0.02, 2.0, 20)
+    singles = [(one,) for one in of_speed(2.0)]
+    best = _sets(singles, v, 0.3 * np.sqrt(v), np.full(20, 0.005))[0][0]
+    assert [one.text for one in best] == ["sign(v) √|v|"]
+    assert _solved(best, v, 0.3 * np.sqrt(v), np.full(20, 0.005))[1] == pytest.approx([0.3])
+
+
+def test_the_period_of_a_wave_is_found():
+    q, n = np.linspace(-0.3, 0.9, 90), np.random.default_rng().uniform(12, 60)
+    assert _period(q, 2 * np.sin(n * q + 1) + 0.5, 0.03) == pytest.approx((n,), rel=1e-3)

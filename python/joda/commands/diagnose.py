@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.outcome import read_runs
-from joda.diagnosis.phrases import NAMES, named, percent
+from joda.diagnosis.phrases import LEARN, NAMES, named, percent
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
 from joda.files import check_targets, write_together
@@ -82,8 +82,14 @@ def check_effect(name: str) -> None:
 
 def sentences(diagnosis: Diagnosis) -> list[str]:
     """The diagnosis for a person: the verdict, the candidates, what to do next, notes."""
-    out = [diagnosis.summary, *map(_candidate, diagnosis.effects)]
-    return out + _after(diagnosis)
+    return [diagnosis.summary, *_candidates(diagnosis), *_after(diagnosis)]
+
+
+def _candidates(diagnosis: Diagnosis) -> list[str]:
+    """What may be missing, and how likely it is none of these."""
+    unknown = diagnosis.unexplained_probability
+    none = [] if unknown is None else [f"{percent(unknown)} none of these."]
+    return [*map(_candidate, diagnosis.effects), *none]
 
 
 def _candidate(found: Finding) -> str:
@@ -93,11 +99,16 @@ def _candidate(found: Finding) -> str:
 
 
 def _after(diagnosis: Diagnosis) -> list[str]:
-    """The next experiment, and notes."""
+    """The next experiment, what to do about what has no name, and notes."""
     told = diagnosis.next_experiment
     parts = " and ".join(f"s = {a:.2f} to {b:.2f}" for a, b in diagnosis.unvisited)
     away = f"No run visited {parts}: nothing is known of the joint there."
-    return [away] * bool(parts) + [f"Next experiment: {told}"] * bool(told) + list(diagnosis.notes)
+    return [
+        *[away] * bool(parts),
+        *[f"Next experiment: {told}"] * bool(told),
+        *[LEARN] * (diagnosis.verdict == "unexplained"),
+        *diagnosis.notes,
+    ]
 
 
 def _page(diagnosis: Diagnosis, drawn: bytes) -> str:
@@ -107,7 +118,7 @@ def _page(diagnosis: Diagnosis, drawn: bytes) -> str:
     parts.append(embedded(drawn, what))
     if diagnosis.effects:
         parts.append(table(head, [_row(one, diagnosis.unit) for one in diagnosis.effects]))
-    parts += map(paragraph, (*map(_candidate, diagnosis.effects), *_after(diagnosis)))
+    parts += map(paragraph, (*_candidates(diagnosis), *_after(diagnosis)))
     return page(f"{diagnosis.joint}: what the model lacks", *parts)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from joda.diagnosis.improving import Step, improved
 from joda.diagnosis.outcome import beside, draw_mended, nearby, read_runs, scene_files, wholes
-from joda.diagnosis.phrases import named
+from joda.diagnosis.phrases import LEARN, named
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.files import write_together
 from joda.measured.maps import draw_maps, draw_models, replayed
@@ -159,6 +159,7 @@ def _ending(result: Improved) -> list[str]:
         *["Nothing was added or corrected, and no scene was written."] * unchanged,
         result.why,
         *[f"Next experiment: {told}"] * bool(told),
+        *[LEARN] * bool(last and last.verdict == "unexplained"),
         *result.departures,
         *result.changes,
         *result.notes,

@@ -75,6 +75,8 @@ class Diagnosis:
         corrections: numbers of the model that the data contradict, apart from what is missing.
         doubt: why the first effect may be none however well it explains the runs, a clause: then it
             is added only if it is asked for by name. None if nothing speaks for that.
+        unexplained_probability: that what is missing is none of the known effects, by the same map
+            as theirs; None where nothing was weighed, or more than that map decided.
     """
 
     joint: str
@@ -89,6 +91,7 @@ class Diagnosis:
     contacts: tuple[Contact, ...]
     corrections: tuple[Correction, ...] = ()
     doubt: str | None = None
+    unexplained_probability: float | None = None
 
     def to_json(self) -> str:
         """The diagnosis as JSON."""

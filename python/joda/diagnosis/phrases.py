@@ -54,6 +54,11 @@ WAYS = {"positive": "towards +q", "negative": "towards \N{MINUS SIGN}q"}
 
 assert set(NAMES) >= {*EFFECTS, *CHANNEL_EFFECTS}
 
+LEARN = (
+    "What has no name can be learned from these runs: joda add ... --effect learned_force, which "
+    "adds the law only if runs held out of the fit are clearly better with it."
+)
+
 
 SUREST = 0.99
 """Highest probability that is said."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.judge import Judge, Make, Unknowns
 from joda.diagnosis.windows import Windows, evenly
+from joda.measured.reading import Measured
 from joda.profile import Joint
 
 Array = NDArray[np.float64]
@@ -21,6 +22,8 @@ PER_WINDOW = 0.4
 """Length of a window, s."""
 LONGEST = 20.0
 """Of a motion, s."""
+SLOWEST = 0.02
+"""Part of the range per second that a motion is proposed at, at the least."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +69,29 @@ class Means:
     forced: bool
 
 
+def means_of(measured: Measured, windows: Windows, h: float) -> Means:
+    """What experiments on a joint would be made with: as these runs were.
+
+    Args:
+        measured: the joint and its runs.
+        windows: of these.
+        h: step, s.
+    """
+    least = SLOWEST * float(np.ptp(measured.profile.joint.range))
+    return Means(
+        joint=measured.profile.joint,
+        inertia=measured.single.inertia,
+        speed=max(float(np.sqrt(np.mean(windows.start[:, 1] ** 2))), least),
+        h=h,
+        sigma=measured.floor,
+        forced=any(run.pushed for run in measured.runs),
+    )
+
+
 def next_experiment(first: Model, second: Model, means: Means) -> str | None:
     """The motion of the menu that tells the models apart best; None if none does."""
     best, told = None, 3.0
-    for motion in _menu(means):
+    for motion in menu(means):
         if (difference := _difference(motion, first, second, means)) > told:
             best, told = motion, difference
     return None if best is None else best.sentence
@@ -94,7 +116,7 @@ def there_and_back(means: Means) -> Motion:
     )
 
 
-def _menu(means: Means) -> Iterator[Motion]:
+def menu(means: Means) -> Iterator[Motion]:
     """Motions that people can make, slow and fast ones, long enough to be told apart."""
     lo, hi = means.joint.range
     span, h = hi - lo, means.h
@@ -140,18 +162,18 @@ def _menu(means: Means) -> Iterator[Motion]:
 
 def _difference(motion: Motion, first: Model, second: Model, means: Means) -> float:
     """How far off the second model is where the first is true: RMS residual, in noises."""
-    lo, hi = means.joint.range
-    windows = _recorded(motion, first, means, lo, hi - lo)
+    windows = recorded(motion, first, means)
     judge = Judge(windows, windows.count > 0)
     fit = judge.fit(second.make, second.unknowns, second.x, windows.start, 3)
     samples = max(int(windows.count.sum()), 1)
     return float(np.sqrt(fit.squares.sum() / samples))
 
 
-def _recorded(motion: Motion, model: Model, means: Means, lo: float, span: float) -> Windows:
+def recorded(motion: Motion, model: Model, means: Means) -> Windows:
     """What the first model does, in windows, without noise."""
     h, solo = means.h, model.make(model.x)
-    position = lo + span * motion.position
+    lo, hi = means.joint.range
+    position = lo + (hi - lo) * motion.position
     n = len(position)
     free = np.isnan(position)
     force = np.zeros(n)

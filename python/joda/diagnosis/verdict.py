@@ -26,7 +26,7 @@ from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.looks import Looked, looked
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.plausible import unseen_place
-from joda.diagnosis.probes import Means, Model, next_experiment, there_and_back
+from joda.diagnosis.probes import Model, means_of, next_experiment, there_and_back
 from joda.diagnosis.ranking import Ranking, Told
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.summary import BOUNCY, SAME, other_unit, summarised
@@ -43,8 +43,6 @@ from joda.profile import Profile
 
 FALLEN = 0.95
 """Part of an error held out that an effect leaves at most, where only a second look knows of it."""
-SLOWEST = 0.02
-"""Part of the range per second that a motion is proposed at, at the least."""
 TOO_SHORT = "The measurements are too short to tell anything."
 RECORD_MORE = (
     "Record more: move the joint through its whole range in both directions, slowly and fast, with "
@@ -207,6 +205,7 @@ def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
         _said(measured, verdict, summary, worth, experiment),
         corrections=corrections(own, measured.profile.joint, FAR_OFF),
         doubt=doubt,
+        unexplained_probability=weighed.unknown if verdict == weighed.verdict else None,
     )
     servo = corrected(ranking.asked, own, FAR_OFF, guess.fit.x, driven_only=True) if sure else None
     told = Diagnosed(said, profile if worth else None, findings, puzzling, corrected=servo)
@@ -372,16 +371,7 @@ def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool)
     """The experiment that tells the likeliest two apart; None if the first is sure."""
     if not measured.runs:
         return GAUGE_BACK if one_way else None
-    velocity = ranking.asked.judge.windows.start[:, 1]
-    least = SLOWEST * float(np.ptp(measured.profile.joint.range))
-    means = Means(
-        joint=measured.profile.joint,
-        inertia=measured.single.inertia,
-        speed=max(float(np.sqrt(np.mean(velocity**2))), least),
-        h=ranking.asked.base.h,
-        sigma=measured.floor,
-        forced=any(run.pushed for run in measured.runs),
-    )
+    means = means_of(measured, ranking.asked.judge.windows, ranking.asked.base.h)
     if one_way:
         return there_and_back(means).sentence
     if weighed.verdict == "unexplained":

@@ -120,6 +120,11 @@ class Weighed:
         return tuple(zip(self.effects, self.probabilities, strict=True))
 
     @property
+    def unknown(self) -> float | None:
+        """Probability that it is none of these; None where nothing was weighed."""
+        return max(1.0 - sum(self.probabilities), 0.0) if self.probabilities else None
+
+    @property
     def likely(self) -> bool:
         """Whether an effect is missing, and one of those named is more likely than not."""
         return self.verdict == "missing_effect" and sum(self.probabilities) > EVEN

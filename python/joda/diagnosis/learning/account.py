@@ -13,6 +13,7 @@ from joda.diagnosis.learning.ensemble import (
     over_position,
     over_speed,
 )
+from joda.diagnosis.learning.experiment import narrowing
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.formula import Formula, formula
 from joda.diagnosis.learning.law import Memory
@@ -48,6 +49,7 @@ class Account:
         memory: what it remembers.
         gain, time: of the memory, see `joda.effects.LearnedForce`; None without one.
         formula: few terms that do as well, beside the memory; None if none do.
+        next_experiment: that would make the bands narrowest; None if none would by much.
         unit, force_unit: of the joint's position, and of a force on it.
     """
 
@@ -58,6 +60,7 @@ class Account:
     gain: Number | None
     time: Number | None
     formula: Formula | None
+    next_experiment: str | None
     unit: str
     force_unit: str
 
@@ -83,6 +86,7 @@ def account(train: Measured, held: Measured, learned: Learned, unseen: float) ->
         gain=gain,
         time=time,
         formula=formula(train, held, learned, unseen),
+        next_experiment=narrowing(train, learned),
         unit=train.profile.joint.unit,
         force_unit=train.profile.joint.force_unit,
     )
@@ -126,6 +130,8 @@ def sentences(told: Account) -> list[str]:
         )
     elif told.position or told.speed:
         out.append("No formula of few terms is as good and stable.")
+    if told.next_experiment:
+        out.append(f"Next experiment: {told.next_experiment}")
     return out
 
 

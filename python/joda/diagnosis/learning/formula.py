@@ -138,7 +138,7 @@ class Terse(Law):
 
 def formula(train: Measured, held: Measured, learned: Learned, unseen: float) -> Formula | None:
     """A formula for a law; None if none does as well or is stable, or resistances differ along the
-    way.
+    way, or it only remembers.
 
     Args:
         train: the joint and runs to fit.
@@ -147,7 +147,7 @@ def formula(train: Measured, held: Measured, learned: Learned, unseen: float) ->
         unseen: its error on these, in windows.
     """
     law, learner = learned.law, Learner(train)
-    if law.terms.along:
+    if law.terms.along or not (law.terms.position or law.terms.speed):
         return None
     x, draws = learned.fit.x[learner.base.count :], drawn(learner, learned)
     curves, others = _curves(law, x), [_curves(law, one) for one in draws]

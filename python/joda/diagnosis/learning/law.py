@@ -161,7 +161,7 @@ class Law:
         """Of the memory, in its effect's unit."""
         if self.terms.memory == "none":
             return 0.0
-        gain = float(self._split(x)[3][0])
+        gain = float(self.remembered(x)[0])
         if self.terms.memory == "speed":
             return gain / self.fastest
         return max(gain, 0.0) * self.force / self.span  # bounds hold but nearly
@@ -170,7 +170,11 @@ class Law:
         """Of the memory, s."""
         if self.terms.memory == "none":
             return self.terms.time
-        return float(self.terms.time * np.exp(self._split(x)[3][1]))
+        return float(self.terms.time * np.exp(self.remembered(x)[1]))
+
+    def remembered(self, x: Array) -> Array:
+        """The memory's numbers."""
+        return self._split(x)[3]
 
     def _split(self, x: Array) -> list[Array]:
         return np.split(x, np.cumsum(self._counts)[:-1])

@@ -1,0 +1,64 @@
+"""The motion that would tell most of a learned law: after it the law's band is narrowest."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._core import Solo
+from joda.diagnosis.judge import Judge
+from joda.diagnosis.learning.fitting import Learned, Learner
+from joda.diagnosis.learning.law import Law
+from joda.diagnosis.probes import Model, means_of, menu, recorded
+from joda.measured.reading import Measured
+
+Array = NDArray[np.float64]
+
+NARROWER = 0.9
+"""Part of the band's width to which a motion worth making brings it."""
+
+
+def narrowing(train: Measured, learned: Learned) -> str | None:
+    """What to do next with the joint, a sentence; None if no motion of the menu tells much more.
+
+    Args:
+        train: the joint and runs that were fitted.
+        learned: the law; it counts as true.
+    """
+    learner, law = Learner(train), learned.law
+    unknowns, fit = learner.unknowns(law), learned.fit
+    means = means_of(train, learned.judge.windows, learned.judge.windows.h)
+
+    def make(x: Array) -> Solo:
+        return learner.solo(law, x, means.h)
+
+    known = np.diag(unknowns.doubt**-2.0)
+    known += learned.judge.linear(make, unknowns, fit.x, fit.start).normal()[0]
+    n = learner.base.count
+    off = np.eye(len(fit.x))[n:] * unknowns.step[n:, None]
+    here = _curves(law, fit.x[n:])
+    shapes = np.zeros((len(here), len(fit.x)))
+    for k, one in enumerate(off, start=n):
+        shapes[:, k] = (_curves(law, (fit.x + one)[n:]) - here) / unknowns.step[k]
+    now = _width(shapes, known)
+    best, told = None, NARROWER
+    for motion in menu(means):
+        windows = recorded(motion, Model(make, unknowns, fit.x), means)
+        judge = Judge(windows, windows.count > 0)
+        more = judge.linear(make, unknowns, fit.x, windows.start).normal()[0]
+        if (left := _width(shapes, known + more) / now) < told:
+            best, told = motion, left
+    if best is None:
+        return None
+    return f"{best.sentence} It would make the law's band {100 * (1 - told):.0f} % narrower."
+
+
+def _curves(law: Law, x: Array) -> Array:
+    """The law's curves with some numbers, one after the other, and what it remembers; in units of
+    the usual force."""
+    force = law.force_at(x) if law.terms.position else np.zeros(0)
+    resists = law.resistance(x) if law.terms.speed else np.zeros(0)
+    return np.concatenate([force / law.force, resists / law.force, law.remembered(x)])
+
+
+def _width(shapes: Array, known: Array) -> float:
+    """Of the band, the mean over the curves."""
+    return float(np.mean(np.sqrt(np.sum(shapes * np.linalg.solve(known, shapes.T).T, axis=1))))
