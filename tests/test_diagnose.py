@@ -265,6 +265,7 @@ ADD = "add model.xml run1.csv --joint joint -o new.xml --diagnosis"
         (f"{ADD} d.json -o there.xml", "there.xml: exists already"),
         ("improve model.xml run1.csv --joint joint -o there.xml", "there.xml: exists already"),
         ("demo --seed 3", "go with joda demo hidden-effect"),
+        ("demo hidden-effect --alien --position-only", "--alien needs the force"),
     ],
 )
 def test_a_mistake_is_one_sentence(mistaken, line, words):

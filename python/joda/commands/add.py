@@ -133,7 +133,8 @@ def add(
         mended, law = learn(train, held, progress)
     else:
         mended = mend(train, held, name, direction, near, progress)
-    told_law = account(train, held, law, mended.after.window) if law else None
+    known = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
+    told_law = account(train, held, law, mended.after.window, known) if law else None
     notes: list[str] = []
     if mended.effect:
         if not told_law:  # of a learned law nothing is where no run was

@@ -124,8 +124,8 @@ def mend(
     trials = Trials(train, held)
     with threadpool_limits(1, BLAS):
         begun = asked(train)
-        starts = _starts(begun, effect, direction, near)
-        tried = [one for start in starts for one in trials.reshaped(start, effect, told)]
+        begin = starts(begun, effect, direction, near)
+        tried = [one for start in begin for one in trials.reshaped(start, effect, told)]
         loss = trials.unseen.loss(train.profile)
 
     needs = Needs(train)
@@ -193,7 +193,7 @@ def _as_good(other: Tried, first: Tried) -> bool:
     return other.score < first.score + LIKELIER and not clearly(first.unseen, other.unseen)
 
 
-def _starts(
+def starts(
     begun: Asked, effect: str, direction: str | None, near: tuple[float, float] | None
 ) -> list[Profile]:
     """The profile with the effect at its most likely place, and if that is elsewhere, near one."""

@@ -17,7 +17,9 @@ from joda.diagnosis.learning.experiment import narrowing
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.formula import Formula, formula
 from joda.diagnosis.learning.law import Memory
+from joda.diagnosis.learning.nearest import Nearest, nearest
 from joda.diagnosis.outcome import draw_mended
+from joda.diagnosis.phrases import named
 from joda.measured.reading import Measured
 from joda.pictures.style import COLOURS, EFFECTS, house_style, note
 from joda.profile import Profile
@@ -49,6 +51,7 @@ class Account:
         memory: what it remembers.
         gain, time: of the memory, see `joda.effects.LearnedForce`; None without one.
         formula: few terms that do as well, beside the memory; None if none do.
+        nearest: the known effect that a diagnosis found likeliest; None if it found none.
         next_experiment: that would make the bands narrowest; None if none would by much.
         unit, force_unit: of the joint's position, and of a force on it.
     """
@@ -60,12 +63,15 @@ class Account:
     gain: Number | None
     time: Number | None
     formula: Formula | None
+    nearest: Nearest | None
     next_experiment: str | None
     unit: str
     force_unit: str
 
 
-def account(train: Measured, held: Measured, learned: Learned, unseen: float) -> Account:
+def account(
+    train: Measured, held: Measured, learned: Learned, unseen: float, known: str | None = None
+) -> Account:
     """What a law is that was learned from runs.
 
     Args:
@@ -73,6 +79,7 @@ def account(train: Measured, held: Measured, learned: Learned, unseen: float) ->
         held: the same with runs held out.
         learned: the law.
         unseen: its error on these, in windows.
+        known: the effect that a diagnosis found likeliest.
     """
     learner, law = Learner(train), learned.law
     x, draws = learned.fit.x[learner.base.count :], drawn(learner, learned)
@@ -86,6 +93,7 @@ def account(train: Measured, held: Measured, learned: Learned, unseen: float) ->
         gain=gain,
         time=time,
         formula=formula(train, held, learned, unseen),
+        nearest=nearest(train, held, known, unseen) if known else None,
         next_experiment=narrowing(train, learned),
         unit=train.profile.joint.unit,
         force_unit=train.profile.joint.force_unit,
@@ -130,6 +138,11 @@ def sentences(told: Account) -> list[str]:
         )
     elif told.position or told.speed:
         out.append("No formula of few terms is as good and stable.")
+    if told.nearest:
+        out.append(
+            f"Nearest of what has a name: {named(told.nearest.effect)}, "
+            f"{told.nearest.times:.2g} times worse on what was held out."
+        )
     if told.next_experiment:
         out.append(f"Next experiment: {told.next_experiment}")
     return out

@@ -1,0 +1,40 @@
+"""The known effect that comes nearest to a learned law, and how much worse it is."""
+
+from dataclasses import dataclass
+
+from threadpoolctl import threadpool_limits
+
+from joda.diagnosis.asking import asked
+from joda.diagnosis.judge import BLAS
+from joda.diagnosis.mending import error, starts
+from joda.measured.reading import Measured
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """A known effect beside a learned law.
+
+    Attributes:
+        effect: its name.
+        times: its error on what was held out, in windows, in the learned law's.
+    """
+
+    effect: str
+    times: float
+
+
+def nearest(train: Measured, held: Measured, effect: str, unseen: float) -> Nearest | None:
+    """How much worse a known effect is than a learned law, its numbers fitted to the same runs;
+    None if these tell nothing of it.
+
+    Args:
+        train: the joint and runs to fit.
+        held: the same with runs held out.
+        effect: its name.
+        unseen: the learned law's error on what was held out, in windows.
+    """
+    with threadpool_limits(1, BLAS):
+        profiles = starts(asked(train), effect, None, None)
+    if not profiles or not unseen:
+        return None
+    return Nearest(effect, error(held, profiles[0]).window / unseen)
