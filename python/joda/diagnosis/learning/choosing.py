@@ -80,8 +80,9 @@ class Learning:
 
     def _best(self, best: Tried, others: Iterator[Terms]) -> Tried:
         """One, or the best of others with more terms that are worth it."""
+        near = best
         for terms in others:
-            one = self.tried(terms, best if terms.memory != "none" else None)
+            one = self.tried(terms, near if terms.memory != "none" else None)
             if _worth(one, best):
                 best = one
         return best
