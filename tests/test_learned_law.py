@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from joda import add
+from joda import add, hidden_effect
 from joda.commands.add import sentences
 from joda.diagnosis.learning.account import account
 from joda.diagnosis.learning.choosing import Learning, learn
@@ -150,3 +150,15 @@ def test_the_root_of_a_speed_is_told_from_all_other_terms():
 def test_the_period_of_a_wave_is_found():
     q, n = np.linspace(-0.3, 0.9, 90), np.random.default_rng().uniform(12, 60)
     assert _period(q, 2 * np.sin(n * q + 1) + 0.5, 0.03) == pytest.approx((n,), rel=1e-3)
+
+
+@pytest.mark.long
+def test_the_demo_learns_a_law_that_has_no_name(tmp_path):
+    said = []
+    result = hidden_effect(tmp_path / "out", alien=True, say=said.append)
+    assert any("Learn the law from the runs" in sentence for sentence in said)
+    opened = next(k for k, sentence in enumerate(said) if "seal is opened" in sentence)
+    assert result.truth["effect"].replace("_", " ") in said[opened + 1]
+    assert result.judgement in said[opened + 2 :]
+    assert result.after.rmse_window < 0.5 * result.before.rmse_window
+    assert result.right == (result.diagnosis.verdict == "unexplained")

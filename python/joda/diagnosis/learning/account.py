@@ -104,31 +104,21 @@ def sentences(told: Account) -> list[str]:
     """A law for a person."""
     parts = []
     if told.position:
-        size, error = told.position.largest
+        size, error, _ = told.position.largest
         a, b = told.position.at[0], told.position.at[-1]
         parts.append(
             f"a force over position, up to {size:.3g} ± {error:.1g} {told.force_unit}, from "
             f"s = {a:.2f} to {b:.2f}"
         )
     if told.speed:
-        size, error = told.speed.largest
+        size, error, at = told.speed.largest
         way = ", different along the way" if told.along else ""
         parts.append(
             f"a resistance up to {size:.3g} ± {error:.1g} {told.force_unit} at "
-            f"{max(told.speed.at):.2g} {told.unit}/s{way}"
+            f"{at:.2g} {told.unit}/s{way}"
         )
-    if told.gain and told.time:
-        fastest = max(told.speed.at) if told.speed else 1.0
-        parts.append(
-            REMEMBERS[told.memory].format(
-                gain=told.gain,
-                time=told.time,
-                percent=100 * told.gain.value * fastest,
-                fastest=fastest,
-                force=told.force_unit,
-                unit=told.unit,
-            )
-        )
+    if remembered := _remembered(told):
+        parts.append(remembered)
     out = [f"Learned: {'; '.join(parts)}. Where no run was there is none of it."]
     if found := told.formula:
         beside = " beside this memory" if told.gain else ""
@@ -148,6 +138,21 @@ def sentences(told: Account) -> list[str]:
     return out
 
 
+def _remembered(told: Account) -> str:
+    """The memory in words; nothing without one."""
+    if not told.gain or not told.time:
+        return ""
+    fastest = max(told.speed.at) if told.speed else 1.0
+    return REMEMBERS[told.memory].format(
+        gain=told.gain,
+        time=told.time,
+        percent=100 * told.gain.value * fastest,
+        fastest=fastest,
+        force=told.force_unit,
+        unit=told.unit,
+    )
+
+
 def learned_picture(held: Measured, after: Profile, told: Account) -> "Figure":
     """The joint before and after, and the law with its band."""
     from matplotlib.figure import Figure
@@ -163,8 +168,8 @@ def learned_picture(held: Measured, after: Profile, told: Account) -> "Figure":
         left.set(xlabel=f"joint position ({joint.unit})", ylabel=f"force ({joint.force_unit})")
         _band(right, told.speed, 0.0, 1.0, EFFECTS)
         right.set(xlabel=f"velocity ({joint.unit}/s)", ylabel=f"resists with ({joint.force_unit})")
-        what = "what was learned, ± 2 standard deviations of an ensemble"
-        below.suptitle(what, x=0.02, ha="left", fontsize=10)
+        what = ["what was learned, ± 2 standard deviations of an ensemble", _remembered(told)]
+        below.suptitle("\n+ ".join(filter(None, what)), x=0.02, ha="left", fontsize=10)
         return figure
 
 

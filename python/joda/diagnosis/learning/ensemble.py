@@ -37,10 +37,10 @@ class Band:
     error: tuple[float, ...]
 
     @property
-    def largest(self) -> tuple[float, float]:
-        """The largest force, and its standard deviation."""
+    def largest(self) -> tuple[float, float, float]:
+        """The largest force, its standard deviation, and where it is."""
         k = int(np.argmax(np.abs(self.force)))
-        return abs(self.force[k]), self.error[k]
+        return abs(self.force[k]), self.error[k], abs(self.at[k])
 
 
 @dataclass(frozen=True)
