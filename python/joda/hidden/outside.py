@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.hidden import laws, rubbing, truth
+from joda.hidden import fleeting, laws, rubbing, truth
 from joda.hidden.die import Builder, Die, Hidden, everywhere
 
 
@@ -58,6 +58,32 @@ def _cable(die: Die) -> Hidden:
     return Hidden((law,), (taut, 1.0), force, die.unit(), "positive")
 
 
+def _fading(die: Die) -> Hidden:
+    force, joint = die.force(0.3, 0.8), die.joint
+    periods, phase = die.between(3, 6), die.between(0, 2 * np.pi)
+    velocity = die.between(0.3, 0.8) * joint.span / joint.time
+    return everywhere(fleeting.FadingWave(force, periods, phase, velocity), force, die.unit())
+
+
+def _drift(die: Die) -> Hidden:
+    force = die.force(0.2, 0.5)
+    law = fleeting.Drift(die.way() * force, die.between(0.8, 2.5) * die.joint.time)
+    return everywhere(law, force, die.unit())
+
+
+def _tremor(die: Die) -> Hidden:
+    force, count = die.force(0.15, 0.4), 7
+    frequencies = tuple(die.between(0.3, 3.0) / die.joint.time for _ in range(count))
+    phases = tuple(die.between(0, 2 * np.pi) for _ in range(count))
+    return everywhere(fleeting.Tremor(force, frequencies, phases), force, die.unit())
+
+
+def _ratchet(die: Die) -> Hidden:
+    force, way = die.force(0.3, 0.7), die.way()
+    law = fleeting.Ratchet(force, die.between(6, 14), way)
+    return everywhere(law, force, die.unit(), way)
+
+
 BEYOND: dict[str, Builder] = {
     "maxwell_relaxation": _relaxation,
     "friction_ageing": _ageing,
@@ -67,4 +93,8 @@ BEYOND: dict[str, Builder] = {
     "actuation_delay": _delay,
     "periodic_disturbance": _shaking,
     "pulling_cable": _cable,
+    "fading_detent": _fading,
+    "temperature_drift": _drift,
+    "tremor": _tremor,
+    "ratchet": _ratchet,
 }
