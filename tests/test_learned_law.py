@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from gauging import SPAN, gauged
 
 from joda import add, hidden_effect
 from joda.commands.add import sentences
@@ -137,6 +138,20 @@ def test_the_command_adds_it(tmp_path):
     held = [tmp_path / run.name for run in case.held_out]
     after = read_measured(new, case.joint, held)
     assert error(after).window < 0.5 * error(unseen).window
+
+
+def test_a_wave_is_learned_from_a_curve(tmp_path):
+    periods = np.random.default_rng().uniform(3, 6)
+    gauged(tmp_path, lambda s, way: 0.6 * np.sin(2 * np.pi * periods * s), noise=0.02)
+    said, new = tmp_path / "said.json", tmp_path / "new.xml"
+    said.write_text(json.dumps({"verdict": "unexplained", "effects": []}))
+    curve = [tmp_path / "curve.csv"]
+    found = add(tmp_path / "model.xml", "door", said, curve, new, effect="learned_force")
+    assert found.after.window < 0.1 * found.before.window + 0.04
+    sine, cosine = found.learned.formula.terms
+    assert np.hypot(sine.factor, cosine.factor) == pytest.approx(0.6, rel=0.05)
+    n = float(sine.term.removeprefix("sin(").removesuffix(" q)"))
+    assert n == pytest.approx(2 * np.pi * periods / SPAN, rel=0.02)
 
 
 def test_the_root_of_a_speed_is_told_from_all_other_terms():

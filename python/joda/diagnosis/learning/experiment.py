@@ -17,12 +17,15 @@ NARROWER = 0.9
 
 
 def narrowing(train: Measured, learned: Learned) -> str | None:
-    """What to do next with the joint, a sentence; None if no motion of the menu tells much more.
+    """What to do next with the joint, a sentence; None if no motion of the menu tells much more, or
+    nothing moved in what there is.
 
     Args:
         train: the joint and runs that were fitted.
         learned: the law; it counts as true.
     """
+    if not train.runs:
+        return None
     learner, law = Learner(train), learned.law
     unknowns, fit = learner.unknowns(law), learned.fit
     means = means_of(train, learned.judge.windows, learned.judge.windows.h)

@@ -19,6 +19,7 @@ from joda.diagnosis.learning.law import Law, Terms
 from joda.diagnosis.reshaping import LONGER, checked
 from joda.joints.least_squares import Inequalities
 from joda.measured.reading import Measured
+from joda.measured.runs import QuasiStatic, Run
 from joda.profile import Profile
 
 Array = NDArray[np.float64]
@@ -73,7 +74,9 @@ class Learner:
         windows, joint = self.windows[0], self.train.profile.joint
         units = units_of(windows, self.train)
         lo, hi = joint.range
-        s = (windows.position - lo) / (hi - lo)
+        logs: list[Run | QuasiStatic] = [*self.train.runs]
+        logs = logs or [one.curve for one in self.train.curves]
+        s = (np.concatenate([log.position for log in logs]) - lo) / (hi - lo)
         a, b = float(np.clip(s.min(), 0, 1)), float(np.clip(s.max(), 0, 1))
         interval = a if a > AT_END else 0.0, b if b < 1 - AT_END else 1.0
         speeds = np.abs(windows.start[:, 1])
