@@ -92,6 +92,15 @@ def test_the_other_tutorial_repairs_the_arm(tmp_path):
     assert all(float(b) < 0.1 * float(a) for a, b in zip(before, after, strict=True))
 
 
+@pytest.mark.long
+def test_what_has_no_name_is_learned(tmp_path):
+    told = [run(command, tmp_path) for command in blocks("unknown.md", "sh")[0].splitlines()]
+    assert masked(blocks("unknown.md", "text")[0]) <= masked(told[1])
+    assert "The seal is opened:" in told[0]
+    (stiffness,) = re.findall(r"stiffness ([\d.]+) ± ", told[1])
+    assert float(stiffness) == pytest.approx(13.9, rel=0.05)
+
+
 @pytest.mark.long("my_door")
 def test_a_log_of_mujoco_becomes_a_run(my_door):
     folder, _ = my_door
