@@ -1,6 +1,7 @@
 """Laws of no catalogue are learned from runs: planted truths are recovered, and noise is not."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from gauging import SPAN, gauged
 
 from joda import add, hidden_effect
 from joda.commands.add import sentences
+from joda.commands.hidden_effect import _judged_law
 from joda.diagnosis.learning.account import account
 from joda.diagnosis.learning.choosing import Learning, learn
 from joda.diagnosis.learning.formula import _period, _sets, _solved
@@ -18,6 +20,13 @@ from joda.diagnosis.mending import error
 from joda.diagnosis.split import parted
 from joda.hidden import draw, write
 from joda.measured.reading import read_measured
+
+
+def diagnosed(verdict, *effects):
+    """A diagnosis, as far as the demo looks at it."""
+    return SimpleNamespace(
+        verdict=verdict, effects=[SimpleNamespace(effect=effect) for effect in effects]
+    )
 
 
 def planted(folder, effect):
@@ -165,6 +174,18 @@ def test_the_root_of_a_speed_is_told_from_all_other_terms():
 def test_the_period_of_a_wave_is_found():
     q, n = np.linspace(-0.3, 0.9, 90), np.random.default_rng().uniform(12, 60)
     assert _period(q, 2 * np.sin(n * q + 1) + 0.5, 0.03) == pytest.approx((n,), rel=1e-3)
+
+
+def test_the_demo_judges_what_was_learned():
+    none = diagnosed("unexplained")
+    half, tenth, one = (SimpleNamespace(rmse_window=error) for error in (0.5, 0.1, 1.0))
+    told, right = _judged_law(none, {}, one, tenth)
+    assert (told, right) == ("What was learned leaves 10 % of the error on unseen runs.", True)
+    assert not _judged_law(none, {}, one, half)[1]
+    assert _judged_law(none, {}, one, None) == ("Missed: nothing was learned.", False)
+    told, right = _judged_law(diagnosed("missing_effect", "backlash"), {}, one, tenth)
+    assert told.startswith("It has no name, and was taken for play between")
+    assert not right
 
 
 @pytest.mark.long

@@ -219,9 +219,9 @@ def _judged_law(
     """The same of a law that has no name: a sentence, and whether it was told to be unknown and
     unseen runs are missed by much less with what was learned."""
     known = diagnosis.verdict != "unexplained"
-    said = f"It has no name, and was taken for {named(diagnosis.effects[0].effect)}. " * (
-        known and bool(diagnosis.effects)
-    )
+    said = ""
+    if known and diagnosis.effects:
+        said = f"It has no name, and was taken for {named(diagnosis.effects[0].effect)}. "
     if after is None or not before.rmse_window or not after.rmse_window:
         return f"{said}Missed: nothing was learned.", False
     part = after.rmse_window / before.rmse_window
