@@ -55,7 +55,7 @@ class Learner:
     def __init__(self, train: Measured) -> None:
         """Args: the joint and runs to fit."""
         self.train = train
-        self.single = replace(as_it_is(train), servo=train.single.servo)
+        self.single = as_it_is(train)
         usual_length = windows_for(train).length
         lengths = [factor * usual_length for factor in LONGER] if train.runs else [usual_length]
         # at the scene's own step
