@@ -16,6 +16,7 @@ from joda.propose.asking import Effort
 from joda.propose.history import History
 from joda.propose.session import PICTURES, Progress, Session, relative, silent
 from joda.scenes.model import find_joint, joint_name, joint_type, load_model
+from joda.scenes.shelf import loading_once
 from joda.template import read_templates
 
 ROUNDS = 3
@@ -96,8 +97,9 @@ def generate(
         chosen = choose(proposer, key, vlm, base_url, effort)
         if check := getattr(chosen, "check", None):
             check(read_templates(further))
-    session = begin(folder, source, name, describe, further, key, resume, progress)
-    run(session, choose(proposer, session.history.key, vlm, base_url, effort), rounds, force)
+    with loading_once(source):
+        session = begin(folder, source, name, describe, further, key, resume, progress)
+        run(session, choose(proposer, session.history.key, vlm, base_url, effort), rounds, force)
     return Generated(folder, session.history, tuple(session.notes))
 
 

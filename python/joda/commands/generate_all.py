@@ -16,6 +16,7 @@ from joda.propose.offline import Offline
 from joda.propose.session import PICTURES, Session
 from joda.propose.sheet import Entry, sheet
 from joda.scenes.model import load_model
+from joda.scenes.shelf import loading_once
 
 Advance = Callable[[int, int, str], None]
 Results = dict[str, Generated | JodaError]
@@ -91,32 +92,33 @@ def generate_all(
     _check_target(target, force or resume)
     chosen = choose(proposer, key, vlm, base_url, effort)
     done: Results = {}
-    jobs = find_jobs(source, target, joint, done)
-    make_folder(target)
-    further = [Path(path) for path in templates]
-    sessions: dict[str, Session] = {}
-    pictures = BOTH_ENDS if isinstance(chosen, Offline) else PICTURES
-    batched = chosen if isinstance(chosen, BatchProposer) else None
-    for number, (label, job) in enumerate(jobs.items()):
-        progress(number, len(jobs), label)
-        try:
-            session = begin(
-                *(job.folder, job.model, job.joint, describe, further, key, resume),
-                pictures=pictures,
-            )
-            if batched is None:
-                own = choose(proposer, session.history.key, vlm, base_url, effort)
-                run(session, own, rounds, force)
-            elif session.pending(rounds) and not force:
-                session.check_unedited()
-            sessions[label] = session
-        except JodaError as error:
-            done[label] = error
-    if batched is not None:
-        _run_many(sessions, batched, rounds, target / "batch.json", done, progress)
-    for label, session in sessions.items():
-        if label not in done:
-            done[label] = Generated(session.folder, session.history, tuple(session.notes))
+    with loading_once(source):
+        jobs = find_jobs(source, target, joint, done)
+        make_folder(target)
+        further = [Path(path) for path in templates]
+        sessions: dict[str, Session] = {}
+        pictures = BOTH_ENDS if isinstance(chosen, Offline) else PICTURES
+        batched = chosen if isinstance(chosen, BatchProposer) else None
+        for number, (label, job) in enumerate(jobs.items()):
+            progress(number, len(jobs), label)
+            try:
+                session = begin(
+                    *(job.folder, job.model, job.joint, describe, further, key, resume),
+                    pictures=pictures,
+                )
+                if batched is None:
+                    own = choose(proposer, session.history.key, vlm, base_url, effort)
+                    run(session, own, rounds, force)
+                elif session.pending(rounds) and not force:
+                    session.check_unedited()
+                sessions[label] = session
+            except JodaError as error:
+                done[label] = error
+        if batched is not None:
+            _run_many(sessions, batched, rounds, target / "batch.json", done, progress)
+        for label, session in sessions.items():
+            if label not in done:
+                done[label] = Generated(session.folder, session.history, tuple(session.notes))
     progress(len(jobs), len(jobs), "drawing the contact sheet")
     write_sheet(target, done)
     progress(len(jobs), len(jobs), "done")

@@ -204,7 +204,7 @@ def refine(
         raise JodaError(f"{target}: not written, as {reason}.{noted}")
     hidden = unseen(begin, parameters, result.covariance, away)
     also, besides = _beyond(parameters, result.theta, compiled, number, found)
-    scene, said = attached(source, after, target, joint=name, native="keep", also=also)
+    scene, said, _ = attached(source, after, target, joint=name, native="keep", also=also)
     notes += [*said, *besides, *problem.notes, *extrapolated(before, after, away)]
     balance = np.array(found.positions), -np.array(found.gravity_force)
     paths = was, problem.paths(result.theta)

@@ -77,7 +77,7 @@ def scene_files(
     Returns:
         contents by path, and what is done there, a sentence each.
     """
-    content, notes = attached(model, profile, scene, joint=profile.joint.name, servo=servo)
+    content, notes, _ = attached(model, profile, scene, joint=profile.joint.name, servo=servo)
     return {scene: content, composed: profile.to_json()}, notes
 
 

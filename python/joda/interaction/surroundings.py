@@ -1,6 +1,5 @@
 """The scene around a joint, where more acts on it than a joint by itself feels."""
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 from joda.profile import Profile
 from joda.scenes.actuators import acting_on
 from joda.scenes.assembly import at_others_limit, put, taut
-from joda.scenes.attaching import attach
+from joda.scenes.attaching import in_scene
 from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact, contacts_along
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
@@ -73,10 +72,7 @@ class Surroundings:
 
         Actuators on the joint are off: its behaviour is what it does by itself.
         """
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, "scene.xml")
-            attach(self.path, profile, path, joint=self.joint)
-            model = load_model(path)
+        model = in_scene(self.path, profile, self.joint)
         number = find_joint(model, self.joint)
         for actuator in acting_on(model, number):
             model.actuator_gainprm[actuator] = model.actuator_biasprm[actuator] = 0.0

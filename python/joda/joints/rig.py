@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
-from joda.scenes.attaching import attach
+from joda.scenes.attaching import in_scene
 from joda.scenes.context import Context
-from joda.scenes.model import load_model
 from joda.scenes.native import Row, native_attributes
 
 GRAVITY = 9.81
@@ -82,10 +81,9 @@ def rig(
         update={"joint": profile.joint.model_copy(update={"name": "joint"})}
     )
     with tempfile.TemporaryDirectory() as folder:
-        bare, scene = Path(folder, "bare.xml"), Path(folder, "scene.xml")
+        bare = Path(folder, "bare.xml")
         bare.write_text(text)
-        attach(bare, on_rig, scene)
-        return load_model(scene)
+        return in_scene(bare, on_rig)
 
 
 def _actuator(servo: Servo) -> str:

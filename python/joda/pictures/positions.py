@@ -7,6 +7,7 @@ of its motion, can be seen. All the work is done in a child process, see `joda.p
 import io
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 
 from joda.errors import JodaError
 from joda.files import check_target, file_name, make_folder, write_bytes
+from joda.pictures.canvas import Canvas
 from joda.pictures.caption import captioned
 from joda.pictures.offscreen import Image, answer, ask
 from joda.pictures.stage import Stage, View
@@ -23,9 +25,13 @@ from joda.pictures.style import clean
 from joda.profile import Joint
 from joda.scenes.model import describe_joint, find_joint, load_model
 from joda.scenes.part import Array, moving
+from joda.scenes.shelf import shelf_name
 
 ARROW = (0.95, 0.36, 0.05)
 AXIS = (0.12, 0.12, 0.14)
+
+COMPRESSED = 3
+"""Of 9, zlib's: files are a tenth larger than with its usual 6, and made in half the time."""
 
 ELEVATIONS = (-42.0, -22.0)
 FROM_BELOW = -ELEVATIONS[1]
@@ -59,19 +65,19 @@ def render(
     """
     if count < 2:
         raise JodaError(f"count is {count}; give at least 2 pictures, one for each end.")
-    request = [str(model), joint, str(output), count, force]
+    request = [str(model), joint, str(output), count, force, shelf_name()]
     return [Path(target) for target in ask("joda.pictures.positions", request)]
 
 
 def _make(request: Any) -> list[str]:
     """In the child: renders and writes the pictures that `render` is asked for."""
-    path, address, folder, count, force = request
-    model = load_model(Path(path))
+    path, address, folder, count, force, shelf = request
+    model, canvas = _opened(path, shelf)
     index = find_joint(model, address)
     joint = describe_joint(model, index)
     if not moving(model, index):
         raise JodaError(f"{path}: joint '{joint.name}' moves no geom that can be seen.")
-    stage = Stage(model, index)
+    stage = Stage(copy(model), index, canvas)
     fractions = np.linspace(0, 1, count)
     stem = file_name(joint.name)
     digits = max(2, len(str(count - 2)))
@@ -88,6 +94,18 @@ def _make(request: Any) -> list[str]:
     return [str(target) for target in targets]
 
 
+def _opened(path: str, shelf: str | None) -> tuple[mujoco.MjModel, Canvas]:
+    """A file's model and a canvas for it: the last ones, where they are of the same shelf."""
+    if shelf is None or (path, shelf) not in _last:
+        _last.clear()
+        model = load_model(Path(path))
+        _last[path, shelf] = model, Canvas(model)
+    return _last[path, shelf]
+
+
+_last: dict[tuple[str, str | None], tuple[mujoco.MjModel, Canvas]] = {}
+
+
 def _label(joint: Joint, q: float, s: float) -> str:
     hinge = joint.type == "hinge"
     other = f"{np.rad2deg(q):.1f}°" if hinge else f"{q * 1000:.4g} mm"
@@ -99,7 +117,7 @@ def _label(joint: Joint, q: float, s: float) -> str:
 def _write(target: Path, label: str, image: Image) -> None:
     """Writes the picture as PNG, its label in the lower left corner."""
     content = io.BytesIO()
-    captioned(image, label).save(content, "png")
+    captioned(image, label).save(content, "png", compress_level=COMPRESSED)
     write_bytes(target, content.getvalue())
 
 

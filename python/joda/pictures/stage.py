@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.pictures.offscreen import HEIGHT, WIDTH, Image, opening
+from joda.pictures.canvas import SMALL, Canvas
+from joda.pictures.offscreen import HEIGHT, WIDTH, Image
 from joda.scenes.part import Array, groups, moving, outline
 
 Mask = NDArray[np.bool_]
@@ -31,8 +32,6 @@ AMBIENT, DIFFUSE = 0.48, 0.50
 THROUGH = 0.35
 """How much of the axis and the arrow shows through what stands before them."""
 
-SCOUT = (96, 72)
-
 
 @dataclass(frozen=True)
 class View:
@@ -43,10 +42,10 @@ class View:
 
     def frame(self) -> Array:
         """Unit vectors to the right, up and forward, as rows."""
-        a, e = np.deg2rad([self.azimuth, self.elevation])
-        forward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-        right = np.array([np.sin(a), -np.cos(a), 0.0])
-        return np.stack([right, np.cross(right, forward), forward])
+        a, e = np.deg2rad(self.azimuth), np.deg2rad(self.elevation)
+        right = np.sin(a), -np.cos(a), 0.0
+        up = -np.cos(a) * np.sin(e), -np.sin(a) * np.sin(e), np.cos(e)
+        return np.array([right, up, (np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e))])
 
     def camera(self, points: Array) -> mujoco.MjvCamera:
         """The nearest camera that has all points, shape (n, 3), within MARGIN of the frame."""
@@ -76,17 +75,13 @@ class Stage:
         part: geoms that the joint moves.
     """
 
-    def __init__(self, model: mujoco.MjModel, joint: int) -> None:
-        """Makes the OpenGL context; raises NoRenderer."""
+    def __init__(self, model: mujoco.MjModel, joint: int, canvas: Canvas) -> None:
+        """Args: a model to change; a joint's index; a canvas that was made for the same model."""
         self.model, self.data = model, mujoco.MjData(model)
+        self._canvas = canvas
         self.joint, self.part = joint, moving(model, joint)
         self._outlines = [outline(model, g) for g in self.part]
         self._prepare()
-        with opening():
-            self._gl = mujoco.GLContext(WIDTH, HEIGHT)
-            self._gl.make_current()
-            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._scene = mujoco.MjvScene(model, maxgeom=4 * model.ngeom + 2000)
         for flag in ("SHADOW", "REFLECTION", "HAZE", "SKYBOX"):
             self._scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = False
@@ -98,19 +93,13 @@ class Stage:
     def _prepare(self) -> None:
         """Evens out the light, and sizes the frame for scouting."""
         model = self.model
-        # Textures are slow to upload, and scouting needs none of them.
-        self._texture_sizes = model.tex_width.copy(), model.tex_height.copy()
-        flat = model.tex_type == int(mujoco.mjtTexture.mjTEXTURE_2D)
-        model.tex_width[:], model.tex_height[:] = 1, np.where(flat, 1, 6)
+        self._canvas.resize(*SMALL)
         model.light_active[:] = 0
         model.vis.headlight.active = 1
         model.vis.headlight.ambient[:] = AMBIENT
         model.vis.headlight.diffuse[:] = DIFFUSE
         model.vis.headlight.specular[:] = 0.08
         model.vis.global_.fovy = FOVY
-        model.vis.global_.offwidth, model.vis.global_.offheight = SCOUT
-        model.vis.quality.offsamples = 4
-        model.vis.quality.shadowsize = 0
 
     def pose(self, position: float) -> None:
         """Moves the joint, rad or m."""
@@ -157,13 +146,16 @@ class Stage:
 
     def scout(self, cameras: list[mujoco.MjvCamera]) -> list[Mask]:
         """Where each camera sees the part in this pose, shape (72, 96)."""
-        self._update(cameras[0])
-        ids = [geom.segid + 1 for geom, inside in self._drawn() if inside]
+        model = self.model
+        own = model.geom_matid.copy(), model.geom_rgba.copy()
         masks = []
         for camera in cameras:
-            mujoco.mjv_updateCamera(self.model, self.data, camera, self._scene)
-            pixels = self._read(*SCOUT, segments=True).astype(np.int64)
+            self._hide(self._away(camera))
+            self._update(camera)
+            ids = [geom.segid + 1 for geom, inside in self._drawn() if inside]
+            pixels = self._read(*SMALL, segments=True).astype(np.int64)
             masks.append(np.isin(pixels @ [1, 256, 65536], ids))
+            model.geom_matid[:], model.geom_rgba[:] = own
         return masks
 
     def settle(self, camera: mujoco.MjvCamera, mark: Callable[[mujoco.MjvScene], None]) -> None:
@@ -173,10 +165,10 @@ class Stage:
         mask = self.scout([camera])[0]
         self._usual = np.full(3, 0.5)
         if mask.any():
-            self._usual = np.median(self._bare(*SCOUT)[mask], axis=0) / 255
+            self._usual = np.median(self._bare(*SMALL)[mask], axis=0) / 255
         materials = [g.matid for g, inside in self._drawn() if inside and g.matid >= 0]
         self._textured = bool(np.any(self.model.mat_texid[materials] >= 0))
-        mujoco.mjr_resizeOffscreen(WIDTH, HEIGHT, self._context)
+        self._canvas.resize(WIDTH, HEIGHT)
         self._update(camera)
         self._scene.ngeom = 0
         self._add_backdrop()
@@ -187,6 +179,15 @@ class Stage:
 
     def _forget(self, camera: mujoco.MjvCamera) -> None:
         """Hides the geoms that the camera cannot see, and uploads the textures of the others."""
+        model, away = self.model, self._away(camera)
+        others = (model.geom_matid[~away], model.skin_matid, model.flex_matid, model.tendon_matid)
+        unused = set(model.geom_matid[away]).difference(*others)
+        self._hide(away)
+        used = [k for k in range(model.nmat) if k not in unused]
+        self._canvas.upload(model, set(model.mat_texid[used].ravel().tolist()) - {-1})
+
+    def _away(self, camera: mujoco.MjvCamera) -> NDArray[np.bool_]:
+        """The geoms, of the part none, that lie wholly outside what a camera sees in this pose."""
         model = self.model
         forward = View(camera.azimuth, camera.elevation).frame()[2]
         way = self.data.geom_xpos - (camera.lookat - camera.distance * forward)
@@ -196,13 +197,10 @@ class Stage:
         away = aside * np.cos(angle) - depth * np.sin(angle) > model.geom_rbound
         away &= model.geom_rbound > 0  # a plane has no bound
         away[self.part] = False
-        others = (model.geom_matid[~away], model.skin_matid, model.flex_matid, model.tendon_matid)
-        unused = set(model.geom_matid[away]).difference(*others)
-        model.geom_matid[away], model.geom_rgba[away] = -1, 0
-        model.tex_width[:], model.tex_height[:] = self._texture_sizes
-        used = [k for k in range(model.nmat) if k not in unused]
-        for texture in set(model.mat_texid[used].ravel()) - {-1}:
-            mujoco.mjr_uploadTexture(model, self._context, texture)
+        return np.asarray(away)
+
+    def _hide(self, geoms: NDArray[np.bool_]) -> None:
+        self.model.geom_matid[geoms], self.model.geom_rgba[geoms] = -1, 0
 
     def shoot(self) -> Image:
         """The picture in this pose; marks that stand behind something show through faintly."""
@@ -275,11 +273,7 @@ class Stage:
     def _read(self, width: int, height: int, segments: bool = False) -> Image:
         for flag in (mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR):
             self._scene.flags[flag] = segments
-        rect = mujoco.MjrRect(0, 0, width, height)
-        mujoco.mjr_render(rect, self._scene, self._context)
-        image = np.empty((height, width, 3), np.uint8)
-        mujoco.mjr_readPixels(image, None, rect, self._context)
-        return image[::-1]
+        return self._canvas.draw(self._scene, width, height)
 
 
 def _tint(colour: Array, change: Array) -> Array:

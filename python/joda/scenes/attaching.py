@@ -7,10 +7,11 @@ damping).
 """
 
 import os
+import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import mujoco
 import numpy as np
@@ -62,9 +63,23 @@ def attach(
     """
     output = Path(output)
     check_target(output, force)
-    content, notes = attached(model, profiles, output, joint=joint, native=native, also=also)
-    write_bytes(output, content)
-    return notes
+    made = attached(model, profiles, output, joint=joint, native=native, also=also)
+    write_bytes(output, made.content)
+    return made.notes
+
+
+class Attached(NamedTuple):
+    """A scene with profiles: the file's content, what was done, and the scene compiled."""
+
+    content: bytes
+    notes: list[str]
+    model: mujoco.MjModel
+
+
+def in_scene(model: Path, profile: Profile, joint: str | None = None) -> mujoco.MjModel:
+    """The scene that `attach` would write, compiled, without a file; raises JodaError as that."""
+    with tempfile.TemporaryDirectory() as folder:
+        return attached(model, profile, Path(folder, "scene.xml"), joint=joint).model
 
 
 def attached(
@@ -76,8 +91,8 @@ def attached(
     native: Literal["replace", "keep"] = "replace",
     also: Mapping[str, str] = MappingProxyType({}),
     servo: Servo | None = None,
-) -> tuple[bytes, list[str]]:
-    """The scene that `attach`, with the same arguments, writes to `output`, and what it tells.
+) -> Attached:
+    """The scene that `attach`, with the same arguments, writes to `output`.
 
     `servo`: of the actuators on the (only) joint, with another gain or delay; None: as they are.
     """
@@ -100,11 +115,13 @@ def attached(
     content = scene.finish(output.parent)
     changed = ["dof_invweight0"] * (scene.heavier or "armature" in also)
     changed += ["actuator_gainprm"] * (servo is not None)
-    _verify(output, content, compiled, changed)
-    return content, scene.notes
+    after = _verify(output, content, compiled, changed)
+    return Attached(content, scene.notes, after)
 
 
-def _verify(output: Path, content: bytes, before: mujoco.MjModel, changed: Collection[str]) -> None:
+def _verify(
+    output: Path, content: bytes, before: mujoco.MjModel, changed: Collection[str]
+) -> mujoco.MjModel:
     """Compiles the scene where it will lie; raises JodaError if it is not the model it was, but for
     what was changed."""
     trial = output.with_name(f".{output.stem}.{os.getpid()}.xml")
@@ -127,3 +144,4 @@ def _verify(output: Path, content: bytes, before: mujoco.MjModel, changed: Colle
                 f"{output}: written out by MuJoCo the model is another one ({name}); "
                 "attach to the file in which the joint itself is written."
             )
+    return after

@@ -6,8 +6,8 @@ makes on the joint, not that two geoms touch: a door that rests in its frame tou
 and is free.
 """
 
-from collections.abc import Iterable, Sequence
-from copy import copy
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -177,9 +177,7 @@ class _Sweep:
     def __init__(
         self, model: mujoco.MjModel, joint: int, described: Joint, home: bool = False
     ) -> None:
-        self.model = copy(model)  # pulled away from a contact by anything else, it shows no force
-        for kind in ALL_ELSE:
-            self.model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}"))
+        self.model = model
         self.data = at_home(self.model) if home else mujoco.MjData(self.model)
         self._others = self.data.qpos.copy()
         self.lo, hi = described.range
@@ -199,7 +197,22 @@ class _Sweep:
             self._looks[position] = self._look(position)
         return self._looks[position]
 
+    @contextmanager
+    def _nothing_else(self) -> Iterator[None]:
+        """Only contacts act: pulled away from one by anything else, the joint shows no force."""
+        before = self.model.opt.disableflags
+        for kind in ALL_ELSE:
+            self.model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}"))
+        try:
+            yield
+        finally:
+            self.model.opt.disableflags = before
+
     def _look(self, position: float) -> dict[Pair, Felt]:
+        with self._nothing_else():
+            return self._looked(position)
+
+    def _looked(self, position: float) -> dict[Pair, Felt]:
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         data.qpos[:] = self._others

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import mujoco
@@ -314,4 +315,6 @@ class EditedScene:
     def _new_name(self, joint: int) -> str:
         body = self.model.body(self.model.jnt_bodyid[joint]).name or "unnamed"
         base = re.sub(r"\W+", "_", f"{body}_joint")
-        return next(n for n in (base, *(f"{base}{k}" for k in range(10**6))) if n not in self.names)
+        if base not in self.names:
+            return base
+        return next(name for k in count() if (name := f"{base}{k}") not in self.names)

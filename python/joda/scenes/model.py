@@ -12,6 +12,7 @@ from joda.errors import JodaError
 from joda.profile import Joint, describe
 from joda.scenes.copies import refuse_copied_plugins
 from joda.scenes.engine import FORGETS_INSTANCES
+from joda.scenes.shelf import Loaded, kept
 
 _TYPES = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name
@@ -22,8 +23,12 @@ LONGEST_NAME = 1000
 """Bytes of a name in a model."""
 
 
-def load(path: Path) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
+def load(path: Path) -> Loaded:
     """An MJCF or URDF file, parsed and compiled; raises JodaError."""
+    return kept(path, _load)
+
+
+def _load(path: Path) -> Loaded:
     if not path.is_file():
         raise JodaError(f"{path}: no such file; give an MJCF or URDF file.")
     refuse_copied_plugins(path)

@@ -92,8 +92,8 @@ def _local(model: mujoco.MjModel, geom: int) -> Array:
         vertices = model.mesh_vert[first : first + count].astype(float)
         if count <= _VERTICES:
             return np.asarray(vertices)
-        along = vertices @ _BALL.T  # what reaches farthest in any of these directions
-        return np.asarray(vertices[np.unique([along.argmax(axis=0), along.argmin(axis=0)])])
+        farthest = (_BALL @ vertices.T).argmax(axis=1)  # in any of these directions
+        return np.asarray(vertices[np.unique(farthest)])
     if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
         return np.concatenate([_RING * [size[0], size[0], z] for z in (-size[1], size[1])])
     if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
