@@ -4,19 +4,25 @@ import json
 import secrets
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
 from articulated import objects
 from joint_table import judge, made
 
 from joda import context, generate, schema
 from joda.errors import JodaError
-from joda.propose import Task
-from joda.propose.archetype import Force, forces, read_archetypes
+from joda.proposal import Strength
+from joda.propose import Answer, Task
+from joda.propose.archetype import read_archetypes
 from joda.propose.history import History
 from joda.propose.naming import _vocabulary, concepts, said
 from joda.propose.offline import Offline
+from joda.propose.plausible import Force, forces
 from joda.propose.recognise import recognise
 from joda.propose.wishes import Wanted, read_wishes, state
+from joda.scenes.model import find_joint
+from joda.scenes.motion import settle
 from joda.template import read_templates
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -305,3 +311,107 @@ def test_what_a_part_is_on_is_told_by_the_nearest_name(tmp_path):
     found = recognise(context(path, "j"))[1]
     assert "the object is called oven" in [one.feature for one in found.decided]
     assert found.title == "selector knob"
+
+
+# --- how fast it shuts, where it holds
+@pytest.mark.parametrize(
+    ("said", "wish"),
+    [
+        ("It shuts with at most 0.4 m/s at the handle.", Wanted("arrives", most=0.4)),
+        ("It closes by itself and arrives with less than 1.5 m/s.", Wanted("arrives", most=1.5)),
+        ("It holds between 20 and 110 degrees.", Wanted("holds_between", 20, 110)),
+        ("The lid stays where it is from 15 to 62.5 degrees.", Wanted("holds_between", 15, 62.5)),
+    ],
+)
+def test_a_speed_and_angles_can_be_said(said, wish):
+    assert wish in read_wishes(said)
+    assert read_wishes(state([wish])) == [wish]
+
+
+BOX = """<mujoco model="{called}"><compiler angle="radian"/><worldbody>
+  <geom type="box" size="{half} .25 .02" pos="{half} 0 -.4"/>
+  <geom type="box" size="{half} .02 .2" pos="{half} .23 -.2"/>
+  <geom type="box" size="{half} .02 .2" pos="{half} -.23 -.2"/>
+  <geom type="box" size=".02 .25 .2" pos=".02 0 -.2"/>
+  <geom type="box" size=".02 .25 .2" pos="{front} 0 -.2"/>
+  <body name="lid"><joint name="lid" axis="0 -1 0" range="0 {widest}" pos="0 0 .02"/>
+    <geom type="box" size="{half} .25 .015" pos="{half} 0 .017" mass="{mass}"/></body>
+</worldbody></mujoco>"""
+
+
+def chest(folder, called):
+    drawn = secrets.SystemRandom()
+    half = drawn.uniform(0.2, 0.3)
+    numbers = {"half": half, "front": 2 * half - 0.02, "mass": drawn.uniform(1.5, 4)}
+    path = folder / f"{called}.xml"
+    path.write_text(BOX.format(called=called, widest=drawn.uniform(1.4, 1.9), **numbers))
+    return path
+
+
+def test_a_toy_chests_lid_holds_between_the_standards_angles(tmp_path):
+    """Nothing of it is asked of the simulation's own sentence: it is let go here."""
+    path = chest(tmp_path, "toybox")
+    last = generate(path, "lid", tmp_path / "toy", proposer="offline").history.rounds[-1]
+    assert last.recognised.title == "toy chest lid" and not last.unmet
+    scene = mujoco.MjModel.from_xml_path(str(tmp_path / "toy" / "scene.xml"))
+    joint = find_joint(scene, "lid")
+    for angle in (12, 35, 58):
+        rest = settle(scene, joint, np.radians(angle), 10).position[-1]
+        assert np.degrees(rest) == pytest.approx(angle, abs=1.3)  # 12.7 mm of 0.56 m
+    last = generate(chest(tmp_path, "box"), "lid", tmp_path / "box", proposer="offline")
+    other = last.history.rounds[-1]
+    assert "falls shut" in " ".join(other.met) and other.recognised.force.shuts.most == 3.5
+
+
+def test_a_door_that_would_slam_is_slowed(tmp_path):
+    limit = secrets.SystemRandom().uniform(0.1, 0.3)
+    said = f"It goes back by itself from anywhere; it shuts with at most {limit:.2f} m/s."
+    out = tmp_path / "out"
+    done = generate(MODELS / "refrigerator.xml", "door", out, proposer="offline", describe=said)
+    last = done.history.rounds[-1]
+    found = context(MODELS / "refrigerator.xml", "door")
+    assert not last.unmet and last.behaviour.fastest.speed * found.lever_arm <= limit + 0.005
+    assert f"It shuts with at most {limit:.2g} m/s at the handle." in last.met
+
+
+class Slamming:
+    """Proposes nothing but a strong spring."""
+
+    name = "slamming"
+
+    def propose(self, task, turns):
+        if turns:
+            return Answer(None)
+        first = Offline().propose(task, ()).proposal
+        spring = first.effect_proposals[0].model_copy(
+            update={
+                "effect_name": "spring_return_to_low_end",
+                "start_ratio": 0.0,
+                "end_ratio": 1.0,
+                "strength": Strength(conservative="strong"),
+            }
+        )
+        update = {"effect_proposals": (spring,), "whole_motion_descrptn": "It closes."}
+        return Answer(first.model_copy(update=update))
+
+
+def test_what_somebody_proposes_is_held_against_real_joints(tmp_path):
+    """A laptop's lid that a spring slams shut: it should hold, and such lids take less."""
+    done = generate(MODELS / "laptop.xml", "lid", tmp_path / "lid", proposer=Slamming())
+    told = " ".join(done.history.rounds[-1].notes)
+    assert "which holds between 20 and 110 degrees (an estimate), but let go at" in told
+    done = generate(MODELS / "refrigerator.xml", "door", tmp_path / "door", proposer=Slamming())
+    told = " ".join(done.history.rounds[-1].notes)
+    assert "which shuts with at most 0.6 m/s at the handle (an estimate), but it arrives" in told
+
+
+def test_the_page_has_the_table_of_speeds_and_angles():
+    page = (MODELS.parent / "docs" / "generation.md").read_text()
+    for row in forces().values():
+        if row.shuts:
+            told = row.shuts.source or "estimate"
+            assert f"| {row.name} | shuts with at most {row.shuts.most:g} m/s | {told} |" in page
+        if row.holds:
+            a, b = row.holds.between
+            told = row.holds.source or "estimate"
+            assert f"| {row.name} | holds between {a:g} and {b:g} degrees | {told} |" in page

@@ -8,8 +8,8 @@ from test_behaviour import curve, joint, steady
 from joda.interaction.behaviour import behaviour
 from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
 
-NUMBERS = {"clicks": 5, "closes_from": 20, "takes": 5}
-MOST = {"takes": 10}
+NUMBERS = {"clicks": 5, "closes_from": 20, "takes": 5, "holds_between": 12}
+MOST = {"takes": 10, "arrives": 0.5, "holds_between": 45.5}
 ALL = [Wanted(name, NUMBERS.get(name, 0), MOST.get(name, 0)) for name in WISHES if name != "moves"]
 
 
@@ -166,6 +166,8 @@ CASES = {
     "left_open": (FRICTION, MAGNET),
     "falls_shut": (RETURN, MAGNET),
     "takes": (FRICTION, RETURN),
+    "arrives": (RETURN, ((steady(-8),), (), (steady(1),))),
+    "holds_between": (FRICTION, RETURN),
     "opens_past": (((curve((-4, 6)),), (steady(0.2),), (steady(5),)), RETURN),
     "held_shut": (MAGNET, ((steady(2),), (steady(0.1),), (steady(3),))),
     "caught": (CATCH, ((steady(-6),), (steady(0.2),), (steady(3),))),
@@ -180,6 +182,9 @@ CASES = {
     "free": (CATCH, FRICTION),
     "soft": (RETURN, ((steady(-8),), (), (steady(1),))),
 }
+
+
+ANGLES = {"closes_from", "holds_between"}
 
 
 def turning(found):
@@ -202,7 +207,7 @@ def test_a_wish_is_met_by_a_joint_that_does_it_and_not_by_one_that_does_not(tmp_
     for parts in (does, does_not):
         found, given = joint(tmp_path, *parts, mass=0.2 if name == "snaps" else 1.0, mirror=mirror)
         behaved = behaviour(found, given)
-        lacking.append(unmet(wanted, behaved, turning(found) if name == "closes_from" else found))
+        lacking.append(unmet(wanted, behaved, turning(found) if name in ANGLES else found))
     assert lacking[0] == {}
     assert list(lacking[1]) == [name]
     assert lacking[1][name].startswith(f"It {wanted[0].sentence}: no, ")
@@ -238,5 +243,6 @@ def test_another_angle_than_it_closes_from_is_told(tmp_path, degrees, said):
 
 def test_what_slides_has_no_degrees(tmp_path):
     found, given = joint(tmp_path, *SPRUNG)
-    lacking = unmet([Wanted("closes_from", 20)], behaviour(found, given), found)
-    assert "no degrees" in lacking["closes_from"]
+    wanted = [Wanted("closes_from", 20), Wanted("holds_between", 10, 20)]
+    lacking = unmet(wanted, behaviour(found, given), found)
+    assert all("no degrees" in lacking[name] for name in ANGLES)

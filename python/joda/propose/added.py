@@ -21,6 +21,9 @@ WISHED: dict[str, tuple[Part, ...]] = {
     "stays_put": (
         part("constant_friction_hinge", (0.1, 1), "it is to stay where left", friction="medium"),
     ),
+    "holds_between": (
+        part("constant_friction_hinge", (0.1, 1), "it is to hold there", friction="medium"),
+    ),
     "stays_half": (
         part("constant_friction_hinge", (0.3, 0.7), "it is to hold half-way", friction="strong"),
     ),
@@ -32,6 +35,7 @@ WISHED: dict[str, tuple[Part, ...]] = {
     "returns_to_middle": (part("detent_internal", (0, 1), "it is to return", "strong"),),
     "snaps": (part("detent_internal", (0.3, 0.7), "it is to snap through", "medium"),),
     "soft": (part("constant_damping_hinge", (0, 0.3), "it is to close softly", damping="medium"),),
+    "arrives": (part("constant_damping_hinge", (0, 0.3), "it is not to slam", damping="medium"),),
 }
 """What is added for a wish that the kind does not have."""
 

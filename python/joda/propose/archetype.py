@@ -18,6 +18,7 @@ from joda.errors import JodaError
 from joda.files import read_text
 from joda.profile import describe
 from joda.propose.parts import Part
+from joda.propose.plausible import forces
 from joda.propose.wishes import WISHES
 from joda.scenes.shape import Shape
 
@@ -84,40 +85,6 @@ class Archetypes(Frozen):
     """The content of a file of archetypes."""
 
     archetype: tuple[Archetype, ...]
-
-
-class Force(Frozen):
-    """What opening real joints of a kind takes.
-
-    Attributes:
-        name: the kind.
-        opening: within which the most lies that a slow hand needs, at the handle, N.
-        basis: a standard's bound, a measurement, or the authors' estimate.
-        source: where it is from; empty for an estimate.
-    """
-
-    name: str
-    opening: tuple[float, float]
-    basis: Literal["standard", "measured", "estimate"]
-    source: str
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if (self.basis == "estimate") != (not self.source):
-            raise ValueError("a source is needed, but for an estimate")
-        return self
-
-
-class _Forces(Frozen):
-    joint: tuple[Force, ...]
-
-
-@cache
-def forces() -> dict[str, Force]:
-    """The measured joints of `forces.toml`, by name."""
-    text = (files("joda.propose") / "forces.toml").read_text("utf-8")
-    rows = _Forces.model_validate(tomllib.loads(text)).joint
-    return {row.name: row for row in rows}
 
 
 def read_archetypes(folders: Sequence[str | Path] = ()) -> tuple[Archetype, ...]:

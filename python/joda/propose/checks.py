@@ -156,6 +156,21 @@ def takes(seen: Seen) -> str:
     )
 
 
+def arrives(seen: Seen) -> str:
+    """Where it closes by itself it arrives no faster than this."""
+    fastest = seen.behaviour.fastest
+    speed = fastest.speed * seen.context.lever_arm if fastest else 0.0
+    return _unless(speed <= seen.most, f"it arrives with {speed:.2g} m/s")
+
+
+def holds_between(seen: Seen) -> str:
+    """Between these angles it stays, as far as it goes."""
+    if seen.context.joint.type != "hinge":
+        return "it slides, which has no degrees"
+    low, high = (min(share(seen.context, angle), 0.98) for angle in (seen.number, seen.most))
+    return _each(seen, np.linspace(low, high, 17), "stays")
+
+
 def stays_put(seen: Seen) -> str:
     """Beyond the first part of the way it stays."""
     return _each(seen, np.linspace(0.15, 0.95, 33), "stays")

@@ -207,6 +207,9 @@ def _demands(wish: Wanted, proposal: Proposal, context: Context) -> list[Demand]
             return held_shut + _latch(wish, proposal, context)
         case "stays_put":
             return stay(0.145, 0.955)
+        case "holds_between" if context.joint.type == "hinge":
+            low, high = (min(share(context, angle), 0.985) for angle in (wish.number, wish.most))
+            return stay(low - 0.005, high)
         case "stays_half":
             return stay(0.38, 0.62)
         case "stays_open":

@@ -17,11 +17,12 @@ from joda.interaction.pulling import SLOW
 from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
 from joda.propose import Answer, Task, Turn
 from joda.propose.added import RISING, WISHED
-from joda.propose.archetype import Archetype, forces
+from joda.propose.archetype import Archetype
 from joda.propose.checks import FELT, SOFT, share
 from joda.propose.complaints import revise
 from joda.propose.mend import mend, rescale
 from joda.propose.parts import Part
+from joda.propose.plausible import forces
 from joda.propose.recognise import Recognition, recognise, scale_doubt
 from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
 from joda.scenes.context import Context
@@ -36,7 +37,7 @@ CLICKS = re.compile(r"detent_internal|spring_return")
 
 EXCLUSIVE = {
     "closes_from", "closes_anywhere", "stays_put", "stays_half", "opens_past", "two_sides",
-    "returns_to_middle", "clicks",
+    "returns_to_middle", "clicks", "holds_between",
 }  # fmt: skip
 """Wishes about the middle of the way: the user's replace those of the kind."""
 
@@ -70,13 +71,13 @@ class Offline:
         if not lacking:
             return Answer(None, recognised=found)
         mended = last.proposal
-        if "soft" in lacking:
-            mended = _softer(mended, task.context, last)
+        if slow := [limit for name, limit in _slow(wanted) if name in lacking]:
+            mended = _softer(mended, task.context, last, min(slow))
         if "free" in lacking:
             mended = _lighter(mended, task.context, last)
         if "takes" in lacking:
             mended = _less_damped(mended, task.context, wanted)
-        if lacking.keys() - {"soft"}:
+        if lacking.keys() - {"soft", "arrives"}:
             mended = self._mended(mended, task, wanted)
         return Answer(None if mended == last.proposal else mended, recognised=found)
 
@@ -152,8 +153,8 @@ def _plan(kind: Archetype, context: Context, description: str) -> tuple[list[Wan
     taken = {name for part in added for name in part.serves}
     parts = [part for part in parts if not part.serves or set(part.serves) - taken]
     if kind.force and not asked.keys() & FORCEFUL:
-        least, most = forces()[kind.force].opening
-        wanted.append(Wanted("takes", least, most))
+        usual = forces()[kind.force].wanted([wish.name for wish in wanted], context)
+        wanted += [wish for wish in usual if wish.name not in asked]
     return _counted(wanted, context), parts + added
 
 
@@ -241,12 +242,18 @@ def _with(proposal: Proposal, effects: Sequence[EffectProposal]) -> Proposal:
     return proposal.model_copy(update={"effect_proposals": (*proposal.effect_proposals, *effects)})
 
 
-def _softer(proposal: Proposal, context: Context, last: Turn) -> Proposal:
-    """More damping where it closes; a damper there, if there is none."""
+def _slow(wanted: Sequence[Wanted]) -> list[tuple[str, float]]:
+    """The wishes that it shuts slowly, and at how many m/s at most."""
+    return [("soft", SOFT), *((wish.name, wish.most) for wish in wanted if wish.name == "arrives")]
+
+
+def _softer(proposal: Proposal, context: Context, last: Turn, limit: float) -> Proposal:
+    """More damping where it closes, so that it arrives with `limit` (m/s at the lever arm) at
+    most; a damper there, if there is none."""
     fastest = last.behaviour.fastest
     if fastest is None:
         return proposal
-    factor = min(1.5 * fastest.speed * context.lever_arm / SOFT, 10.0)
+    factor = min(1.5 * fastest.speed * context.lever_arm / limit, 10.0)
     closed = 1.0 if context.closed_end == "high_end" else 0.0
     effects = [
         rescale(effect, "damping", factor)

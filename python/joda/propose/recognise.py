@@ -12,8 +12,9 @@ import numpy as np
 
 from joda.compiling import reference_scales
 from joda.component import Frozen
-from joda.propose.archetype import Archetype, Feature, Force, forces, read_archetypes
+from joda.propose.archetype import Archetype, Feature, read_archetypes
 from joda.propose.naming import Concepts, concepts, said
+from joda.propose.plausible import Force, forces
 from joda.scenes.context import Context
 
 Gravity = Literal["level", "opens", "closes"]

@@ -30,8 +30,8 @@ from joda.profile import Profile, describe
 from joda.proposal import Proposal
 from joda.propose import Answer, Proposer, Task, Turn, Usage, total
 from joda.propose.archetype import Archetype, read_archetypes
-from joda.propose.checks import Seen, takes
 from joda.propose.history import Failure, History, Round
+from joda.propose.plausible import CLOSING, STAYING
 from joda.propose.recognise import recognise
 from joda.propose.wishes import Wanted, read_wishes, unmet
 from joda.scenes.attaching import attach
@@ -283,23 +283,21 @@ class Session:
         return round, self._turn(round, profile)
 
     def _implausible(self, behaved: Behaviour, answer: Answer) -> tuple[str, ...]:
-        """That opening takes another force than such joints do; of rules it is a wish of theirs."""
+        """What it does otherwise than such joints, in numbers; rules wish for that themselves."""
         if answer.recognised is not None:
             return ()
         found = recognise(self.context, self.history.description, self.task.archetypes)[1]
         if found.force is None or found.likely < SURE:
             return ()
-        least, most = found.force.opening
-        instead = takes(Seen(behaved, self.context, least, most))
-        return (
-            (
-                f"It looks like a {found.title} ({found.likely:.0%}), which takes {least:g} to "
-                f"{most:g} N at the handle to open ({found.force.source or 'an estimate'}), but "
-                f"{instead}.",
-            )
-            if instead
-            else ()
-        )
+        asked = read_wishes(self.history.description)  # the user knows better where it holds
+        told = found.force.wanted(CLOSING if asked else CLOSING | STAYING, self.context)
+        doubts = [
+            f"which {wish.sentence} ({found.force.by(wish.name)}), but {instead}"
+            for wish in told
+            if (instead := wish.instead(behaved, self.context))
+        ]
+        looks = f"It looks like a {found.title} ({found.likely:.0%}), {'; and '.join(doubts)}."
+        return (looks,) if doubts else ()
 
     def _hindered(
         self, profile: Profile, every: Sequence[Wanted], lacking: Mapping[str, str]

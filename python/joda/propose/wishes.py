@@ -110,6 +110,18 @@ WISHES: dict[str, Wish] = {
         rf"(?P<about>{_REAL}) ?{_NEWTON}",
         checks.takes,
     ),
+    "arrives": Wish(
+        "shuts with at most {most} m/s at the handle",
+        rf"(?:{_CLOSE}|arriv\w*)[^.;]*?(?:at most|no more than|less than|under|below|up to) "
+        rf"(?P<limit>{_REAL}) ?m/s",
+        checks.arrives,
+    ),
+    "holds_between": Wish(
+        "holds between {number} and {most} degrees",
+        rf"(?:stays?|holds?|held|rests?|remains?)\b[^.;]*?\b(?:between|from) (?P<number>{_REAL}) "
+        rf"(?:and|to) (?P<most>{_REAL}) ?(?:degrees|deg\b|°)",
+        checks.holds_between,
+    ),
     "stays_put": Wish(
         "stays wherever it is left",
         r"^(?!.*\b(?:beyond|past|farther|further)\b).*"
@@ -191,6 +203,10 @@ class Wanted:
         """What it says."""
         return WISHES[self.name].says.format(number=f"{self.number:g}", most=f"{self.most:g}")
 
+    def instead(self, behaviour: Behaviour, context: Context) -> str:
+        """What the joint does instead; empty if it does what it says."""
+        return WISHES[self.name].check(Seen(behaviour, context, self.number, self.most))
+
 
 def read_wishes(text: str, *, refused: bool = False) -> list[Wanted]:
     """The wishes that a description states.
@@ -238,6 +254,6 @@ def unmet(wanted: Sequence[Wanted], behaviour: Behaviour, context: Context) -> d
     """
     out = {}
     for wish in (Wanted("moves"), *wanted):
-        if instead := WISHES[wish.name].check(Seen(behaviour, context, wish.number, wish.most)):
+        if instead := wish.instead(behaviour, context):
             out[wish.name] = f"It {wish.sentence}: no, {instead}."
     return out
