@@ -4,7 +4,10 @@ import base64
 import io
 import json
 import re
+import secrets
+import shutil
 from html.parser import HTMLParser
+from xml.etree import ElementTree
 
 import mujoco
 import pytest
@@ -108,6 +111,7 @@ def test_what_overlaps_all_along_the_way_has_its_remedy(tmp_path):
     last = generate_all(tmp_path / "m", tmp_path / "out", rounds=1)["a/door"].history.rounds[-1]
     told = " ".join(last.notes)
     assert last.unmet and '<contact><exclude body1="..." body2="..."/></contact>' in told
+    assert 'here "world" and "a"' in told
     passing = '</worldbody><contact><exclude body1="world" body2="a"/></contact>'
     (tmp_path / "m" / "a.xml").write_text(text.replace("</worldbody>", passing))
     again = generate_all(tmp_path / "m", tmp_path / "again", rounds=1)["a/door"]
@@ -205,3 +209,68 @@ def test_a_page_of_a_thousand_joints_is_quick_and_small(tmp_path):
         for k in range(1000)
     ]
     assert len(sheet(entries, tmp_path, "many")) < 2_000_000
+
+
+FRAME = '<geom type="box" size=".03 .01 .2" pos=".41 {depth} 0"/>'
+
+
+def test_what_overlaps_its_frame_only_when_closed_is_told_with_its_remedy(tmp_path):
+    """A door whose edge is drawn some millimetres into the stop of a frame that is fixed."""
+    (tmp_path / "m").mkdir()
+    depth = secrets.SystemRandom().uniform(0.012, 0.017)  # they overlap by 3 to 8 mm
+    text = BOX.format(name="door", more=FRAME.format(depth=depth))
+    (tmp_path / "m" / "a.xml").write_text(text)
+    last = generate_all(tmp_path / "m", tmp_path / "out", rounds=1)["a/door"].history.rounds[-1]
+    told = " ".join(last.notes)
+    assert "'a' touches 'world' from s = 0.00 to 0.0" in told
+    assert "mounted on MuJoCo lets pass, but not where that is fixed" in told
+    assert told.endswith('<exclude body1="..." body2="..."/></contact>, here "world" and "a".')
+    # what can move is not what the door is mounted on
+    carried = f'<body name="wall"><freejoint/>{FRAME.format(depth=depth)}'
+    moving = text.replace(FRAME.format(depth=depth), "").replace(
+        "<worldbody>", "<worldbody>" + carried
+    )
+    (tmp_path / "m" / "a.xml").write_text(moving.replace("</worldbody>", "</body></worldbody>"))
+    other = generate_all(tmp_path / "m", tmp_path / "other", rounds=1, joint="door")["a/door"]
+    assert not any("mounted" in note for note in other.history.rounds[-1].notes)
+
+
+def test_every_round_has_its_picture_of_what_came_true(tmp_path):
+    """The first round of our oven lacks something, and the second does not."""
+    from test_generate import OVEN
+
+    (tmp_path / "m").mkdir()
+    shutil.copy(OVEN, tmp_path / "m")
+    done = generate_all(tmp_path / "m", tmp_path / "out", proposer="offline")["oven/door"]
+    rounds = done.history.rounds
+    assert len(rounds) > 1 and rounds[0].unmet and not rounds[-1].unmet
+    for round in rounds:
+        root = ElementTree.fromstring(round.picture)
+        wide, high = (float(root.get(size)) for size in ("width", "height"))
+        texts = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
+        told = " ".join(" ".join(texts).split())
+        for mark, sentences in (("\u2713", round.met), ("\u2717", round.unmet)):
+            assert sum(text.startswith(mark) for text in texts) == len(sentences)
+            assert all(f"{mark} {sentence}" in told for sentence in sentences)
+        # the strip is as wide as the picture, and closes where the joint does
+        strip = [r for r in root.iter("{http://www.w3.org/2000/svg}rect") if r.get("x")]
+        assert sum(float(r.get("width")) for r in strip) == pytest.approx(wide, abs=1)
+        assert len(strip) == len(round.behaviour.let_go)
+        assert all(0 <= float(e.get("y")) <= high for e in root.iter() if e.get("y"))
+    page = Page((tmp_path / "out" / "sheet.html").read_text())
+    shown = [image["src"] for image in page.all("img") if "svg" in image["src"]]
+    drawn = [base64.b64decode(source.split(",")[1]).decode() for source in shown]
+    assert drawn == [round.picture for round in rounds]
+    assert (
+        f"round 1: {len(rounds[0].met)} of {len(rounds[0].met) + len(rounds[0].unmet)}" in page.text
+    )
+
+
+def test_a_round_says_how_many_behaviours_came_true(joda, tmp_path):
+    from test_generate import OVEN
+
+    out = tmp_path / "out"
+    status, said, _ = joda("generate", OVEN, "--proposer", "offline", "--rounds", "1", "-o", out)
+    (first,) = History.read(out / "history.json").rounds
+    came, of = len(first.met), len(first.met) + len(first.unmet)
+    assert status == 0 and f"{came} of {of} behaviours came true, but not these:\n  ! It " in said

@@ -85,6 +85,8 @@ def tell_round(round: "Round") -> None:
         where = f"{effect.start_ratio:g} to {effect.end_ratio:g}"
         say(f"  - {effect.effect_name}, s = {where}: {effect.reason}")
     say(*textwrap.indent(round.facts, "  ").split("\n"))
+    came, of = len(round.met), len(round.met) + len(round.unmet)
+    say(f"  {came} of {of} behaviours came true" + (", but not these:" if round.unmet else "."))
     for sentence in (*round.unmet, *round.notes):
         say(f"  ! {sentence}")
 

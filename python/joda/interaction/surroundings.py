@@ -57,14 +57,22 @@ class Surroundings:
 
     @property
     def remedy(self) -> str:
-        """What to do about parts that overlap all along the way; empty if none do."""
-        overlaps = [one for one in self.contacts
-                    if one.presses and one.interval[1] - one.interval[0] > OVERLAPS]  # fmt: skip
-        if not overlaps:
+        """What to do about parts that overlap all along the way, or anywhere with what they are
+        mounted on; empty if none do."""
+        pressing = [one for one in self.contacts if one.presses]
+        mounted = sorted({one.mounted for one in pressing if one.mounted})
+        far = any(one.interval[1] - one.interval[0] > OVERLAPS for one in pressing)
+        if not mounted and not far:
             return ""
+        named = [f'"{base}" and "{body}"' for base, body in mounted if base and body]
         return (
             "; if parts that overlap all along the way are meant to pass, keep them from colliding "
+            if far
+            else "; a part that overlaps what it is mounted on MuJoCo lets pass, but not where "
+            "that is fixed in the world: if it is meant to pass, keep them from colliding "
+        ) + (
             'with <contact><exclude body1="..." body2="..."/></contact>'
+            + (f", here {', '.join(named)}" if named else "")
         )
 
     def scene(self, profile: Profile) -> tuple[mujoco.MjModel, int]:

@@ -28,6 +28,8 @@ class Round(Frozen):
         notes: what the proposer had to say besides.
         usage: what it cost.
         recognised: what the proposer took the joint for, and by what.
+        picture: its forces, where the joint goes, and what came true, as SVG; empty in histories
+            of before.
     """
 
     number: int
@@ -41,6 +43,7 @@ class Round(Frozen):
     notes: tuple[str, ...] = ()
     usage: Usage = Usage()
     recognised: Recognition | None = None
+    picture: str = ""
 
     @property
     def sure(self) -> float:

@@ -33,6 +33,7 @@ from joda.propose.archetype import Archetype, read_archetypes
 from joda.propose.history import Failure, History, Round
 from joda.propose.plausible import CLOSING, STAYING
 from joda.propose.recognise import recognise
+from joda.propose.sketch import sketch
 from joda.propose.wishes import Wanted, read_wishes, unmet
 from joda.scenes.attaching import attach
 from joda.scenes.context import Context, context
@@ -262,7 +263,8 @@ class Session:
         said = "" if heard else self.history.description
         every = [*wanted, *(wish for wish in read_wishes(said) if wish not in wanted)]
         lacking = unmet(every, behaved, self.context)
-        came = [wish.sentence for wish in (Wanted("moves"), *every) if wish.name not in lacking]
+        came = (wish.sentence for wish in (Wanted("moves"), *every) if wish.name not in lacking)
+        met = tuple(f"It {sentence}." for sentence in came)
         round = Round(
             number=len(self.history.rounds) + 1,
             proposer=proposer,
@@ -270,7 +272,7 @@ class Session:
             proposal=proposal,
             behaviour=behaved,
             facts=behaved.describe(self.context),
-            met=tuple(f"It {sentence}." for sentence in came),
+            met=met,
             unmet=tuple(lacking.values()),
             notes=(
                 *answer.notes,
@@ -279,6 +281,7 @@ class Session:
             ),
             usage=answer.usage,
             recognised=answer.recognised,
+            picture=sketch(profile, self.context, behaved, met, tuple(lacking.values())),
         )
         return round, self._turn(round, profile)
 

@@ -52,6 +52,8 @@ class Contact:
         presses: whether it pushes somewhere, and does not only rub.
         along: whether it only rubs, and that wherever the joint was moved.
         stop: whether it lies at an end of the range, as a stop does.
+        mounted: the bodies, where the other's is what the geom's is mounted on, fixed in the world:
+            if that could move, MuJoCo would let them pass. Empty for any other.
     """
 
     geom: str
@@ -62,6 +64,7 @@ class Contact:
     presses: bool
     along: bool
     stop: bool
+    mounted: tuple[str, ...] = ()
 
     @property
     def hinders(self) -> bool:
@@ -113,6 +116,7 @@ def contacts_along(
                     presses=bool(pushes[first : last + 1].any()),
                     along=bool(resists.all() and not pushes.any()),
                     stop=b <= END or a >= 1 - END,
+                    mounted=sweep.mounted.get(pair, ()),
                 )
             )
     return tuple(sorted(out, key=lambda one: (one.interval, one.geom, one.other)))
@@ -186,6 +190,7 @@ class _Sweep:
         self.moved = moves_with(model, int(model.jnt_bodyid[joint]))[model.geom_bodyid]
         self.felt = FELT * self.span * self._inertia()
         self._looks: dict[float, dict[Pair, Felt]] = {}
+        self.mounted: dict[Pair, tuple[str, ...]] = {}
 
     def _inertia(self) -> float:
         mujoco.mj_fwdPosition(self.model, self.data)
@@ -248,6 +253,8 @@ class _Sweep:
             mine, others = geoms[k] if own[k, 0] else geoms[k][::-1]
             pair = self._name(int(mine)), self._name(int(others))
             out.setdefault(pair, []).extend(range(first, first + count))
+            if bodies := _mounted(self.model, int(mine), int(others)):
+                self.mounted[pair] = bodies
         return out
 
     def _name(self, geom: int) -> str:
@@ -284,6 +291,19 @@ class _Sweep:
             else:
                 outside = middle
         return inside
+
+
+def _mounted(model: mujoco.MjModel, mine: int, other: int) -> tuple[str, ...]:
+    """The bodies of two geoms, the other's first, where that is fixed and carries the first's.
+
+    MuJoCo leaves out contacts of a body with the one that carries it, but not with the world's.
+    """
+    if mine < 0 or other < 0:
+        return ()
+    body, base = (int(model.geom_bodyid[geom]) for geom in (mine, other))
+    carrier = model.body_parentid[model.body_weldid[body]]
+    fixed = model.body_weldid[carrier] == 0 and model.body_weldid[base] == 0
+    return (model.body(base).name, model.body(body).name) if fixed else ()
 
 
 def _runs(true: NDArray[np.bool_]) -> list[tuple[int, int]]:

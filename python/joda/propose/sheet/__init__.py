@@ -4,6 +4,7 @@ Names come from other people's files: whatever is shown is escaped, and the page
 """
 
 import shlex
+from base64 import b64encode
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
@@ -96,10 +97,26 @@ def _card(entry: Entry, folder: Path) -> str:
         f"{picture}{entry.sketch}"
         f'<p><b>{_text(entry.kind)}</b> <meter min="0" max="1" value="{entry.likely}"></meter> '
         f"{entry.likely:.0%}{_text(others)}</p>"
-        f"<p>{_text(force + band)}</p><ul>{behaviours}</ul>{remarks}"
+        f"<p>{_text(force + band)}</p><ul>{behaviours}</ul>{_rounds(entry)}{remarks}"
         f'<p class="more">{links} <button type="button">copy studio command</button></p>'
         f"<code>{_text(command)}</code></article>"
     )
+
+
+def _rounds(entry: Entry) -> str:
+    """What came true in each round, where there were several, as pictures.
+
+    As images: what an SVG holds that somebody has changed is not obeyed there.
+    """
+    if len(entry.rounds) < 2:
+        return ""
+    out = []
+    for round in entry.rounds:
+        told = f"round {round.number}: {len(round.met)} of {len(round.met) + len(round.unmet)}"
+        source = b64encode(round.picture.encode()).decode()
+        shown = f'<img alt="{told}" src="data:image/svg+xml;base64,{source}">'
+        out.append(f"<p>{told} came true</p>{shown if source else ''}")
+    return f"<details><summary>{len(out)} rounds</summary>{''.join(out)}</details>"
 
 
 def _text(text: str) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from joda.field import evaluate
 from joda.files import write_bytes
 from joda.profile import Profile
-from joda.propose.history import History
+from joda.propose.history import History, Round
 from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
@@ -42,6 +42,7 @@ class Entry:
         likely: how sure that is, 0 to 1.
         others: what else it could be, in words.
         met, unmet, notes: of the last round, a sentence each.
+        rounds: all of them, oldest first.
         remarks: what was told of the model and its files.
         force: that opening takes at the handle, N; None where a hand cannot open it.
         band: what such joints take, N; None where nothing is known.
@@ -59,6 +60,7 @@ class Entry:
     met: tuple[str, ...] = ()
     unmet: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    rounds: tuple[Round, ...] = ()
     remarks: tuple[str, ...] = ()
     force: float | None = None
     band: tuple[float, float] | None = None
@@ -95,6 +97,7 @@ class Entry:
             met=last.met,
             unmet=last.unmet,
             notes=last.notes,
+            rounds=history.rounds,
             remarks=remarks,
             force=force / context.lever_arm if way.arrived else None,
             band=found.force.opening if found and found.force else None,
