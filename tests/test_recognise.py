@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from articulated import objects
+from assets import asset
 from joint_table import judge, made
 
 from joda import context, generate, schema
@@ -115,6 +116,30 @@ def nameless(model, joint):
 )
 def test_own_models_are_told_by_their_shape_alone(model, joint, wish):
     assert wish in recognise(nameless(model, joint))[0].wishes
+
+
+@pytest.mark.parametrize(
+    ("source", "file", "joint", "wish"),
+    [
+        ("table", "", "base__drawer", "closes_near"),
+        ("table", "", "base__slide", "stays_put"),
+        ("table", "", "base__switch", "two_sides"),
+        ("door", "", "latch_joint", "returns_to_middle"),
+        ("drawer", "buttonbox.xml", "btnbox_joint", "closes_anywhere"),
+        ("drawer", "coffeemachine.xml", "goal_slidey", "closes_anywhere"),
+    ],
+)
+def test_other_peoples_are_told_by_their_shape_alone(source, file, joint, wish):
+    path = asset(source)
+    found = context(path.with_name(file) if file else path, joint)
+    bare = found.model_copy(update={"names": (), "around": ()})
+    assert wish in recognise(bare)[0].wishes and wish in recognise(found)[0].wishes
+
+
+def test_a_lever_on_a_stand_of_its_own_stays_where_it_is_put():
+    path = asset("drawer").with_name("lever.xml")
+    kind, found = recognise(context(path, "LeverAxis"))
+    assert found.title == "control lever" and "stays_put" in kind.wishes
 
 
 HALF = {

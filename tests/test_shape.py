@@ -198,3 +198,19 @@ def test_the_room_beyond_either_end_is_that_to_the_object(tmp_path):
     assert seen.room_open == pytest.approx(0.5, abs=0.02)
     free = scene(tmp_path, rest, slide.replace('"1 0 0"', '"0 0 1"'), part, "0 0 0").shape
     assert free.room_closed == free.room_open == 1.0
+
+
+def test_a_tray_lies_and_a_panel_stands(tmp_path):
+    wide, deep, thin = np.random.default_rng().uniform([0.15, 0.15, 0.01], [0.3, 0.3, 0.05])
+    slide = '<joint name="j" type="slide" axis="0 -1 0" range="0 .2"/>'
+    for size, lies in (((wide, deep, thin), True), ((thin, deep, wide), False)):
+        part = f'<geom type="box" size="{" ".join(map(str, size))}" mass="1"/>'
+        assert scene(tmp_path, joint=slide, part=part).shape.lies == lies
+
+
+def test_a_joint_is_centred_whose_reference_is_in_the_middle_of_its_range(tmp_path):
+    low, span, off = np.random.default_rng().uniform([-2, 0.5, 0.2], [1, 2, 0.5])
+    for reference, centred in ((low + span / 2, True), (low + (0.5 + off) * span, False)):
+        ends = f'range="{low} {low + span}" ref="{reference}"'
+        joint = f'<joint name="j" axis="0 0 -1" {ends}/>'
+        assert scene(tmp_path, joint=joint).shape.centred == centred

@@ -32,6 +32,8 @@ WITNESSES = 3
 """From at least so many of these places the part must be seen to close a cavity."""
 ALIKE = 0.03
 """Parts whose sizes differ by no more than this share are of equal shape."""
+UPRIGHT = 0.85
+"""Cosine to the vertical from which a direction is upright."""
 LEVEL = 0.15
 """A part that rises by less than this share of its size neither falls open nor shut."""
 SLIT = 0.015
@@ -60,9 +62,11 @@ class Shape(Frozen):
             a disc, less a lever, spokes or a frame.
         slim: the middle one over the largest: 0 a rod, 1 a square plate or a cube.
         travel: hinge: degrees; slide: m.
+        centred: whether its reference position lies in the middle of its range.
         axis: "vertical", "level" or "slanted".
         faces: hinge: "along" an axis in the plane of a flat part, "normal" to it, or "none" where
             the part is not flat; slide: whether it moves along or normal to its face.
+        lies: whether the part's thinnest edge is upright, as a tray's, and not level, as a panel's.
         offset: hinge: how far the axis is from the part's middle, in units of half its width: 0
             through the middle, 1 at the edge, more beyond it; slide: the travel over the part's
             size along it.
@@ -93,8 +97,10 @@ class Shape(Frozen):
     flat: float = 1.0
     slim: float = 1.0
     travel: float = 0.0
+    centred: bool = False
     axis: Literal["vertical", "level", "slanted"] = "level"
     faces: Faces = "none"
+    lies: bool = False
     offset: float = 0.0
     weight: Literal["opens", "closes", "level"] = "level"
     covers: float = 0.0
@@ -162,7 +168,7 @@ def look(model: mujoco.MjModel, joint: int, described: Joint, reference: End | s
     data_at(model, data, joint, described.range[0 if shut == "low_end" else 1])
     fill = filled(model, data, own, at.box, at.outward)
     alike, controls, doors = _neighbours(model, data, joint)
-    shape = _features(model, described, at, open_, data)
+    shape = _features(model, joint, described, at, open_)
     below, above = _carriers(model, body), _carried(model, body)
     shape = shape.model_copy(
         update={
@@ -302,7 +308,7 @@ def _closed(looks: dict[str, _Look], reference: str, slide: bool) -> End | Liter
 
 
 def _features(
-    model: mujoco.MjModel, described: Joint, at: _Look, open_: _Look, data: mujoco.MjData
+    model: mujoco.MjModel, joint: int, described: Joint, at: _Look, open_: _Look
 ) -> Shape:
     slide = described.type == "slide"
     lo, hi = described.range
@@ -330,8 +336,10 @@ def _features(
         aspect=_round(float(box.size[1] / max(box.size[0], 1e-9))),
         slim=_round(middle / max(large, 1e-9)),
         travel=_round(hi - lo if slide else np.degrees(hi - lo)),
-        axis="vertical" if rise > 0.85 else "level" if rise < 0.35 else "slanted",
+        centred=bool(abs(model.qpos0[model.jnt_qposadr[joint]] - (lo + hi) / 2) < 0.1 * (hi - lo)),
+        axis="vertical" if rise > UPRIGHT else "level" if rise < 0.35 else "slanted",
         faces=faces,
+        lies=abs(float(box.axes[thin] @ up)) > UPRIGHT,
         offset=_round(float(offset)),
         weight=_weight(slide, at, open_, up),
         covers=_round(at.covers),
