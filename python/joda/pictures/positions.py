@@ -21,7 +21,7 @@ from joda.pictures.canvas import Canvas
 from joda.pictures.caption import captioned
 from joda.pictures.offscreen import Image, answer, ask
 from joda.pictures.stage import Stage, View
-from joda.pictures.style import clean
+from joda.pictures.style import COMPRESSED, clean
 from joda.profile import Joint
 from joda.scenes.model import describe_joint, find_joint, load_model
 from joda.scenes.part import Array, moving
@@ -30,12 +30,9 @@ from joda.scenes.shelf import shelf_name
 ARROW = (0.95, 0.36, 0.05)
 AXIS = (0.12, 0.12, 0.14)
 
-COMPRESSED = 3
-"""Of 9, zlib's: files are a tenth larger than with its usual 6, and made in half the time."""
-
 ELEVATIONS = (-42.0, -22.0)
 FROM_BELOW = -ELEVATIONS[1]
-TRIED = 12
+TRIED = 8
 """How many of the candidates, the most promising, are rendered."""
 
 

@@ -19,6 +19,9 @@ EFFECTS = "#6b4fa0"
 GRAVITY = "#1f5fbf"
 INK = "#333333"
 
+COMPRESSED = 3
+"""Of 9, zlib's: files are a tenth larger than with its usual 6, and made in half the time."""
+
 
 def write_png(figure: "Figure", path: str | Path, force: bool = False) -> None:
     """Writes the figure as PNG; raises JodaError if `path` exists and `force` is off."""
@@ -31,7 +34,8 @@ def png(figure: "Figure") -> bytes:
     """The figure as a PNG file's content."""
     content = io.BytesIO()
     with house_style():
-        figure.savefig(content, format="png", dpi=figure.dpi)
+        pil_kwargs = {"compress_level": COMPRESSED}
+        figure.savefig(content, format="png", dpi=figure.dpi, pil_kwargs=pil_kwargs)
     return content.getvalue()
 
 
