@@ -31,6 +31,7 @@ from joda.propose import anthropic as proposer
 from joda.propose import batch as batches
 from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.prompt import MAX_TOKENS
+from joda.propose.replies import PLAINLY
 from joda.propose.service import Credentials
 
 MODEL = "claude-sonnet-5-5"
@@ -447,6 +448,24 @@ def test_effort_is_what_was_asked_for(server):
     with pytest.raises(JodaError, match="leave --effort out"):
         ask(server, reply(), effort="low")
     assert len(server.requests) == 1
+
+
+def test_a_model_that_no_schema_holds_is_asked_in_words(server):
+    """And what it says around the object is left out."""
+    server.models[MODEL] = able(True, "low", held=False)
+    said = json.loads(json.dumps(reply()))
+    text = next(block for block in said["content"] if block["type"] == "text")
+    text["text"] = f"Here it is:\n```json\n{text['text']}\n```"
+    assert ask(server, said).proposal == proposed()
+    assert ask(server, said, effort="low").proposal == proposed()
+    plain, low = server.requests
+    assert "output_config" not in plain and low["output_config"] == {"effort": "low"}
+    words = plain["system"][-1]["text"]
+    schema = json.loads(words.partition(PLAINLY)[2])
+    assert "cache_control" not in plain["system"][-1] and "enum" in json.dumps(schema)
+    server.models[MODEL] = able(True)
+    ask(server, reply())
+    assert schema == server.requests[-1]["output_config"]["format"]["schema"]
 
 
 @pytest.mark.parametrize("nonsense", [[], {}, {"capabilities": 3}, {"capabilities": {"effort": 1}}])

@@ -45,7 +45,7 @@ def error(status, kind, text, **headers):
     }
 
 
-def able(adaptive, *efforts):
+def able(adaptive, *efforts, held=True):
     """What the service tells of a model."""
 
     def supported(yes):
@@ -60,7 +60,11 @@ def able(adaptive, *efforts):
         "display_name": "Test",
         "created_at": "2026-11-01T00:00:00Z",
         "lifecycle": "active",
-        "capabilities": {"thinking": thinking, "effort": effort},
+        "capabilities": {
+            "thinking": thinking,
+            "effort": effort,
+            "structured_outputs": supported(held),
+        },
     }
 
 
@@ -73,8 +77,11 @@ def need(condition, text):
         raise Wrong(text)
 
 
-def check(asked):
-    """Raises Wrong where the real service would refuse the request."""
+def check(asked, held=True):
+    """Raises Wrong where the real service would refuse the request.
+
+    `held`: whether the model's answer can be held to a schema.
+    """
     allowed = {"model", "max_tokens", "messages", "system", "output_config", "thinking"}
     need(not asked.keys() - allowed, f"unexpected: {sorted(asked.keys() - allowed)}")
     need(isinstance(asked.get("model"), str) and asked["model"], "model: field required")
@@ -104,9 +111,14 @@ def check(asked):
     need(all(life in ("5m", "1h") for life in lives), "cache_control: unknown ttl")
     need(lives == sorted(lives), "cache_control: a longer ttl must come before a shorter one")
     need(asked.get("thinking", ADAPTIVE) == ADAPTIVE, "thinking: unknown")
-    effort = asked["output_config"].get("effort", "high")
+    config = asked.get("output_config", {})
+    effort = config.get("effort", "high")
     need(effort in ("low", "medium", "high", "xhigh", "max"), "output_config.effort: unknown")
-    form = asked["output_config"]["format"]
+    need(held or "format" not in config, "output_config.format: not supported by this model")
+    if not held:
+        return
+    need("format" in config, "output_config.format: field required")
+    form = config["format"]
     need(form["type"] == "json_schema", "output_config.format.type")
     schema(form["schema"])
 
@@ -165,6 +177,13 @@ class Server:
         self.released = threading.Event()
         self.url = ""
 
+    def holds(self, asked):
+        """Whether what is told of the model does not say that no schema holds its answers."""
+        told = self.models.get(asked.get("model"))
+        said = told.get("capabilities") if isinstance(told, dict) else None
+        found = said.get("structured_outputs") if isinstance(said, dict) else None
+        return found != {"supported": False}
+
 
 class Handler(BaseHTTPRequestHandler):
     """Answers from `self.server.state`."""
@@ -202,7 +221,7 @@ class Handler(BaseHTTPRequestHandler):
         try:
             if self.path == "/v1/messages":
                 state.requests.append(asked)
-                check(asked)
+                check(asked, state.holds(asked))
                 self.play(state.script.pop(0) if len(state.script) > 1 else state.script[0])
             elif self.path == "/v1/messages/count_tokens":
                 check({"max_tokens": 1, **asked})

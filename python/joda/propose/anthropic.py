@@ -46,10 +46,12 @@ class Abilities:
     Attributes:
         thinks: whether it decides by itself how much to think (adaptive thinking).
         efforts: which it takes; None: not said.
+        obeys: whether its answer can be held to a JSON Schema; where not, that is asked in words.
     """
 
     thinks: bool = False
     efforts: tuple[str, ...] | None = None
+    obeys: bool = True
 
 
 class Anthropic(VisionModel):
@@ -98,8 +100,9 @@ class Anthropic(VisionModel):
     def sending(self) -> Iterator[Send]:
         """See `VisionModel`."""
         with self._client() as client:
-            extra = self._extra(client)
-            yield lambda asked, tally: self._reply(self._send(client, tally, _with(asked, extra)))
+            yield lambda asked, tally: self._reply(
+                self._send(client, tally, self._suited(client, asked))
+            )
 
     def propose_many(
         self,
@@ -128,7 +131,7 @@ class Anthropic(VisionModel):
                 except JodaError as error:
                     yield ask.name, error
                     continue
-                asked = _with(asked, self._extra(client))
+                asked = self._suited(client, asked)
                 wanted[_key(ask.name, asked)] = ask, asked
             requests = {key: asked for key, (_, asked) in wanted.items()}
             batches = Batches(client, store, lambda e: self._sentence(e, client), progress, sleep)
@@ -148,16 +151,28 @@ class Anthropic(VisionModel):
             timeout=self._timeout,
         )
 
-    def _extra(self, client: "Client") -> Request:
-        """What a request has besides its words: how much the model is to think."""
+    def _suited(self, client: "Client", asked: Request) -> Request:
+        """The request as the model takes it: how much it thinks, how its answer is held.
+
+        Raises:
+            JodaError: it takes no such effort, or the service cannot be asked what it takes.
+        """
         if self._abilities is None:
             self._abilities = self._look_up(client)
         takes = self._abilities.efforts
         if self._effort and takes is not None and self._effort not in takes:
             instead = f"it takes {', '.join(takes)}" if takes else "leave --effort out"
             raise JodaError(f"{self.model} takes no effort '{self._effort}'; {instead}.")
-        thinking = {"thinking": {"type": "adaptive"}} if self._abilities.thinks else {}
-        return {**thinking, **({"output_config": {"effort": self._effort}} if self._effort else {})}
+        out, config = dict(asked), dict(asked["output_config"])
+        if self._abilities.thinks:
+            out["thinking"] = {"type": "adaptive"}
+        if self._effort:
+            config["effort"] = self._effort
+        if not self._abilities.obeys:
+            words = replies.PLAINLY + json.dumps(config.pop("format")["schema"])
+            out["system"] = [*asked["system"], {"type": "text", "text": words}]
+        del out["output_config"]
+        return {**out, "output_config": config} if config else out
 
     def _look_up(self, client: "Client") -> Abilities:
         """What the model can do; nothing is assumed where the service does not know it."""
@@ -198,7 +213,7 @@ class Anthropic(VisionModel):
 
     def _reply(self, message: "Message") -> Reply:
         said = "".join(getattr(one, "text", "") for one in message.content if _kind(one) == "text")
-        text = self._credentials.hide(said)
+        text = self._credentials.hide(replies.bare(said))
         if message.stop_reason == "refusal":
             details = getattr(message, "stop_details", None)
             why = getattr(details, "explanation", None) or getattr(details, "category", None)
@@ -245,19 +260,15 @@ class Anthropic(VisionModel):
         return refused(self.model, error.status_code, reason, advice)
 
 
-def _with(asked: Request, extra: Request) -> Request:
-    """A request and what it has besides its words."""
-    config = {**asked["output_config"], **extra.get("output_config", {})}
-    return {**asked, **extra, "output_config": config}
-
-
 def _abilities(found: Any) -> Abilities:
     """What the service says of a model, which it may not."""
     said = getattr(found, "capabilities", None)
     efforts = getattr(said, "effort", None)
     known = [name for name in ("low", "medium", "high", "xhigh", "max") if _has(efforts, name)]
     types = getattr(getattr(said, "thinking", None), "types", None)
-    return Abilities(_has(types, "adaptive"), None if efforts is None else tuple(known))
+    form = getattr(getattr(said, "structured_outputs", None), "supported", None)
+    takes = None if efforts is None else tuple(known)
+    return Abilities(_has(types, "adaptive"), takes, form is not False)
 
 
 def _has(said: Any, name: str) -> bool:

@@ -26,6 +26,7 @@ from joda.propose.asking import (
     refused,
 )
 from joda.propose.price import Tally, Tokens
+from joda.propose.replies import PLAINLY, bare
 from joda.propose.service import Credentials, counted, host
 
 if TYPE_CHECKING:
@@ -39,10 +40,6 @@ REFUSALS = (400, 415, 422)
 FORMAT = re.compile("schema|grammar|response_format|structured|json", re.IGNORECASE)
 TOO_MUCH = re.compile(
     "max_tokens|max_completion_tokens|context (?:length|size|window)", re.IGNORECASE
-)
-PLAINLY = (
-    "Answer with one JSON object and nothing else: no words before or after it, no Markdown. It "
-    "must obey this JSON Schema:\n"
 )
 
 
@@ -160,7 +157,7 @@ class OpenAI(VisionModel):
             told = "does not answer as the chat API does; check --base-url, it mostly ends in /v1."
             raise ProposalFailed(f"{host(client)} {told}", tally.usage)
         tally.pay(_tokens(getattr(answer, "usage", None)))
-        text = self._credentials.hide(_bare(_text(getattr(said, "content", None))))
+        text = self._credentials.hide(bare(_text(getattr(said, "content", None))))
         refusal = getattr(said, "refusal", None)
         end = getattr(choice, "finish_reason", None)
         if refusal or end == "content_filter":
@@ -260,13 +257,6 @@ def _text(content: Any) -> str:
         return content
     parts = (part.get("text") for part in _list(content) if isinstance(part, dict))
     return "".join(part for part in parts if isinstance(part, str))
-
-
-def _bare(text: str) -> str:
-    """The JSON object in an answer, without thoughts, words and Markdown around it."""
-    if not text.lstrip().startswith("{"):
-        text = text.rpartition("</think>")[2]
-    return text[text.find("{") : text.rfind("}") + 1] or text
 
 
 def _list(value: Any) -> list[Any]:

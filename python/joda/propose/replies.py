@@ -23,6 +23,20 @@ UNSUPPORTED = {
 """Keywords of JSON Schema that structured output does not know, or that `schema.md` says better."""
 
 
+PLAINLY = (
+    "Answer with one JSON object and nothing else: no words before or after it, no Markdown. It "
+    "must obey this JSON Schema:\n"
+)
+"""For a model that cannot be held to a schema; the schema follows."""
+
+
+def bare(text: str) -> str:
+    """The JSON object in an answer, without thoughts, words and Markdown around it."""
+    if not text.lstrip().startswith("{"):
+        text = text.rpartition("</think>")[2]
+    return text[text.find("{") : text.rfind("}") + 1] or text
+
+
 def schema(templates: Mapping[str, Template]) -> dict[str, Any]:
     """The JSON Schema of an answer, within what structured output supports.
 
