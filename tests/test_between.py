@@ -12,14 +12,21 @@ from joda.effects import EndStopRestitution
 from joda.joints import single
 from joda.joints.parameters import KINDS, Parameters
 from joda.refining.between import Between
+from joda.refining.engine import JointEngine
+from joda.refining.shooting import Shooting
 
 
 def between(case, kinds=("values", "intervals"), profile=None, **changed) -> Between:
     """A planted case; `changed` is what of the joint is wrong."""
     model = quiet_rig(case.found, case.true)
     joint = replace(single.single(case.found, case.true, model, 0), **changed)
-    span = float(np.ptp(case.found.joint.range))
-    return Between(joint, Parameters(profile or case.start, kinds), case.runs, NOISE * span, STEP)
+    return between_of(joint, Parameters(profile or case.start, kinds), case.runs)
+
+
+def between_of(joint, parameters, runs=()) -> Between:
+    span = parameters.profile.joint.range
+    engine = JointEngine(joint, span, runs, NOISE * float(np.ptp(span)), STEP)
+    return Between(Shooting(engine, parameters))
 
 
 def truth(case, parameters: Parameters):
@@ -110,14 +117,13 @@ def test_every_kind_of_number_does_what_it_does_in_mujoco():
     found = context(MODELS + "/cabinet.xml", "door")
     profile = cabinet_profile(found, 2.5, 0.4)
     parameters = Parameters(profile, KINDS)
-    joint = Between(
-        single.single(found, profile, quiet_rig(found, profile), 0), parameters, [], 1e-3, STEP
-    )
+    own = single.single(found, profile, quiet_rig(found, profile), 0)
+    shooting = between_of(own, parameters).shooting
     theta = parameters.start + 0.05 * np.random.default_rng(0).uniform(size=len(parameters.start))
     force = 8 * np.sin(6 * STEP * np.arange(600))
     start = np.array([[0.3, 0.5]])
-    path = joint.solo(theta).replay(force, np.zeros(1, int), start, np.array([True]), STEP)[1]
-    body = joint.body(theta)
+    path = shooting.mover(theta).replay(force, np.zeros(1, int), start, np.array([True]), STEP)[1]
+    body = shooting.engine.body(parameters, theta)
     model = quiet_rig(
         single.weighing(found.model_copy(update={"equivalent_inertia": body.inertia}), body),
         parameters.written(theta, exact=True),
@@ -144,10 +150,10 @@ def test_the_ends_bounce_as_those_of_the_model(end):
     own = single.single(found, profile, model, 0)
     solref, solimp = own.limits(profile, STEP)
     parameters = Parameters(profile, KINDS)
-    joint = Between(replace(own, solref=solref, solimp=solimp), parameters, [], 1e-3, STEP)
+    shooting = between_of(replace(own, solref=solref, solimp=solimp), parameters).shooting
     force = np.repeat([-40.0, 40.0, 40.0, -40.0], 150)
     begin = np.zeros(1, int), np.array([[0.3, 0.5]]), np.array([True])
-    path = joint.solo(parameters.start).replay(force, *begin, STEP)[1]
+    path = shooting.mover(parameters.start).replay(force, *begin, STEP)[1]
     wanted = own.solo(profile, STEP).replay(force, *begin, STEP)[1]
     np.testing.assert_array_equal(path, wanted)
     assert path.min() < found.joint.range[0] and path.max() > found.joint.range[1]

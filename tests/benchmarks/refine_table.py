@@ -23,6 +23,7 @@ from joda.joints.rig import rig
 from joda.joints.single import single
 from joda.measured.runs import Run
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
+from joda.refining.engine import JointEngine, noise
 from joda.refining.fitting import Problem
 from joda.scenes.context import Context
 from joda.scenes.motion import Motion, release
@@ -99,13 +100,15 @@ def problem_of(found: Context, start: Profile, runs, kinds=("values", "intervals
     """The fit of a profile to runs."""
     joint = single(found, start, quiet_rig(found, start), 0)
     parameters = Parameters(start, kinds, gravity=gravity_scale(found, start))
-    return Problem(joint, parameters, runs, STEP)
+    span = found.joint.range
+    engine = JointEngine(joint, span, runs, noise(runs, float(np.ptp(span))), STEP)
+    return Problem(engine, parameters)
 
 
 def missed(found: Context, profile: Profile, runs, windows: bool = False) -> float:
     """RMS misfit of whole runs, or of windows of 0.4 s, rad or m."""
     one = problem_of(found, profile, runs)
-    return one.between.rms(one.long if windows else one.whole, one.parameters.start)
+    return one.shooting.rms(one.long if windows else one.whole, one.parameters.start)
 
 
 # --- planted profiles

@@ -28,6 +28,7 @@ from joda.pictures.style import png
 from joda.profile import Profile
 from joda.refining.acceptance import refused
 from joda.refining.curvefit import CurveProblem
+from joda.refining.engine import JointEngine, noise
 from joda.refining.fitting import Problem
 from joda.refining.refinement import extrapolated, history, picture, unseen
 from joda.scenes.attaching import attached
@@ -179,17 +180,18 @@ def refine(
     def all_of(profile: Profile) -> Profile:
         return whole_profile(compiled, number, profile)
 
+    span = begin.joint.range
+    sigma = noise(parts, float(np.ptp(span)))
+    engine = JointEngine(at_first.single, span, parts, sigma, at_first.timestep, all_of)
     problem: Problem | CurveProblem = (
-        Problem(at_first.single, parameters, parts, at_first.timestep, all_of)
-        if timed
-        else CurveProblem(found, all_of, parameters, still)
+        Problem(engine, parameters) if timed else CurveProblem(found, all_of, parameters, still)
     )
     was = problem.paths(parameters.start)
     result = problem.fit(iterations, lambda stage, k, rms: progress(stage, k, iterations, rms))
     parameters = problem.parameters
     after = parameters.written(result.theta)
     mended = all_of(after)
-    body = problem.body(result.theta) if set(fit) - set(STILL) else None
+    body = engine.body(parameters, result.theta) if set(fit) - set(STILL) else None
     if body:  # armature is all of the inertia that is written
         bodies = found.equivalent_inertia - compiled.dof_armature[compiled.jnt_dofadr[number]]
         body = replace(body, inertia=max(body.inertia, float(bodies)))
@@ -277,13 +279,13 @@ def _beyond(
 ) -> tuple[dict[str, str], list[str]]:
     """What was fitted besides the profile: attributes for the joint, and sentences."""
     also, said = {}, []
-    pairs = zip(parameters.slots, theta * parameters.scales, strict=True)
-    values = {(slot.kind, slot.index): value for slot, value in pairs}
-    if ("damping_ratio", 0) in values:
+    if "damping_ratio" in parameters.kinds:
         constant, ratio = model.jnt_solref[joint]
-        also["solreflimit"] = f"{constant:.6g} {ratio * np.exp(values['damping_ratio', 0]):.6g}"
-    if ("inertia", 0) in values:
-        inertia = found.equivalent_inertia * np.exp(values["inertia", 0])
+        also["solreflimit"] = (
+            f"{constant:.6g} {ratio * np.exp(parameters.number(theta, 'damping_ratio')):.6g}"
+        )
+    if "inertia" in parameters.kinds:
+        inertia = found.equivalent_inertia * np.exp(parameters.number(theta, "inertia"))
         armature = model.dof_armature[model.jnt_dofadr[joint]] + inertia - found.equivalent_inertia
         unit = "kg·m²" if found.joint.type == "hinge" else "kg"
         said.append(f"Inertia: {found.equivalent_inertia:.4g} → {inertia:.4g} {unit}.")
@@ -295,8 +297,8 @@ def _beyond(
                 "errors are those with the bodies as they are."
             )
             also["armature"] = "0"
-    if ("gravity", 0) in values:
-        a, b = (values.get(("gravity", k), 0.0) for k in (0, 1))
+    if "gravity" in parameters.kinds:
+        a, b = (parameters.number(theta, "gravity", k) for k in (0, 1))
         what = f"{a:.4g} cos q + {b:.4g} sin q N·m" if found.joint.type == "hinge" else f"{a:.4g} N"
         said.append(
             f"Gravity's force on the joint lacks {what}: it is in the profile as a gravity_offset; "

@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from joda._core import Solo
-from joda.diagnosis.windows import Windows
+from joda.diagnosis.windows import Mover, Windows
 from joda.joints.least_squares import Inequalities, bounded_step
 
 Array = NDArray[np.float64]
-Make = Callable[[Array], Solo]
-"""A joint with its numbers."""
+Make = Callable[[Array], Mover]
+"""A joint, or a scene, with its numbers."""
 
 BLAS = "blas"
 """Fits' matrices are small: threads of their own would only be in the way of ours."""
@@ -115,7 +114,7 @@ class Fit:
 
     Attributes:
         x: its numbers, shape (k,).
-        start: of the windows, shape (m, 2).
+        start: of the windows, shape (m, d).
         squares: sum of squared residuals of each window, shape (m,).
         loss: robust, with the numbers' penalty; twice a negative log-likelihood.
     """
@@ -133,8 +132,8 @@ class Linear:
     Attributes:
         r: shape (m, n).
         J: by the numbers, shape (m, n, k).
-        S: by the starts' doubts, shape (m, n, 2).
-        z: how far the starts are from the measured ones, in doubts, shape (m, 2).
+        S: by the starts' doubts, shape (m, n, d).
+        z: how far the starts are from the measured ones, in doubts, shape (m, d).
         weight: of each window, shape (m,).
     """
 
@@ -146,8 +145,8 @@ class Linear:
 
     @cached_property
     def inverse(self) -> Array:
-        """Of the starts' own normal matrices, shape (m, 2, 2)."""
-        A = np.einsum("mni,mnj->mij", self.S, self.S) + np.eye(2)
+        """Of the starts' own normal matrices, shape (m, d, d)."""
+        A = np.einsum("mni,mnj->mij", self.S, self.S) + np.eye(self.S.shape[2])
         return np.asarray(np.linalg.inv(A))
 
     def products(self, a: Array, b: Array, za: Array | None = None) -> Array:
@@ -155,7 +154,7 @@ class Linear:
 
         Args:
             a, b: shapes (m, n, p) and (m, n, q).
-            za: a's part on the starts' own rows, shape (m, 2, p); None: zero.
+            za: a's part on the starts' own rows, shape (m, d, p); None: zero.
         """
         across = self.S.transpose(0, 2, 1)
         Sa, Sb = across @ a, across @ b
@@ -181,7 +180,7 @@ class Linear:
         return np.asarray(w * H), np.asarray((w * g)[:, :, 0])
 
     def follow(self, move: Array) -> Array:
-        """How the starts move, in doubts, when the numbers do; shape (m, 2)."""
+        """How the starts move, in doubts, when the numbers do; shape (m, d)."""
         g = np.einsum("mni,mn->mi", self.S, self.r + self.J @ move) + self.z
         return np.asarray(-np.einsum("mij,mj->mi", self.inverse, g))
 
@@ -211,7 +210,7 @@ class Judge:
         """The same in longer steps, see `Windows.coarser`."""
         return replace(self, windows=self.windows.coarser())
 
-    def squares(self, solo: Solo, start: Array) -> tuple[Array, Array]:
+    def squares(self, solo: Mover, start: Array) -> tuple[Array, Array]:
         """Residuals, and with the starts' prior their sum of squares by window."""
         windows = self.windows
         r = windows.residuals(windows.misfit(solo, start))
@@ -252,35 +251,62 @@ class Judge:
         bend: float = BEND,
         central: bool = True,
     ) -> Linear:
-        """The model about a point, by central differences or by one-sided ones."""
-        windows, k = self.windows, len(x)
-        solo, off = make(x), np.diag(unknowns.step)
-        up, down = np.minimum(x + off, unknowns.high), np.maximum(x - off, unknowns.low)
-        if not central:
-            up = np.where((np.diag(up) > x)[:, None], up, down)
-        tried = (*up, *down) if central else tuple(up)
-        misfits = [windows.misfit(make(y), start) for y in tried]
-        misfits += [windows.misfit(solo, start + NUDGE * windows.doubt * way) for way in np.eye(2)]
-        found = windows.residuals(np.stack(misfits, axis=1))
+        """The model about a point; `central` or one-sided, where slopes are differences."""
+        windows, solo = self.windows, make(x)
         r, squares = self.squares(solo, start)
-        base = found[:, :, k : 2 * k] if central else r[:, :, None]
-        J = (found[:, :, :k] - base) / (np.diag(up - down) if central else np.diag(up) - x)
-        S = (found[:, :, len(tried) :] - r[:, :, None]) / NUDGE
+        J, S = self.slopes(make, solo, unknowns, x, start, r, central)
         room = bend * np.maximum(windows.count, 1)
         weight = np.where(self.counts, 1 / (1 + squares / room), 0.0)
         z = (start - windows.start) / windows.doubt
         return Linear(r, J, S, z, weight)
 
-    def started(self, solo: Solo, iterations: int = 8) -> Fit:
+    def slopes(
+        self,
+        make: Make,
+        solo: Mover,
+        unknowns: Unknowns,
+        x: Array,
+        start: Array,
+        r: Array,
+        central: bool,
+    ) -> tuple[Array, Array]:
+        """Derivatives of the residuals, by central differences or by one-sided ones.
+
+        Args:
+            make, solo: the model, and with the numbers x.
+            unknowns: the numbers.
+            x, start: the point.
+            r: the residuals there.
+            central: see above.
+
+        Returns:
+            by the numbers and by the starts' doubts, as in `Linear`.
+        """
+        windows, k = self.windows, len(x)
+        off = np.diag(unknowns.step)
+        up, down = np.minimum(x + off, unknowns.high), np.maximum(x - off, unknowns.low)
+        if not central:
+            up = np.where((np.diag(up) > x)[:, None], up, down)
+        tried = (*up, *down) if central else tuple(up)
+        misfits = [windows.misfit(make(y), start) for y in tried]
+        ways = np.eye(start.shape[1])
+        misfits += [windows.misfit(solo, start + NUDGE * windows.doubt * way) for way in ways]
+        found = windows.residuals(np.stack(misfits, axis=1))
+        base = found[:, :, k : 2 * k] if central else r[:, :, None]
+        J = (found[:, :, :k] - base) / (np.diag(up - down) if central else np.diag(up) - x)
+        S = (found[:, :, len(tried) :] - r[:, :, None]) / NUDGE
+        return J, S
+
+    def started(self, solo: Mover, iterations: int = 8) -> Fit:
         """Starts fitted to a joint, each window by itself: where one is stuck, others go on."""
         windows = self.windows
         start = windows.start
         squares = self.squares(solo, start)[1]
-        damping = np.full(len(start), 1e-3)
+        damping, unit = np.full(len(start), 1e-3), np.eye(start.shape[1])
         for _ in range(iterations):
             about = self.linear(lambda _: solo, NOTHING, EMPTY, start)
-            A = np.einsum("mni,mnj->mij", about.S, about.S) + np.eye(2)
-            A = A * (1 + damping[:, None, None] * np.eye(2))
+            A = np.einsum("mni,mnj->mij", about.S, about.S) + unit
+            A = A * (1 + damping[:, None, None] * unit)
             g = np.einsum("mni,mn->mi", about.S, about.r) + about.z
             moved = start - windows.doubt * np.linalg.solve(A, g[:, :, None])[:, :, 0]
             trial = self.squares(solo, moved)[1]
@@ -316,7 +342,7 @@ class Judge:
             make: the joint with its numbers.
             unknowns: the numbers.
             x: where to begin, within the bounds, shape (k,).
-            start: of the windows, shape (m, 2); None: as measured.
+            start: of the windows, shape (m, d); None: as measured.
             iterations: at most so many.
             bend: mean square residual from which a window counts as its logarithm.
             told: after each iteration, the best so far.

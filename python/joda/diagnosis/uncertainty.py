@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._core import Solo
 from joda.diagnosis.asking import RESTITUTION, Asked
 from joda.diagnosis.baseline import joined
 from joda.diagnosis.guessing import Guess
@@ -30,6 +29,7 @@ from joda.diagnosis.hypotheses.base import (
 from joda.diagnosis.hypotheses.intervals import GRID
 from joda.diagnosis.judge import Judge, Make, Unknowns
 from joda.diagnosis.knocks import Rebound, best_ratio, ends_of
+from joda.diagnosis.windows import Mover
 from joda.field import merge
 from joda.profile import CHANNELS, Profile
 
@@ -301,7 +301,7 @@ def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Arra
             for far in STEPS:
                 value = float(np.clip(x[k] + way * far * step, unknowns.low[k], unknowns.high[k]))
 
-                def make(y: Array, value: float = value, k: int = int(k)) -> Solo:
+                def make(y: Array, value: float = value, k: int = int(k)) -> Mover:
                     return fitted.make(np.insert(y, k, value))
 
                 fit = judge.fit(make, others, y, near, ITERATIONS)

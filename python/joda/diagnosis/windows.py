@@ -7,11 +7,10 @@ the covariance of both noises.
 """
 
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
-
-from joda._core import Solo
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
@@ -23,18 +22,37 @@ LOOSE = 10.0
 """How much further than its measurement's error a start may be from the measured one."""
 
 
+class Mover(Protocol):
+    """What moves under a force from the states that it is put to: a joint by itself in C++
+    (`joda._core.Solo`), or a scene."""
+
+    def replay(
+        self,
+        force: ArrayLike,
+        at: ArrayLike,
+        start: ArrayLike,
+        fresh: ArrayLike,
+        h: float,
+        command: ArrayLike | None = None,
+    ) -> tuple[Array, Array]:
+        """Positions before and after each step; the arguments are those of `Windows`."""
+        ...
+
+
 @dataclass(frozen=True)
 class Windows:
     """Windows of runs, simulated side by side.
 
     Attributes:
         h: step, s.
-        force: at each step, N·m or N, shape (steps,).
+        force: at each step, N·m or N, shape (steps,); of a scene all that is put into it, shape
+            (steps, inputs).
         command: of an actuator there, see `Servo`; None where none acted.
         at: step at which each window begins, shape (m,).
         fresh: whether it begins a run, shape (m,).
-        start: measured position and velocity there, shape (m, 2).
-        doubt: their standard deviations, shape (m, 2).
+        start: measured position and velocity there, shape (m, 2); of several joints of a scene one
+            after the other, shape (m, 2 joints).
+        doubt: their standard deviations, of the same shape.
         step, share: step of each sample, and how far it is into it; shape (n,).
         position: measured, rad or m, shape (n,).
         time: s, shape (n,).
@@ -126,7 +144,7 @@ class Windows:
             rests=self.rests[kept],
         )
 
-    def misfit(self, solo: Solo, start: Array) -> Array:
+    def misfit(self, solo: Mover, start: Array) -> Array:
         """Predicted minus measured positions, rad or m, shape (n,)."""
         starts = self.at, start, self.fresh
         before, after = solo.replay(self.force, *starts, self.h, self.command)
@@ -154,7 +172,7 @@ HUGE = 1e4
 
 
 def evenly(
-    solo: Solo,
+    solo: Mover,
     force: Array,
     position: Array,
     velocity: Array,

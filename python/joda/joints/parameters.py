@@ -164,6 +164,11 @@ class Parameters:
         """The same numbers, or those of other kinds, of another profile of the same form."""
         return self._made(profile, kinds or self.kinds)
 
+    def number(self, theta: Array, kind: Kind, index: int = 0) -> float:
+        """One of the numbers in its unit, by kind and index; 0 where it is not among them."""
+        pairs = zip(self.slots, theta * self.scales, strict=True)
+        return next((float(x) for s, x in pairs if (s.kind, s.index) == (kind, index)), 0.0)
+
     def written(self, theta: Array, *, exact: bool = False) -> Profile:
         """The profile with these numbers, to six digits unless `exact`."""
         content = self.profile.model_dump()

@@ -82,9 +82,6 @@ class CurveProblem:
         """RMS misfit over the way, N·m or N."""
         return float(np.sqrt(np.mean(self._misfit(theta) ** 2)))
 
-    def body(self, theta: Array) -> None:
-        """None: what moves is not in curves."""
-
     def fit(
         self,
         iterations: int,

@@ -7,7 +7,7 @@ whole runs (multiple shooting: Bock 1983). The starts are fitted too, within the
 error. What the motion does not show is held by a prior at its first value, of the size found.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from joda.diagnosis.judge import Judge
 from joda.joints.least_squares import Fit
 from joda.joints.parameters import Parameters
-from joda.joints.single import Single
-from joda.measured import smoothing
-from joda.measured.runs import Run, known
-from joda.profile import Profile
+from joda.measured.runs import known
 from joda.refining.between import Between
+from joda.refining.engine import Engine
+from joda.refining.shooting import Shooting
 from joda.refining.sizes import sized
 
 Array = NDArray[np.float64]
@@ -46,8 +45,6 @@ BETWEEN = 12
 """Iterations at most with windows between the jumps."""
 MISSED = 1.2
 """Whole runs that are missed by more than so many times the noise leave something to fit."""
-FINEST = 2e-5
-"""Least noise that is believed, in units of the range."""
 
 
 class Problem:
@@ -63,42 +60,33 @@ class Problem:
 
     notes: tuple[str, ...] = ()
 
-    def __init__(
-        self,
-        single: Single,
-        parameters: Parameters,
-        runs: Sequence[Run],
-        h: float,
-        whole: Callable[[Profile], Profile] = lambda profile: profile,
-    ) -> None:
-        """Args: the joint; what may change; measured runs; timestep, s; what makes all that acts
-        on the joint of its profile."""
-        self.parameters = parameters
-        self.span = float(np.ptp(parameters.profile.joint.range))
-        noises = [smoothing.noise(run.time, run.position) for run in runs]
-        self.sigma = max(float(np.median(noises)), FINEST * self.span)
-        self.runs = [(run.time[k], run.position[k]) for run in runs for k in known(run)]
+    def __init__(self, engine: Engine, parameters: Parameters) -> None:
+        """Args: what simulates the joint; what may change."""
+        self.parameters, self.sigma = parameters, engine.sigma
+        self.span = float(np.ptp(engine.range))
+        self.runs = [(run.time[k], run.position[k]) for run in engine.runs for k in known(run)]
         self.axes = "time (s)", f"position ({parameters.profile.joint.unit})"
-        self.between = Between(single, parameters, runs, self.sigma, h, whole)
+        self.shooting = Shooting(engine, parameters)
         durations = [float(np.ptp(time)) for time, _ in self.runs]
         least = sum(durations) / MOST
         self.short, self.long, self.whole = (
-            self.between.judge(length)
-            for length in (max(SHORT, least), max(LONG, least), max(durations) + h)
+            self.shooting.judge(length)
+            for length in (max(SHORT, least), max(LONG, least), max(durations) + engine.h)
         )
+
+    @property
+    def between(self) -> Between:
+        """Fits between the jumps of the force."""
+        return Between(self.shooting)
 
     def rms(self, theta: Array) -> float:
         """RMS misfit of whole runs, from starts that are fitted, rad or m."""
-        return self.between.rms(self.whole, theta)
-
-    def body(self, theta: Array) -> Single:
-        """All of the joint but its profile, with these numbers."""
-        return self.between.body(theta)
+        return self.shooting.rms(self.whole, theta)
 
     def paths(self, theta: Array) -> list[Array]:
         """Predicted positions at the times of `runs`, from starts that are fitted."""
-        path = self.whole.windows.position + self.between.misfit(self.whole, theta)
-        return np.split(path, np.cumsum([len(time) for time, _ in self.runs])[:-1])
+        path = self.whole.windows.position + self.shooting.misfit(self.whole, theta)
+        return np.split(path, np.cumsum([len(time) for time, _ in self.runs]))[: len(self.runs)]
 
     def fit(
         self,
@@ -111,24 +99,24 @@ class Problem:
             iterations: at most so many, of each; of a fit of sizes each start counts as one.
             told: after each, the stage, its number and the stage's RMS misfit.
         """
-        begun = self.parameters, self.between
+        begun = self.parameters, self.shooting
         sizes = iterations >= MANY and "values" in self.parameters.kinds
         first = self._fit(iterations, told, sizes)
         missed = self._missed(first)
         if not sizes or first.interrupted or missed < STUCK * self.sigma:
             return first
-        found = self.parameters, self.between
-        self.parameters, self.between = begun
+        found = self.parameters, self.shooting
+        self.parameters, self.shooting = begun
         more = len(first.history)
         again = self._fit(iterations, lambda name, k, rms: told(name, more + k, rms), sizes=False)
         history = first.history + again.history
         if missed <= self._missed(again):
-            (self.parameters, self.between), again = found, first
+            (self.parameters, self.shooting), again = found, first
         return replace(again, history=history)
 
     def _missed(self, found: Fit) -> float:
         """By how much short windows are missed, RMS, rad or m."""
-        return self.between.rms(self.short, found.theta)
+        return self.shooting.rms(self.short, found.theta)
 
     def _fit(
         self,
@@ -159,7 +147,7 @@ class Problem:
 
         def run(name: str, judge: Judge, most: int, doubt: Array = free) -> None:
             if count := min(most, iterations - len(history)):
-                self.between.fit_windows(
+                self.shooting.fit_windows(
                     judge, self._best, doubt, count, lambda x, misfit: heard(name, x, misfit)
                 )
 
@@ -177,12 +165,12 @@ class Problem:
             return missed
 
         def size(parameters: Parameters, misfit: float) -> None:
-            self.parameters, self.between = parameters, self.between.about(parameters)
+            self.parameters, self.shooting = parameters, self.shooting.about(parameters)
             heard("sizes", parameters.start, misfit)
 
         try:
             if sizes:
-                sized(self.between, self.short, FIRST, size)
+                sized(self.shooting, self.short, FIRST, size)
             run("short windows, intervals held", self.short, min(FIRST, iterations // 3), held)
             follows = self.rms(self._best) < FOLLOWS * self.span
             if not follows:
@@ -196,7 +184,7 @@ class Problem:
                     self._best = min(before, self._best, key=self.rms)
         except KeyboardInterrupt:
             interrupted = True
-        covariance = self.between.covariance(self.long, self._best)
+        covariance = self.shooting.covariance(self.long, self._best)
         return Fit(self._best, covariance, tuple(history), interrupted)
 
     def _alternate(self, run: Callable[[str, Judge, int], None], iterations: int) -> None:
@@ -206,7 +194,7 @@ class Problem:
         for _ in range(TURNS):
             run("short windows", self.short, max(iterations // 12, 1))
             run("long windows", self.long, max(iterations // 6, 1))
-            misfits = [self.between.rms(judge, self._best) for judge in (self.short, self.long)]
+            misfits = [self.shooting.rms(judge, self._best) for judge in (self.short, self.long)]
             misfit = float(np.prod(misfits))
             if misfit < least:
                 best = self._best

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.judge import Judge
 from joda.joints.parameters import Kind, Parameters
-from joda.refining.between import Between
+from joda.refining.shooting import Shooting
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ NOISE = 1.1
 
 
 def sized(
-    between: Between,
+    shooting: Shooting,
     judge: Judge,
     iterations: int,
     told: Callable[[Parameters, float], None],
@@ -37,28 +37,28 @@ def sized(
     """Fits sizes, then sizes and intervals together, each from several starts.
 
     Args:
-        between: the joint and its runs; intervals are fitted if they are among its numbers.
+        shooting: the joint and its runs; intervals are fitted if they are among its numbers.
         judge: of short windows.
         iterations: at most so many from each start.
         told: after each start, the parameters about the best profile so far, and its RMS misfit in
             those windows, rad or m.
     """
-    parameters, found = between.parameters, between.parameters.profile
+    parameters, found = shooting.parameters, shooting.parameters.profile
     both: list[tuple[Kind, ...]] = [("sizes",)]
     if any(slot.kind == "intervals" for slot in parameters.slots):
         both.append(("sizes", "intervals"))
     for kinds in both:
-        other = between.about(parameters.about(found, kinds))
+        other = shooting.about(parameters.about(found, kinds))
         least = np.inf
         for start in _starts(other.parameters):
             x = other.fit_windows(judge, start, other.parameters.doubt, iterations)
             x = _inside(other.parameters, x)
-            loss = judge.started(other.solo(x)).loss
+            loss = judge.started(other.mover(x)).loss
             if loss < least:
                 least, misfit = loss, other.rms(judge, x)
                 found = other.parameters.written(x, exact=True)
             told(parameters.about(found), misfit)
-            if misfit < NOISE * between.sigma:
+            if misfit < NOISE * shooting.engine.sigma:
                 return
 
 
