@@ -34,6 +34,8 @@ HOP = 0.25
 """How far a joint must fall back to an end to knock there, in units of that."""
 APPROACH = 8
 """Samples before a knock that belong to it."""
+SURE = 0.1
+"""Of the error of a velocity at first, where the joint rests."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a window's samples share it."""
 CLEAR = 1.5
@@ -85,19 +87,14 @@ def windows_of(
             many = len(begins)
             window = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST
-            begun = smoothing.smooth(time, position, time[0] + h * begins, sigma)
-            velocity, doubt = begun.velocity.copy(), begun.velocity_error.copy()
-            if smoothing.begins_at_rest(time, position, sigma):
-                velocity[0], doubt[0] = 0.0, 0.1 * doubt[0] / LOOSE
+            start, doubt = starts(time, position, time[0] + h * begins, sigma)
             force = np.interp(time[0] + h * np.arange(steps), time, run.force[piece])
             fresh = np.arange(many) == 0
-            start = np.stack([begun.position, velocity], axis=1)
-            doubts = np.stack([begun.position_error, doubt], axis=1)
             same = np.full(many, number)
             edges = time[0] + h * np.arange(steps + 1)
             given = np.zeros(len(time)) if run.command is None else run.command[piece]
             command = held(time, given, edges)
-            parts.append((force, command, step + begins, fresh, start, doubts, same))
+            parts.append((force, command, step + begins, fresh, start, doubt, same))
             acted = run.command is not None or bool(np.any(run.force[piece]))
             window = np.where(
                 enough[window] & _thinned(index // chunk, position / spread, not acted),
@@ -120,7 +117,7 @@ def windows_of(
         at=at,
         fresh=fresh,
         start=start,
-        doubt=LOOSE * doubts,
+        doubt=doubts,
         step=index,
         share=share,
         position=position,
@@ -133,6 +130,25 @@ def windows_of(
         rests=_rests(rows, (position - lo) / span, spread / span),
         command=command if driven else None,
     )
+
+
+def starts(time: Array, position: Array, at: Array, sigma: float) -> tuple[Array, Array]:
+    """States from which windows begin, and how far the true ones may be from them.
+
+    Args:
+        time, position: of a run's samples, s and rad or m; shape (n,).
+        at: when the windows begin, s, the first with the run; shape (m,).
+        sigma: noise of the position, rad or m.
+
+    Returns:
+        positions and velocities, and their doubts; shape (m, 2) each.
+    """
+    begun = smoothing.smooth(time, position, at, sigma)
+    start = np.stack([begun.position, begun.velocity], axis=1)
+    doubt = LOOSE * np.stack([begun.position_error, begun.velocity_error], axis=1)
+    if smoothing.begins_at_rest(time, position, sigma):
+        start[0, 1], doubt[0, 1] = 0.0, SURE * begun.velocity_error[0]
+    return start, doubt
 
 
 def _step(timestep: float, length: float, usual: float, steps: int) -> float:

@@ -147,9 +147,13 @@ class Windows:
     def misfit(self, solo: Mover, start: Array) -> Array:
         """Predicted minus measured positions, rad or m, shape (n,)."""
         starts = self.at, start, self.fresh
-        before, after = solo.replay(self.force, *starts, self.h, self.command)
-        here = before[self.step]
-        return np.asarray(here + self.share * (after[self.step] - here) - self.position)
+        return self.sampled(*solo.replay(self.force, *starts, self.h, self.command)) - self.position
+
+    def sampled(self, before: Array, after: Array) -> Array:
+        """What is known before and after each step, shape (steps, ...), at the samples."""
+        here, share = before[self.step], self.share
+        share = share.reshape(-1, *[1] * (here.ndim - 1))
+        return np.asarray(here + share * (after[self.step] - here))
 
     def residuals(self, misfit: Array) -> Array:
         """Of variance 1 where the model is true; filling is 0.
@@ -160,11 +164,14 @@ class Windows:
         Returns:
             shape (m, most samples) or (m, most samples, k).
         """
+        return np.nan_to_num(np.clip(self.weighed(misfit), -HUGE, HUGE), nan=HUGE)
+
+    def weighed(self, misfit: Array) -> Array:
+        """The same, however large: of misfits, or of their derivatives."""
         each = misfit.reshape(len(misfit), -1)
         own = self.sharpness[:, :, None] * each[self.rows]
         own -= self.shared @ (self.shared.transpose(0, 2, 1) @ own)
-        out = np.nan_to_num(np.clip(own, -HUGE, HUGE), nan=HUGE)
-        return np.asarray(out.reshape(*self.rows.shape, *misfit.shape[1:]))
+        return np.asarray(own.reshape(*self.rows.shape, *misfit.shape[1:]))
 
 
 HUGE = 1e4

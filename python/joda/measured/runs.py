@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ class Run:
     origin: float = 0.0
     unread: tuple[str, ...] = ()
 
-    def part(self, samples: slice | NDArray[np.intp]) -> "Run":
+    def part(self, samples: slice | NDArray[np.intp]) -> Self:
         """The run with some of its samples only."""
         return replace(
             self,

@@ -9,13 +9,10 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from joda.errors import JodaError
 from joda.measured import smoothing
 from joda.measured.driven import joints_in
 from joda.measured.misfit import rms
-from joda.measured.runs import held, read_signals, read_together
-from joda.measured.table import header, read_table
-from joda.scenes.actuators import acting_on, actuators_on
+from joda.measured.scene_log import read_scene_run, unknown_command
 from joda.scenes.motion import unheard
 
 Array = NDArray[np.float64]
@@ -84,40 +81,18 @@ def _told(course: Course) -> Together:
 
 def course_of(model: mujoco.MjModel, path: Path) -> Course | None:
     """A log replayed, see `replayed_together`; None where a command or a force is not known."""
-    joints = joints_in(model, path)
-    if not joints:
-        raise JodaError(f"{path}: no column 'position:JOINT' of a hinge or slide of the model.")
-    ids = [int(model.joint(name).id) for name in joints]
-    acting = {
-        f"ctrl:{name}": number
-        for k in ids
-        for number, name in zip(acting_on(model, k), actuators_on(model, k), strict=True)
-    }
-    names = {name.lower() for name in header(path)}
-    if any(column.lower() not in names for column in acting):
+    ids = [int(model.joint(name).id) for name in joints_in(model, path)]
+    if unknown_command(model, path, ids):
         return None
-    pushed = {
-        f"force:{name}": int(model.jnt_dofadr[k])
-        for k, name in zip(ids, joints, strict=True)
-        if f"force:{name}".lower() in names
-    }
-    forces = read_table(path, [*pushed], "forces").columns if pushed else {}
-    if any(np.isnan(force).any() for force in forces.values()):
+    run = read_scene_run(model, path)
+    if np.isnan(run.force).any():
         return None
-    run, positions = read_together(path, joints[0], joints[1:])
     time = run.time - run.time[0]
     steps = int(np.ceil(time[-1] / model.opt.timestep))
     edges = model.opt.timestep * np.arange(steps + 1)
-    inputs = np.zeros((steps, model.nu + model.nv))
-    if acting:
-        signals = read_signals(path, [*acting])
-        for number, signal in zip(acting.values(), signals.T, strict=True):
-            inputs[:, number] = held(time, signal, edges)
-    for name, force in forces.items():
-        inputs[:, model.nu + pushed[name]] = np.interp(edges[:-1], time, force)
+    inputs = run.inputs(run.time[0] + edges)
     data = mujoco.MjData(model)
-    for k, name in zip(ids, joints, strict=True):
-        own = positions[name]
+    for k, own in zip(ids, run.positions.T, strict=True):
         sigma = max(smoothing.noise(run.time, own), 1e-12)
         data.qpos[model.jnt_qposadr[k]] = own[0]
         if not smoothing.begins_at_rest(run.time, own, sigma):
@@ -130,9 +105,10 @@ def course_of(model: mujoco.MjModel, path: Path) -> Course | None:
     course = np.vstack([state, states[0]])
     stable = bool(np.all(np.diff(course[:, 0]) > 0))  # else MuJoCo has begun anew
     paths = course[:, 1 : 1 + model.nq]
+    names = [model.joint(k).name for k in ids]
     replayed = {
         name: np.interp(time, edges, paths[:, model.jnt_qposadr[k]])
-        for k, name in zip(ids, joints, strict=True)
+        for k, name in zip(ids, names, strict=True)
     }
-    measured = {name: positions[name] for name in joints}
+    measured = dict(zip(names, run.positions.T, strict=True))
     return Course(run.name, time, measured, replayed, stable)

@@ -7,6 +7,7 @@ motion with its derivatives.
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from importlib import import_module
 from typing import Any
 
 import jax
@@ -23,11 +24,6 @@ from joda.mjx.state import put_state
 from joda.profile import Profile
 from joda.scenes.model import sentence
 
-try:
-    from jax import enable_x64
-except ImportError:  # before JAX 0.8
-    from jax.experimental import enable_x64
-
 Array = NDArray[np.float64]
 Numbers = tuple[Fields, dict[str, NDArray[Any]]]
 """Of profiles and of the model."""
@@ -40,6 +36,9 @@ FORCE = "_impl.efc_force"
 """What of the state a step hands to the next."""
 OWN = ("dof_armature", "dof_M0", "dof_invweight0", "body_invweight0", "jnt_solref")
 """Numbers of the model that change where a joint's inertia or the ends of its range do."""
+_where: Any = jax if hasattr(jax, "enable_x64") else import_module("jax.experimental")
+enable_x64 = _where.enable_x64
+"""What makes numbers double within; older versions of JAX have it in another place."""
 HELD = 1e8
 """Inertia of a joint that is held, in units of the scene's mean."""
 
@@ -147,7 +146,8 @@ class Scene:
         begun = np.concatenate([self._begun(start)[:, None], moved], axis=1)
 
         def go(state: Any, piece: Array) -> tuple[Any, Any]:
-            return self._along(numbers, tangents, state[:, 0], state[:, 1:], piece)
+            out: tuple[Any, Any] = self._along(numbers, tangents, state[:, 0], state[:, 1:], piece)
+            return out
 
         found = _run(go, begun, inputs)
         first = moved[:, None, :, self._places]
