@@ -58,6 +58,15 @@ def refine(
         int, typer.Option(min=0, max=3, help="So many times control points are doubled first.")
     ] = 0,
     passive: Passive = False,
+    scene: Annotated[
+        bool | None,
+        typer.Option(
+            "--scene/--no-scene",
+            help="Simulate the whole scene in MJX, or the joint by itself [default: the scene "
+            "where other joints of the logs, or contacts, move the joint].",
+            show_default=False,
+        ),
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -74,8 +83,8 @@ def refine(
         result = run(
             model, joint, runs, output, check=check or (), iterations=iterations,
             fit=[name.strip() for name in fit.split(",") if name.strip()],  # type: ignore[misc]
-            keep_shape=not free_shape, finer=finer, passive=passive, force=force,
-            progress=bar,
+            keep_shape=not free_shape, finer=finer, passive=passive, scene=scene,
+            force=force, progress=bar,
         )  # fmt: skip
     if as_json:
         print_json(with_text_paths(asdict(result)))

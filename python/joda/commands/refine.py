@@ -27,6 +27,7 @@ from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.profile import Profile
 from joda.refining.acceptance import refused
+from joda.refining.choosing import together
 from joda.refining.curvefit import CurveProblem
 from joda.refining.engine import JointEngine, noise
 from joda.refining.fitting import Problem
@@ -90,6 +91,7 @@ def refine(
     keep_shape: bool = True,
     finer: int = 0,
     passive: bool = False,
+    scene: bool | None = None,
     force: bool = False,
     progress: Callable[[str, int, int, float], None] = lambda stage, number, total, rms: None,
 ) -> Refined:
@@ -114,6 +116,8 @@ def refine(
         keep_shape: see above.
         finer: so many times a control point is put halfway between each two, before the fit.
         passive: whether the actuators on the joint, if there are any, were off.
+        scene: whether the whole scene is simulated, in MJX, instead of the joint by itself; None:
+            where other joints of the logs, or contacts, move the joint.
         force: overwrite what exists.
         progress: told the stage, the iteration, of how many at most, and the RMS misfit (rad or m;
             N·m or N of curves).
@@ -139,7 +143,11 @@ def refine(
         raise JodaError("no runs; give at least one CSV file with time and position.")
     compiled = load_model(source)
     number = find_joint(compiled, joint)
-    fitted, kept = (read_logs(compiled, number, paths, passive) for paths in (runs, check))
+    jointly, notes = together(compiled, number, runs, check, passive, scene)
+    fitted, kept = (
+        jointly.logs(compiled, paths) if jointly else read_logs(compiled, number, paths, passive)
+        for paths in (runs, check)
+    )
     measured, held_out, servo = fitted.read, kept.read, fitted.servo or kept.servo
     if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
         raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
@@ -151,7 +159,7 @@ def refine(
             "one with joda attach."
         )
     before, found = profiles[name], context(source, name)
-    notes = checked([*measured, *held_out], found, float(compiled.opt.timestep))
+    notes += checked([*measured, *held_out], found, float(compiled.opt.timestep))
     notes += [*fitted.notes, *kept.notes]
     whole = whole_profile(compiled, number, before)
     clear = clear_of_contacts(compiled, number, found, whole, measured)
@@ -182,21 +190,27 @@ def refine(
 
     span = begin.joint.range
     sigma = noise(parts, float(np.ptp(span)))
-    engine = JointEngine(at_first.single, span, parts, sigma, at_first.timestep, all_of)
+    by_itself = JointEngine(at_first.single, span, parts, sigma, at_first.timestep, all_of)
+    engine = jointly.engine(by_itself, number) if jointly else by_itself
     problem: Problem | CurveProblem = (
         Problem(engine, parameters) if timed else CurveProblem(found, all_of, parameters, still)
     )
-    was = problem.paths(parameters.start)
+    first, was = parameters, problem.paths(parameters.start)
     result = problem.fit(iterations, lambda stage, k, rms: progress(stage, k, iterations, rms))
     parameters = problem.parameters
     after = parameters.written(result.theta)
     mended = all_of(after)
-    body = engine.body(parameters, result.theta) if set(fit) - set(STILL) else None
+    body = by_itself.body(parameters, result.theta) if set(fit) - set(STILL) else None
     if body:  # armature is all of the inertia that is written
         bodies = found.equivalent_inertia - compiled.dof_armature[compiled.jnt_dofadr[number]]
         body = replace(body, inertia=max(body.inertia, float(bodies)))
 
     def beside(one: Measured) -> tuple[Error, Error]:
+        if jointly:
+            own = jointly.engine(replace(by_itself, runs=one.runs), number)
+            numbers = (first, first.start), (parameters, result.theta)
+            before, after = (Problem(own, which).error(theta) for which, theta in numbers)
+            return before, after
         return error(one), error(one.changed(mended, single=body))
 
     errors = beside(at_first)
@@ -206,14 +220,14 @@ def refine(
         raise JodaError(f"{target}: not written, as {reason}.{noted}")
     hidden = unseen(begin, parameters, result.covariance, away)
     also, besides = _beyond(parameters, result.theta, compiled, number, found)
-    scene, said, _ = attached(source, after, target, joint=name, native="keep", also=also)
+    written, said, _ = attached(source, after, target, joint=name, native="keep", also=also)
     notes += [*said, *besides, *problem.notes, *extrapolated(before, after, away)]
     balance = np.array(found.positions), -np.array(found.gravity_force)
     paths = was, problem.paths(result.theta)
     figure = picture(before, after, balance, problem, paths, hidden)
     write_together(
         {
-            target: scene,
+            target: written,
             others["composed.json"]: after.to_json(),
             others["png"]: png(figure),
             others["history.json"]: history(

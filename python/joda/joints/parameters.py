@@ -21,11 +21,12 @@ from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 Kind = Literal[
-    "values", "intervals", "strengths", "damping_ratio", "inertia", "gravity", "effects", "sizes"
+    *("values", "intervals", "strengths", "damping_ratio", "inertia", "gravity"),
+    *("effects", "sizes", "places"),
 ]
-KINDS: tuple[Kind, ...] = get_args(Kind)[:-2]
+KINDS: tuple[Kind, ...] = get_args(Kind)[:6]
 """What `joda refine` fits; effects' numbers are fitted by `joda.diagnosis.mending`, components'
-sizes before all else."""
+sizes before all else, and the places of those that have one interval together."""
 
 FARTHEST, LOGARITHM = 1e4, 8.0
 """Largest number, and largest logarithm of a size, that counts: a step may lead further."""
@@ -50,6 +51,7 @@ DOUBT: dict[Kind, float] = {
     "gravity": 0.2,
     "effects": 0.5,
     "sizes": 1.2,
+    "places": 0.1,
 }
 """How far (one standard deviation) a number may be from its first value before any data."""
 UNSEEN = 0.1
@@ -116,6 +118,8 @@ class Parameters:
         self._made: Callable[[Profile, Collection[Kind]], Parameters] = partial(
             Parameters, keep_shape=keep_shape, gravity=gravity, inertia=inertia, away=away
         )
+        self._alike = _alike(profile)
+        firsts = {group[0] for group in self._alike.values()}
         slots: list[Slot] = []
         start: list[float] = []
         rows: list[tuple[dict[int, float], float]] = []
@@ -131,8 +135,10 @@ class Parameters:
                     start.append(0.0)
                 if "values" in kinds:
                     _values(name, number, component, keep_shape, slots, start, rows)
-                if "intervals" in kinds:
-                    _interval(name, number, component, slots, start, rows)
+                alike = (name, number) in firsts and "places" in kinds
+                if "intervals" in kinds or alike:
+                    kind: Kind = "places" if alike else "intervals"
+                    _interval(name, number, component, slots, start, rows, kind)
         if "effects" in kinds:
             for number, effect in enumerate(profile.effects):
                 _effect(number, effect, inertia, slots, start, rows)
@@ -160,6 +166,11 @@ class Parameters:
                 G[row, column] = factor
         self.constraints = Inequalities(G, np.array([least for _, least in rows]))
 
+    def _interval_of(self, slot: Slot) -> tuple[float, float]:
+        components = getattr(self.profile.channels, slot.channel).components
+        interval: tuple[float, float] = components[slot.component].interval
+        return interval
+
     def about(self, profile: Profile, kinds: Collection[Kind] | None = None) -> "Parameters":
         """The same numbers, or those of other kinds, of another profile of the same form."""
         return self._made(profile, kinds or self.kinds)
@@ -183,7 +194,7 @@ class Parameters:
                     effect["y"] = y
                 else:
                     effect[slot.key] = number
-            if slot.kind not in ("values", "intervals", "sizes"):
+            if slot.kind not in ("values", "intervals", "sizes", "places"):
                 continue
             components = content["channels"][slot.channel]["components"]
             if slot.kind == "sizes":
@@ -193,11 +204,18 @@ class Parameters:
                 y = list(components[slot.component]["y"])
                 y[slot.index] = value
                 components[slot.component]["y"] = y
-            elif slot.kind == "intervals":
-                ends = list(components[slot.component]["interval"])
+            else:
+                several = (
+                    self._alike[self._interval_of(slot)]
+                    if slot.kind == "places"
+                    else [(slot.channel, slot.component)]
+                )
                 end = min(max(float(value), 0.0), 1.0)
-                ends[slot.index] = end if exact else round(end, 6)
-                components[slot.component]["interval"] = ends
+                for channel, number in several:
+                    other = content["channels"][channel]["components"][number]
+                    ends = list(other["interval"])
+                    ends[slot.index] = end if exact else round(end, 6)
+                    other["interval"] = ends
         gravity = [
             x for s, x in zip(self.slots, theta * self.scales, strict=True) if s.kind == "gravity"
         ]
@@ -217,6 +235,15 @@ class Parameters:
                 kept = [max(y, floor) for y in component["y"]]
                 component["y"] = kept if exact else [rounded(y) for y in kept]
         return Profile.model_validate(content)
+
+
+def _alike(profile: Profile) -> dict[tuple[float, float], list[tuple[str, int]]]:
+    """Components by their intervals, each by its channel and number."""
+    out: dict[tuple[float, float], list[tuple[str, int]]] = {}
+    for name in CHANNELS:
+        for number, component in enumerate(getattr(profile.channels, name).components):
+            out.setdefault(component.interval, []).append((name, number))
+    return out
 
 
 def _tilted(effects: Sequence[dict[str, Any]], more: Sequence[float], exact: bool) -> list[Any]:
@@ -354,6 +381,7 @@ def _interval(
     slots: list[Slot],
     start: list[float],
     rows: Rows,
+    kind: Kind = "intervals",
 ) -> None:
     """A component's interval; ends at the ends of the range stay there."""
     a, b = component.interval
@@ -362,7 +390,7 @@ def _interval(
         if stays:
             continue
         at[index] = len(slots)
-        slots.append(Slot("intervals", channel, number, index))
+        slots.append(Slot(kind, channel, number, index))
         start.append(end)
         rows.append(({at[index]: 1.0}, 0.0))
         rows.append(({at[index]: -1.0}, -1.0))

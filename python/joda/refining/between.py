@@ -61,11 +61,14 @@ class Between:
         return self._smooth(theta, rest // 2, told)
 
     def worse(self, theta: Array, than: Array) -> bool:
-        """Whether numbers miss windows between the jumps by more than others and chance do."""
-        judge = self._clear(than)
-        loss, least = self._loss(judge, theta), self._loss(judge, than)
-        usual = least / max(int(judge.windows.count[judge.counts].sum()), 1)
-        return loss > least + CHANCE * len(theta) * max(usual, 1.0)
+        """Whether numbers miss windows between the jumps, or short ones anywhere, by more than
+        others and chance do."""
+        for judge in (self._clear(than), self.shooting.judge(LENGTHS[-1])):
+            loss, least = self._loss(judge, theta), self._loss(judge, than)
+            usual = least / max(int(judge.windows.count[judge.counts].sum()), 1)
+            if loss > least + CHANCE * len(theta) * max(usual, 1.0):
+                return True
+        return False
 
     def _smooth(self, theta: Array, iterations: int, told: Told) -> Array:
         """Gauss-Newton over windows between the jumps, which are held."""

@@ -84,7 +84,7 @@ class JointEngine:
     sigma: float
     h: float
     whole: Callable[[Profile], Profile] = lambda profile: profile
-    _cut: dict[float, Windows] = field(default_factory=dict, repr=False)
+    _cut: dict[float, Windows] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def inertia(self) -> float:

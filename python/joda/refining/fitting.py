@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.judge import Judge
+from joda.diagnosis.mending import Error
 from joda.joints.least_squares import Fit
 from joda.joints.parameters import Parameters
 from joda.measured.runs import known
@@ -82,6 +83,15 @@ class Problem:
     def rms(self, theta: Array) -> float:
         """RMS misfit of whole runs, from starts that are fitted, rad or m."""
         return self.shooting.rms(self.whole, theta)
+
+    def error(self, theta: Array) -> Error:
+        """How far the joint is off, from starts that are fitted."""
+        missed = []
+        for judge in (self.whole, self.long):
+            rows, own = judge.windows.rows[judge.counts], sum(len(time) for time, _ in self.runs)
+            kept = rows[(rows >= 0) & (rows < own)]
+            missed.append(float(np.sqrt(np.mean(self.shooting.misfit(judge, theta)[kept] ** 2))))
+        return Error(*missed)
 
     def paths(self, theta: Array) -> list[Array]:
         """Predicted positions at the times of `runs`, from starts that are fitted."""

@@ -18,10 +18,14 @@ from joda.measured import smoothing
 from joda.measured.runs import known
 from joda.measured.scene_log import SceneRun
 from joda.mjx.shooting import Numbers, Scene
-from joda.profile import Profile
 from joda.refining.engine import FINEST
+from joda.scenes.model import joint_name
 
 Array = NDArray[np.float64]
+
+STEEP = 1e5
+"""Largest slope of a residual: where a small difference decides to which side a joint snaps there
+are larger ones, and they lead nowhere."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,7 @@ class SceneJudge(Judge):
             for a, b in ((None, -1), (1, None))
         )
         slopes = windows.weighed(windows.sampled(before, after))
+        slopes = np.nan_to_num(np.clip(slopes, -STEEP, STEEP))
         J = np.zeros((*r.shape, k))
         J[:, :, smooth] = slopes[:, :, : len(smooth)]
         for number in jumps:
@@ -134,36 +139,29 @@ class SceneEngine:
     Positions of the other joints are in units in which they have the noise of the fitted one.
 
     Attributes:
-        model: compiled.
+        scene: in MJX, with the joints of the runs.
         joint: id of the fitted joint.
-        profiles: that the scene carries.
         range, runs, sigma, h, inertia: see `joda.refining.engine.Engine`.
     """
 
-    model: mujoco.MjModel
+    scene: Scene
     joint: int
-    profiles: dict[str, Profile]
     range: tuple[float, float]
     runs: Sequence[SceneRun]
     sigma: float
     inertia: float
-    _cut: dict[float, Windows] = field(default_factory=dict, repr=False)
+    _cut: dict[float, Windows] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def h(self) -> float:
         """See `Engine`."""
-        return float(self.model.opt.timestep)
-
-    @cached_property
-    def scene(self) -> Scene:
-        """It in MJX."""
-        return Scene(self.model, self.profiles, self.runs[0].joints, ("gravity_offset",))
+        return float(self.scene.model.opt.timestep)
 
     @cached_property
     def units(self) -> Array:
         """Noise of each joint's position in that of the fitted one, shape (joints,)."""
         joints = self.runs[0].joints
-        spans = np.ptp(self.model.jnt_range[list(joints)], axis=1)
+        spans = np.ptp(self.scene.model.jnt_range[list(joints)], axis=1)
         noises = [[smoothing.noise(run.time, own) for own in run.positions.T] for run in self.runs]
         usual = np.maximum(np.median(noises, axis=0), FINEST * spans)
         return np.asarray(np.append(1.0, usual[1:] / self.sigma))
@@ -177,9 +175,9 @@ class SceneEngine:
             names = ("dof_armature", "dof_M0", "dof_invweight0", "body_invweight0")
             changed = {name: getattr(heavier, name) for name in names}
         if ratio := parameters.number(theta, "damping_ratio"):
-            changed["jnt_solref"] = self.model.jnt_solref.copy()
+            changed["jnt_solref"] = self.scene.model.jnt_solref.copy()
             changed["jnt_solref"][self.joint, 1] *= np.exp(ratio)
-        name = self.model.joint(self.joint).name
+        name = joint_name(self.scene.model, self.joint)
         numbers = self.scene.numbers({name: profile}, changed)
         return SceneMover(self.scene, numbers, self.units, _jumps(parameters))
 

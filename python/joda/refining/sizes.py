@@ -44,10 +44,10 @@ def sized(
             those windows, rad or m.
     """
     parameters, found = shooting.parameters, shooting.parameters.profile
-    both: list[tuple[Kind, ...]] = [("sizes",)]
+    stages: list[tuple[Kind, ...]] = [("sizes",)]
     if any(slot.kind == "intervals" for slot in parameters.slots):
-        both.append(("sizes", "intervals"))
-    for kinds in both:
+        stages += [("sizes", "places"), ("sizes", "intervals")]
+    for kinds in stages:
         other = shooting.about(parameters.about(found, kinds))
         least = np.inf
         for start in _starts(other.parameters):
@@ -63,9 +63,11 @@ def sized(
 
 
 def _starts(parameters: Parameters) -> Sequence[Array]:
-    """Where to begin: as it is, and with some of it weaker or with the intervals elsewhere."""
+    """Where to begin: as it is, and with some of it weaker or with the places elsewhere."""
     slots, must = parameters.slots, parameters.constraints
-    places = np.array([slot.kind == "intervals" for slot in slots])
+    if "intervals" in parameters.kinds:
+        return [parameters.start]
+    places = np.array([slot.kind == "places" for slot in slots])
     upper = np.array([slot.index == 1 for slot in slots])
     resists = np.array([slot.channel != "conservative" for slot in slots])
     if not places.any():
@@ -80,5 +82,5 @@ def _starts(parameters: Parameters) -> Sequence[Array]:
 
 
 def _inside(parameters: Parameters, x: Array) -> Array:
-    places = np.array([slot.kind == "intervals" for slot in parameters.slots])
+    places = np.array([slot.kind in ("places", "intervals") for slot in parameters.slots])
     return np.where(places, np.clip(x, EDGE, 1 - EDGE), x)
