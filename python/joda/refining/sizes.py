@@ -22,6 +22,8 @@ BY = 0.06
 SHIFTS = ((0, 0), (BY, BY), (-BY, -BY), (-BY, BY), (BY, -BY))
 """How far the lower and the upper ends of all intervals are moved at the starts, in normalised
 position."""
+MOST = 6
+"""From how many starts, those with the least loss, numbers are fitted."""
 EDGE = 0.001
 """How near the ends of the range an end of an interval comes: one that is there stays there."""
 NOISE = 1.1
@@ -48,9 +50,13 @@ def sized(
     if any(slot.kind == "intervals" for slot in parameters.slots):
         stages += [("sizes", "places"), ("sizes", "intervals")]
     for kinds in stages:
-        other = shooting.about(parameters.about(found, kinds))
+        bases = [found]
+        if "places" in kinds:  # sizes that were fitted elsewhere may lead nowhere
+            own = parameters.about(parameters.profile, ("sizes",))
+            bases += [own.written(own.start - by, exact=True) for by in (0.0, WEAKER)]
+        starts = _starts(shooting, judge, [parameters.about(base, kinds) for base in bases])
         least = np.inf
-        for start in _starts(other.parameters):
+        for other, start in starts:
             x = other.fit_windows(judge, start, other.parameters.doubt, iterations)
             x = _inside(other.parameters, x)
             loss = judge.started(other.mover(x)).loss
@@ -62,8 +68,18 @@ def sized(
                 return
 
 
-def _starts(parameters: Parameters) -> Sequence[Array]:
-    """Where to begin: as it is, and with some of it weaker or with the places elsewhere."""
+def _starts(
+    shooting: Shooting, judge: Judge, bases: Sequence[Parameters]
+) -> list[tuple[Shooting, Array]]:
+    """Where to begin: of what `_trials` has of each, the ones with the least loss."""
+    trials = [(shooting.about(one), x) for one in bases for x in _trials(one)]
+    if len(trials) > MOST:
+        trials.sort(key=lambda trial: judge.started(trial[0].mover(trial[1])).loss)
+    return trials[:MOST]
+
+
+def _trials(parameters: Parameters) -> list[Array]:
+    """The numbers as they are, and with some of it weaker or with the places elsewhere."""
     slots, must = parameters.slots, parameters.constraints
     if "intervals" in parameters.kinds:
         return [parameters.start]
