@@ -1,6 +1,7 @@
 """Whether a joint is refined by itself, or in its scene: where other joints or contacts move it."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -99,6 +100,9 @@ def together(
             why = found
         from joda.mjx.shooting import Scene
 
+        if passive:
+            model = copy(model)
+            model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         made = Scene(model, profiles_of(model), runs[0].joints, ("gravity_offset",))
     except JodaError as error:
         if scene:

@@ -60,8 +60,7 @@ class Shooting:
             told: see `Told`.
             held: about which values; None: those at first.
         """
-        mean = self.parameters.start if held is None else held
-        unknowns = self._unknowns(mean, doubt)
+        unknowns = self.unknowns(held, doubt)
         start = judge.started(self.mover(theta)).start
 
         def heard(fit: Found) -> None:
@@ -71,8 +70,7 @@ class Shooting:
 
     def covariance(self, judge: Judge, theta: Array) -> Array:
         """Of the numbers' errors, from windows and the prior, shape (n, n)."""
-        doubt = self.parameters.doubt
-        unknowns = self._unknowns(self.parameters.start, doubt)
+        doubt, unknowns = self.parameters.doubt, self.unknowns()
         start = judge.started(self.mover(theta)).start
         H = judge.linear(self.mover, unknowns, theta, start, bend=np.inf).normal()[0]
         return np.asarray(np.linalg.inv(H + np.diag(doubt**-2.0)))
@@ -87,10 +85,17 @@ class Shooting:
         mover = self.mover(theta)
         return judge.windows.misfit(mover, judge.started(mover).start)
 
-    def _unknowns(self, mean: Array, doubt: Array) -> Unknowns:
-        n = len(mean)
-        bounds = np.full(n, -np.inf), np.full(n, np.inf)
-        return Unknowns(*bounds, np.full(n, NUDGE), mean, doubt, self.parameters.constraints)
+    def unknowns(self, mean: Array | None = None, doubt: Array | None = None) -> Unknowns:
+        """The numbers, about which values and how well they are known; None: as at first."""
+        own, n = self.parameters, len(self.parameters.start)
+        bounds, steps = (np.full(n, -np.inf), np.full(n, np.inf)), np.full(n, NUDGE)
+        return Unknowns(
+            *bounds,
+            steps,
+            own.start if mean is None else mean,
+            own.doubt if doubt is None else doubt,
+            own.constraints,
+        )
 
     def robust(self, judge: Judge, fit: Found) -> float:
         """RMS misfit of windows that count, rad or m."""
