@@ -34,6 +34,9 @@ STEPS = 4
 """Moves of one size that are tried in either direction."""
 LESS = 4.0
 """By how much the loss must fall for a jump to be moved: two standard deviations."""
+MUCH = 1.2
+"""How many times as large the loss of short windows is where numbers are much worse: what crosses a
+jump is by chance missed more or less."""
 CHANCE = 3.0
 """By how much per number the loss of two good fits may differ by chance."""
 
@@ -61,14 +64,14 @@ class Between:
         return self._smooth(theta, rest // 2, told)
 
     def worse(self, theta: Array, than: Array) -> bool:
-        """Whether numbers miss windows between the jumps, or short ones anywhere, by more than
-        others and chance do."""
-        for judge in (self._clear(than), self.shooting.judge(LENGTHS[-1])):
-            loss, least = self._loss(judge, theta), self._loss(judge, than)
-            usual = least / max(int(judge.windows.count[judge.counts].sum()), 1)
-            if loss > least + CHANCE * len(theta) * max(usual, 1.0):
-                return True
-        return False
+        """Whether numbers miss windows between the jumps by more than others and chance do, or
+        short ones anywhere by much more."""
+        judge, every = self._clear(than), self.shooting.judge(LENGTHS[-1])
+        loss, least = self._loss(judge, theta), self._loss(judge, than)
+        usual = least / max(int(judge.windows.count[judge.counts].sum()), 1)
+        if loss > least + CHANCE * len(theta) * max(usual, 1.0):
+            return True
+        return self._loss(every, theta) > MUCH * self._loss(every, than)
 
     def _smooth(self, theta: Array, iterations: int, told: Told) -> Array:
         """Gauss-Newton over windows between the jumps, which are held."""
