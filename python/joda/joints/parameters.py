@@ -21,10 +21,17 @@ from joda.scenes.context import Context
 
 Array = NDArray[np.float64]
 Kind = Literal[
-    *("values", "intervals", "strengths", "damping_ratio", "inertia", "gravity"),
-    *("effects", "sizes", "places"),
+    "values",
+    "intervals",
+    "strengths",
+    "damping_ratio",
+    "inertia",
+    "gravity",
+    "effects",
+    "sizes",
+    "places",
 ]
-KINDS: tuple[Kind, ...] = get_args(Kind)[:6]
+KINDS: tuple[Kind, ...] = get_args(Kind)[:-3]
 """What `joda refine` fits; effects' numbers are fitted by `joda.diagnosis.mending`, components'
 sizes before all else, and the places of those that have one interval together."""
 
