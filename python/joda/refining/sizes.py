@@ -52,7 +52,7 @@ def sized(
     for kinds in stages:
         bases = [found]
         if "places" in kinds:  # sizes that were fitted elsewhere may lead nowhere
-            own = parameters.about(parameters.profile, ("sizes",))
+            own = parameters.about(parameters.profile, stages[0])
             bases += [own.written(own.start - by, exact=True) for by in (0.0, WEAKER)]
         starts = _starts(shooting, judge, [parameters.about(base, kinds) for base in bases])
         least = np.inf
