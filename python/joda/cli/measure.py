@@ -110,6 +110,13 @@ def compare(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
     ] = None,
+    corrections: Annotated[
+        Path | None,
+        typer.Option(
+            help="What is wrong with the runs: the NEW.corrections.json that add or improve left "
+            "beside NEW.xml."
+        ),
+    ] = None,
     passive: Passive = False,
     force: Force = False,
 ) -> None:
@@ -128,8 +135,8 @@ def compare(
 
         with spinner("compare") as progress:
             every = compare_all(
-                model, runs, joint or (), passive=passive, json=as_json, force=force,
-                progress=progress,
+                model, runs, joint or (), passive=passive, corrections=corrections, json=as_json,
+                force=force, progress=progress,
             )  # fmt: skip
         tell_joints(every)
         if as_json:
@@ -138,8 +145,8 @@ def compare(
     assert joint
     with spinner("compare") as progress:
         found = run(
-            model, joint[0], runs, passive=passive, json=as_json, report=report, picture=output,
-            force=force, progress=progress,
+            model, joint[0], runs, passive=passive, corrections=corrections, json=as_json,
+            report=report, picture=output, force=force, progress=progress,
         )  # fmt: skip
     for sentence in (*found.notes, *sentences(found)):
         say(sentence)

@@ -14,6 +14,7 @@ from joda.cli.options import (
     Passive,
     Runs,
     Scene,
+    Trust,
     one_joint_only,
     several,
 )
@@ -39,6 +40,7 @@ def diagnose(
         list[str] | None, typer.Option(help="An effect that is not considered.")
     ] = None,
     passive: Passive = False,
+    trust: Trust = None,
     force: Force = False,
 ) -> None:
     """Tell which effect a model lacks, where, and how much of it.
@@ -49,6 +51,7 @@ def diagnose(
     """
     from joda import diagnose as run
     from joda.commands.diagnose import sentences
+    from joda.measured.trust import read_trust
 
     if several(joint):
         one_joint_only(report, output)
@@ -56,8 +59,8 @@ def diagnose(
 
         with progress_bar() as bar:
             every = diagnose_all(
-                model, runs, joint or (), exclude=exclude or (), passive=passive, json=as_json,
-                force=force, progress=bar,
+                model, runs, joint or (), exclude=exclude or (), passive=passive,
+                trust=read_trust(trust or ()), json=as_json, force=force, progress=bar,
             )  # fmt: skip
         for name, one in every.items():
             say(f"{name}:")
@@ -70,7 +73,8 @@ def diagnose(
     with progress_bar() as bar:
         found = run(
             model, joint[0], runs, exclude=exclude or (), json=as_json, report=report,
-            picture=output, passive=passive, force=force, progress=bar,
+            picture=output, passive=passive, trust=read_trust(trust or ()), force=force,
+            progress=bar,
         )  # fmt: skip
     for sentence in sentences(found):
         say(sentence)
@@ -90,30 +94,33 @@ def add(
         str | None, typer.Option(help="Which effect [default: the diagnosis' first].")
     ] = None,
     passive: Passive = False,
+    trust: Trust = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Add the effect that a diagnosis names, if that helps.
 
     It helps if it is plausible and clearly lowers the error on runs held out; else nothing is
-    written. Leaves, beside the scene, its .composed.json and .png. Example:
+    written. Leaves, beside the scene, its .composed.json and .png, and .corrections.json where the
+    diagnosis says that the runs' force, clock or zero is wrong. Example:
 
         joda add hidden/model.xml hidden/run?.csv --joint joint --diagnosis diagnosis.json -o new.xml
     """  # noqa: E501
     from joda import add as run
     from joda.commands.add import sentences
+    from joda.measured.trust import read_trust
 
     with spinner("add") as progress:
         added = run(
-            model, joint, diagnosis, runs, output, effect=effect, passive=passive, force=force,
-            progress=progress,
+            model, joint, diagnosis, runs, output, effect=effect, passive=passive,
+            trust=read_trust(trust or ()), force=force, progress=progress,
         )  # fmt: skip
     if as_json:
         print_json(added.as_json())
         return
     for sentence in sentences(added):
         say(sentence)
-    for path in filter(None, (added.scene, added.composed, added.picture)):
+    for path in filter(None, (added.scene, added.composed, added.picture, added.corrections)):
         say(path)
 
 
@@ -124,17 +131,20 @@ def improve(
     joint: Joints = None,
     report: Report = None,
     passive: Passive = False,
+    trust: Trust = None,
     force: Force = False,
 ) -> None:
     """Diagnose and add until the data support nothing more.
 
-    Leaves, beside the scene, its .composed.json and .png; without an effect to add, nothing but the
-    report. Example:
+    Leaves, beside the scene, its .composed.json and .png, and .corrections.json where the runs'
+    force, clock or zero was wrong; without anything to add or correct, nothing but the report.
+    Example:
 
         joda improve hidden/model.xml hidden/run?.csv --joint joint -o improved.xml
     """
     from joda import improve as run
     from joda.commands.improve import sentences
+    from joda.measured.trust import read_trust
 
     if several(joint):
         one_joint_only(report, None)
@@ -142,22 +152,24 @@ def improve(
 
         with spinner("improve") as progress:
             every = improve_all(
-                model, runs, output, joint or (), passive=passive, force=force, progress=progress
-            )
+                model, runs, output, joint or (), passive=passive, trust=read_trust(trust or ()),
+                force=force, progress=progress,
+            )  # fmt: skip
         for name, one in every.items():
             say(f"{name}:")
             for sentence in sentences(one):
                 say(f"  {sentence}")
-            for path in filter(None, (one.scene, one.composed, one.picture)):
+            for path in filter(None, (one.scene, one.composed, one.picture, one.corrections)):
                 say(path)
         return
     assert joint
     with spinner("improve") as progress:
         result = run(
-            model, joint[0], runs, output, report=report, passive=passive, force=force,
-            progress=progress,
+            model, joint[0], runs, output, report=report, passive=passive,
+            trust=read_trust(trust or ()), force=force, progress=progress,
         )  # fmt: skip
     for sentence in sentences(result):
         say(sentence)
-    for path in filter(None, (result.scene, result.composed, result.picture, report)):
+    written = result.scene, result.composed, result.picture, result.corrections, report
+    for path in filter(None, written):
         say(path)

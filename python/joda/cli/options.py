@@ -33,6 +33,17 @@ Joints = Annotated[
 Passive = Annotated[
     bool, typer.Option("--passive", help="The joint's actuators were off while it was measured.")
 ]
+Trust = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--trust",
+        metavar="NAME=WIDTH",
+        help="How far off a number may be (one standard deviation; 0: not at all), as in mass=0.05 "
+        "for 5 %; of mass, inertia, gravity, damping, frictionloss, stiffness, "
+        "force_scale, actuator_gain; in their units center_of_mass (rad), force_offset (N·m or N), "
+        "time_delay (s), position_offset (rad or m).",
+    ),
+]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to fill.", show_default=False)]
 Scene = Annotated[Path, typer.Option("-o", "--output", help="Scene to write.", show_default=False)]
 Templates = Annotated[

@@ -43,7 +43,7 @@ def templates(
 
 def schema(
     file: Annotated[
-        Literal["composed", "proposal", "template", "archetype", "expected"],
+        Literal["composed", "proposal", "template", "archetype", "expected", "corrections"],
         typer.Argument(help="Which file."),
     ] = "composed",
 ) -> None:

@@ -1,6 +1,6 @@
 """Adds a diagnosed effect to a joint's profile, if that lowers the error on runs held out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
@@ -15,6 +15,7 @@ from joda.diagnosis.learning.fitting import Learned
 from joda.diagnosis.learning.law import LABEL
 from joda.diagnosis.mending import Error, Mended, error, mend
 from joda.diagnosis.outcome import (
+    NO_TRUST,
     beside,
     mended_picture,
     nearby,
@@ -24,13 +25,17 @@ from joda.diagnosis.outcome import (
     told_errors,
 )
 from joda.diagnosis.phrases import extrapolated, named
+from joda.diagnosis.righted import as_told
 from joda.diagnosis.share import places
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together
+from joda.measured.corrections_file import corrections_beside
 from joda.measured.visited import unvisited_part
 from joda.pictures.changes import changes
 from joda.pictures.style import png
+
+FILES = ("scene", "composed", "picture", "corrections")
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,8 @@ class Added:
     Attributes:
         scene, composed, picture: the files that were written; None where nothing was added: then
             nothing is written.
+        corrections: the file of what the diagnosis says that the measurement has wrong; None where
+            nothing of it is.
         effect: its name.
         added: whether the scene has it.
         reason: why it has not, a clause; None if it has.
@@ -58,6 +65,7 @@ class Added:
     scene: Path | None
     composed: Path | None
     picture: Path | None
+    corrections: Path | None
     effect: str
     added: bool
     reason: str | None
@@ -75,7 +83,7 @@ class Added:
     def as_json(self) -> dict[str, Any]:
         """The same for JSON, which has no paths."""
         content = asdict(self)
-        paths = {key: content[key] for key in ("scene", "composed", "picture")}
+        paths = {key: content[key] for key in FILES}
         return content | {key: path and str(path) for key, path in paths.items()}
 
 
@@ -88,6 +96,7 @@ def add(
     *,
     effect: str | None = None,
     passive: bool = False,
+    trust: Mapping[str, float] = NO_TRUST,
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Added:
@@ -103,9 +112,11 @@ def add(
         joint: its name or address, see `joda.scenes.model.find_joint`.
         diagnosis: what `joda.diagnose` wrote as JSON.
         runs: CSV files with time, position and perhaps force, or quasi-static curves.
-        output: scene to write; beside it, with its name, go .composed.json and .png.
+        output: scene to write; beside it, with its name, go .composed.json and .png, and
+            .corrections.json where the diagnosis says that something of the measurement is wrong.
         effect: which one; None: the diagnosis' first.
         passive: whether the actuators on the joint, if there are any, were off.
+        trust: how far off numbers may be, as in `joda.diagnose`.
         force: overwrite what exists.
         progress: told what is being done.
 
@@ -120,7 +131,10 @@ def add(
     composed, picture = beside(target, force, [*runs, diagnosis])
     told = read_diagnosis(Path(diagnosis))
     name, direction, near = _chosen(told, Path(diagnosis), effect)
-    measured = read_runs(model, joint, runs, passive)
+    measured = read_runs(model, joint, runs, passive, trust)
+    driven = measured.single.servo is not None
+    if right := as_told(told.get("corrections", ()), driven):
+        measured = right.of(measured)
     own = measured.profile.joint
     if told.get("joint", own.name) != own.name:
         raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
@@ -136,12 +150,14 @@ def add(
     known = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
     told_law = account(train, held, law, mended.after.window, known) if law else None
     notes: list[str] = []
+    corrections: Path | None = corrections_beside(target)
     if mended.effect:
         if not told_law:  # of a learned law nothing is where no run was
             there = places(mended.profile, name, measured.profile)[0]
             notes += filter(None, [extrapolated(unvisited_part(measured, there)).strip()])
         progress("drawing")
-        files, more = scene_files(Path(model), mended.profile, target, composed)
+        files, more = scene_files(Path(model), mended.profile, target, composed, right=right)
+        corrections = corrections if corrections in files else None
         notes += more
         drawn = (
             learned_picture(held, mended.profile, told_law)
@@ -154,6 +170,7 @@ def add(
         scene=target if added else None,
         composed=composed if added else None,
         picture=picture if added else None,
+        corrections=corrections if added else None,
         effect=name,
         added=added,
         reason=mended.reason,

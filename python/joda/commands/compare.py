@@ -35,6 +35,7 @@ def compare(
     runs: Sequence[str | Path],
     *,
     passive: bool = False,
+    corrections: str | Path | None = None,
     json: str | Path | None = None,
     report: str | Path | None = None,
     picture: str | Path | None = None,
@@ -49,6 +50,8 @@ def compare(
         runs: CSV files with time, position and perhaps force; without time, position and the force
             that slowly moves the joint there, in the order measured.
         passive: whether the actuators on the joint, if there are any, were off.
+        corrections: what is wrong with the runs, as `joda.improve` or `joda.add` wrote it beside
+            its scene: they are replayed as if that were right.
         json, report, picture: files to write: all numbers, an HTML page that needs nothing else,
             a PNG.
         force: overwrite them.
@@ -61,8 +64,9 @@ def compare(
         JodaError: a file cannot be read, or what it holds cannot be of this joint as it stands.
     """
     targets = [Path(path) for path in (json, report, picture) if path]
-    check_targets(targets, force, [model, *runs])
-    measured = read_measured(model, joint, runs, passive)
+    read = [model, *runs, *([corrections] if corrections else [])]
+    check_targets(targets, force, read)
+    measured = read_measured(model, joint, runs, passive, corrections)
     found = errors(measured, explained=True, begin=progress)
     short = window_rows(measured)
     judged = adequacy(measured, found, short) if found.runs else None

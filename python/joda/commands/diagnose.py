@@ -1,11 +1,11 @@
 """Diagnoses what a model lacks: the verdict as sentences, a picture, a page."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from joda.diagnosis.findings import Diagnosis, Finding
-from joda.diagnosis.outcome import read_runs
+from joda.diagnosis.outcome import NO_TRUST, read_runs
 from joda.diagnosis.phrases import LEARN, NAMES, named, percent
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
@@ -28,6 +28,7 @@ def diagnose(
     *,
     exclude: Collection[str] = (),
     passive: bool = False,
+    trust: Mapping[str, float] = NO_TRUST,
     json: str | Path | None = None,
     report: str | Path | None = None,
     picture: str | Path | None = None,
@@ -42,6 +43,9 @@ def diagnose(
         runs: CSV files with time, position and perhaps force.
         exclude: effects that are not considered.
         passive: whether the actuators on the joint, if there are any, were off.
+        trust: how far off numbers of the model and of the measurement may be, by name: standard
+            deviations, relative ones but for center_of_mass (rad), force_offset (N·m or N),
+            time_delay (s) and position_offset (rad or m); 0 trusts a number fully.
         json, report, picture: files to write: all numbers, an HTML page that needs nothing else,
             a PNG.
         force: overwrite them.
@@ -58,7 +62,7 @@ def diagnose(
     check_targets(targets, force, [model, *runs])
     for name in exclude:
         check_effect(name)
-    measured = read_runs(model, joint, runs, passive)
+    measured = read_runs(model, joint, runs, passive, trust)
     found = diagnosed(measured, exclude, progress)
     diagnosis, profile = found.diagnosis, found.profile
     files: dict[Path, bytes | str] = {}

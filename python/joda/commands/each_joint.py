@@ -1,6 +1,6 @@
 """Compares, diagnoses and improves every joint of logs of several joints, one by one."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from json import dumps, loads
 from pathlib import Path
@@ -12,6 +12,7 @@ from joda.commands.diagnose import diagnose
 from joda.commands.improve import Improved, improve
 from joda.diagnosis.findings import Diagnosis
 from joda.diagnosis.improving import INTERRUPTED
+from joda.diagnosis.outcome import NO_TRUST
 from joda.errors import JodaError
 from joda.files import check_targets, file_name, named_like, write_text
 from joda.measured.comparison import Comparison
@@ -58,6 +59,7 @@ def compare_all(
     joints: Sequence[str] = (ALL,),
     *,
     passive: bool = False,
+    corrections: str | Path | None = None,
     json: str | Path | None = None,
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
@@ -70,6 +72,7 @@ def compare_all(
             `ctrl:ACTUATOR`.
         joints: names; "all": those that the first run has.
         passive: whether the actuators on the joints were off.
+        corrections: as in `joda.compare`, of every joint by itself.
         json: file to write, all numbers.
         force: overwrite it.
         progress: told what is being done.
@@ -81,9 +84,13 @@ def compare_all(
     found = {}
     for name in named(model, runs, joints):
         progress(name)
-        found[name] = compare(model, name, runs, passive=passive)
+        found[name] = compare(model, name, runs, passive=passive, corrections=corrections)
     progress("all joints at once")
-    together = () if passive else replayed_together(load_model(Path(model)), [*map(Path, runs)])
+    together = (
+        ()
+        if passive or corrections
+        else replayed_together(load_model(Path(model)), [*map(Path, runs)])
+    )
     compared = Compared(found, together)
     if json:
         write_text(Path(json), compared.to_json())
@@ -97,6 +104,7 @@ def diagnose_all(
     *,
     exclude: Collection[str] = (),
     passive: bool = False,
+    trust: Mapping[str, float] = NO_TRUST,
     json: str | Path | None = None,
     force: bool = False,
     progress: Callable[[int, int, str], None] = lambda done, total, what: None,
@@ -106,6 +114,7 @@ def diagnose_all(
     Args:
         model, runs, joints, passive, json, force: as in `compare_all`.
         exclude: effects that are not considered.
+        trust: as in `joda.diagnose`, of every joint.
         progress: told how much is done, of how much, and what.
 
     Returns:
@@ -122,7 +131,9 @@ def diagnose_all(
         def told(done: int, total: int, what: str, number: int = number, name: str = name) -> None:
             progress(number * total + done, len(names) * total, f"{name}: {what}")
 
-        found[name] = diagnose(model, name, runs, exclude=exclude, passive=passive, progress=told)
+        found[name] = diagnose(
+            model, name, runs, exclude=exclude, passive=passive, trust=trust, progress=told
+        )
         if json:  # what is done stays, whatever ends the rest
             own = {joint: loads(one.to_json()) for joint, one in found.items()}
             write_text(Path(json), dumps({"joints": own}, indent=2, ensure_ascii=False) + "\n")
@@ -136,6 +147,7 @@ def improve_all(
     joints: Sequence[str] = (ALL,),
     *,
     passive: bool = False,
+    trust: Mapping[str, float] = NO_TRUST,
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> dict[str, Improved]:
@@ -145,6 +157,7 @@ def improve_all(
         model, runs, joints, passive: as in `compare_all`.
         output: scene to write; beside it, with its name and each joint's, go .composed.json and
             .png. What is done is written joint by joint, and stays if the rest is interrupted.
+        trust: as in `joda.diagnose`, of every joint.
         force: overwrite what exists.
         progress: told what is being done.
 
@@ -170,8 +183,9 @@ def improve_all(
             progress(f"{name}: {what}")
 
         done = improve(
-            current, name, runs, target, passive=passive, force=force or bool(found), progress=told
-        )
+            current, name, runs, target, passive=passive, trust=trust,
+            force=force or bool(found), progress=told,
+        )  # fmt: skip
         if done.scene and done.composed and done.picture:
             current = done.scene
             composed, picture = (kept[name, end] for end in suffixes)

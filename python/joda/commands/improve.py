@@ -1,6 +1,6 @@
 """Diagnoses and mends a model until the data support no more, and tells the story."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -9,10 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from joda.diagnosis.improving import Step, improved
-from joda.diagnosis.outcome import beside, draw_mended, nearby, read_runs, scene_files, wholes
+from joda.diagnosis.outcome import (
+    NO_TRUST,
+    beside,
+    draw_mended,
+    nearby,
+    read_runs,
+    scene_files,
+    wholes,
+)
 from joda.diagnosis.phrases import LEARN, named
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.files import write_together
+from joda.measured.corrections_file import corrections_beside
 from joda.measured.maps import draw_maps, draw_models, replayed
 from joda.measured.reading import Measured
 from joda.measured.visited import unvisited
@@ -32,6 +41,7 @@ class Improved:
     Attributes:
         scene, composed, picture: the files that were written; None where nothing was added or
             corrected: then only the report is.
+        corrections: the file of what the measurement has wrong; None where nothing of it is.
         joint: its name.
         steps: the model as it was, then with one effect more each.
         why: it ended, a sentence.
@@ -48,6 +58,7 @@ class Improved:
     scene: Path | None
     composed: Path | None
     picture: Path | None
+    corrections: Path | None
     joint: str
     steps: tuple[Step, ...]
     why: str
@@ -68,6 +79,7 @@ def improve(
     *,
     report: str | Path | None = None,
     passive: bool = False,
+    trust: Mapping[str, float] = NO_TRUST,
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Improved:
@@ -79,9 +91,11 @@ def improve(
         runs: CSV files with time, position and perhaps force. Of four or more every fourth is
             held out of all fits, of fewer every fourth block in which the joint moves. Or
             quasi-static curves: of fewer than four every fourth stretch of each is held out.
-        output: scene to write; beside it, with its name, go .composed.json and .png.
+        output: scene to write; beside it, with its name, go .composed.json and .png, and
+            .corrections.json where something of the measurement was corrected.
         report: an HTML page to write that needs nothing else.
         passive: whether the actuators on the joint, if there are any, were off.
+        trust: how far off numbers may be, as in `joda.diagnose`.
         force: overwrite what exists.
         progress: told what is being done.
 
@@ -93,19 +107,21 @@ def improve(
     """
     target = Path(output)
     composed, picture = beside(target, force, runs, report)
-    measured = read_runs(model, joint, runs, passive)
+    measured = read_runs(model, joint, runs, passive, trust)
     steps, why = improved(measured, progress)
     progress("drawing")
-    last, (_, held) = steps[-1].profile, parted(measured)
+    last, right, (_, held) = steps[-1].profile, steps[-1].right, parted(measured)
     there = len(steps) > 1
     files: dict[Path, bytes | str] = {}
     notes: list[str] = []
     if there:
-        files, notes = scene_files(Path(model), last, target, composed, steps[-1].servo)
+        files, notes = scene_files(Path(model), last, target, composed, steps[-1].servo, right)
+    own = corrections_beside(target)
     result = Improved(
         scene=target if there else None,
         composed=composed if there else None,
         picture=picture if there else None,
+        corrections=own if own in files else None,
         joint=last.joint.name,
         steps=steps,
         why=why,
@@ -118,7 +134,8 @@ def improve(
         notes=(*measured.notes, *notes),
     )
     if there or report:
-        drawn = png(_picture(result, measured, held))
+        shown = (right.of(one) if right else one for one in (measured, held))
+        drawn = png(_picture(result, *shown))
         if there:
             files[picture] = drawn
         if report:

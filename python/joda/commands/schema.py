@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
+from joda.measured.corrections_file import Corrections
 from joda.profile import Profile
 from joda.proposal import Proposal
 from joda.propose.archetype import Archetypes
@@ -12,14 +13,17 @@ from joda.template import Template
 
 
 def schema(
-    file: Literal["composed", "proposal", "template", "archetype", "expected"] = "composed",
+    file: Literal[
+        "composed", "proposal", "template", "archetype", "expected", "corrections"
+    ] = "composed",
 ) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a file format.
 
     Args:
         file: "composed" for `composed.json`, "proposal" for `proposal.json`, "template" for the
             effect templates, "archetype" for the tables of kinds of joints (TOML), "expected" for
-            what a model's joints should do (`MODEL.expected.json`).
+            what a model's joints should do (`MODEL.expected.json`), "corrections" for what a
+            measurement has wrong (`MODEL.corrections.json`).
 
     Returns:
         the schema as a JSON object.
@@ -30,5 +34,6 @@ def schema(
         "template": Template,
         "archetype": Archetypes,
         "expected": Expectations,
+        "corrections": Corrections,
     }
     return models[file].model_json_schema()

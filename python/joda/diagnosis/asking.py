@@ -170,10 +170,11 @@ def asked(measured: Measured, length: float | None = None, near: Array | None = 
     windows = windows_for(measured, length)
     judge = Judge(windows, usable(windows))
     single, own = single_for(measured, windows.h), measured.own_row
-    base = base_of(measured.profile, single, windows.h)
+    base = base_of(measured.profile, single, windows.h, measured.trust)
     fit, given = _fitted(judge, base, near)
     if measured.runs and own and measured.profile.channels.friction.components:
-        yielding = base_of(measured.profile, replace(single, friction_row=own), windows.h)
+        other = replace(single, friction_row=own)
+        yielding = base_of(measured.profile, other, windows.h, measured.trust)
         fit_so, given_so = _fitted(judge, yielding, near)
         calm = excess(fit_so.loss, max(judge.samples, 1.0)) < CALM  # else something else is missing
         if calm and fit_so.loss < fit.loss - CLEARLY:

@@ -13,9 +13,10 @@ from joda.diagnosis.static import Still, curve_windows
 from joda.diagnosis.windows import GRID, Windows
 from joda.joints.single import Single
 from joda.measured.reading import Measured
+from joda.measured.trust import USUAL, Trust
 from joda.profile import CHANNELS, Profile
 from joda.scenes.actuators import Servo
-from joda.scenes.native import DAMPING
+from joda.scenes.native import DAMPING, FRICTION, SPRING
 
 Array = NDArray[np.float64]
 
@@ -121,8 +122,8 @@ class Base:
         return self.own(x).stepped(self.h).solo(profile, self.h)
 
 
-def base_of(profile: Profile, single: Single, h: float) -> Base:
-    """The model as it is."""
+def base_of(profile: Profile, single: Single, h: float, trust: Trust = USUAL) -> Base:
+    """The model as it is; `trust`: how far off its numbers may be."""
     shared = shared_damping(profile, single.servo)
     places = tuple(
         (name, number)
@@ -132,11 +133,10 @@ def base_of(profile: Profile, single: Single, h: float) -> Base:
     )
     k = len(places)
     doubt, most = (BASE_DOUBT, 20.0) if single.servo is None else (DRIVEN_DOUBT, 100.0)
-    unknowns = Unknowns(
-        np.zeros(k), np.full(k, most), np.full(k, 0.01), np.ones(k), np.full(k, doubt)
-    )
+    doubts = np.array([_doubt(profile, place, trust, doubt) for place in places])
+    unknowns = Unknowns(np.zeros(k), np.full(k, most), np.full(k, 0.01), np.ones(k), doubts)
     if single.servo is not None:
-        unknowns = unknowns.and_(_of_servo(single.servo))
+        unknowns = unknowns.and_(_of_servo(single.servo, trust))
     return Base(profile, single, h, places, unknowns)
 
 
@@ -148,15 +148,25 @@ def shared_damping(profile: Profile, servo: Servo | None) -> list[tuple[str, int
     return [("damping", number) for number, part in parts if part.label == DAMPING]
 
 
-def _of_servo(servo: Servo) -> Unknowns:
+def _doubt(profile: Profile, place: tuple[str, int], trust: Trust, usual: float) -> float:
+    """How far off a component's strength may be: those of a profile as usual."""
+    channel, number = place
+    label = getattr(profile.channels, channel).components[number].label
+    named = {DAMPING: "damping", FRICTION: "frictionloss", SPRING: "stiffness"}
+    width = trust.width(named[label], usual) if label in named else usual
+    return max(width, HELD)
+
+
+def _of_servo(servo: Servo, trust: Trust) -> Unknowns:
     """Gain, damping and delay of an actuator, of which a model's are rarely right."""
-    damps = GAIN_DOUBT if servo.damping else HELD  # else only the joint's own does
+    damps = trust.width("damping", GAIN_DOUBT) if servo.damping else HELD  # else only the joint's
+    doubt = trust.width("actuator_gain", GAIN_DOUBT), damps, trust.width("time_delay", DELAY_DOUBT)
     return Unknowns(
         low=np.array([-GAIN_AT_MOST, -GAIN_AT_MOST, 0.0]),
         high=np.array([GAIN_AT_MOST, GAIN_AT_MOST, DELAY_AT_MOST]),
         step=np.array([0.01, 0.01, 2e-4]),
         mean=np.array([0.0, 0.0, servo.delay]),
-        doubt=np.array([GAIN_DOUBT, damps, DELAY_DOUBT]),
+        doubt=np.maximum(doubt, HELD),
     )
 
 

@@ -31,7 +31,13 @@ ALIKE = 0.12
 SLOW = 0.02
 """A delay of commands (s) of which a part counts as the same part of another number does."""
 
-Parameter = Literal["damping", "frictionloss", "stiffness", "actuator_gain", "time_delay"]
+OfModel = Literal[
+    "mass", "inertia", "gravity", "center_of_mass", "damping", "frictionloss", "stiffness"
+]
+OfMeasurement = Literal[
+    "actuator_gain", "time_delay", "force_scale", "force_offset", "position_offset"
+]
+Parameter = OfModel | OfMeasurement
 NATIVE: dict[str, Parameter] = {
     DAMPING: "damping",
     FRICTION: "frictionloss",
@@ -42,16 +48,18 @@ NATIVE: dict[str, Parameter] = {
 
 @dataclass(frozen=True)
 class Correction:
-    """A number of the model that the measurements contradict.
+    """A number of the model or of the measurement that the runs contradict.
 
     Attributes:
-        parameter: the joint's attribute in MJCF, or what of its actuator it is.
+        parameter: the joint's attribute in MJCF, or what of its body, its actuator or the
+            measurement it is.
         joint: its name.
         factor: the right value over the model's; None where that is zero.
         value: the right one.
         error: its standard error.
         unit: of both.
         explanation: for a person.
+        alternatives: other numbers one of which may be off instead: the data cannot tell.
     """
 
     parameter: Parameter
@@ -61,6 +69,7 @@ class Correction:
     error: float
     unit: str
     explanation: str
+    alternatives: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

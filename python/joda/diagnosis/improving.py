@@ -8,12 +8,14 @@ from threadpoolctl import threadpool_limits
 from joda.diagnosis.ahead import pairs
 from joda.diagnosis.asking import asked
 from joda.diagnosis.baseline import windows_for
+from joda.diagnosis.calibrating import Calibration
 from joda.diagnosis.corrections import OFF, Corrected, Correction, corrected, corrections, numbers
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.given import FAITHFUL, Departures
 from joda.diagnosis.judge import BLAS
 from joda.diagnosis.mending import Error, error, mend
 from joda.diagnosis.reshaping import refitted
+from joda.diagnosis.righted import Righted
 from joda.diagnosis.share import divided
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
@@ -49,6 +51,7 @@ class Step:
         profile: with all effects so far.
         corrections: of the model's own numbers, that were made instead.
         servo: of the joint's actuators, with all corrections so far; None where none was made.
+        right: what was set right of what the joint moves and of the measurement, so far.
         error: on runs held out of every fit.
         diagnosis: of the model with this profile; None if it was not made.
         departs: by what the profile is not what was given and diagnosed.
@@ -61,6 +64,7 @@ class Step:
     departs: Departures = FAITHFUL
     corrections: tuple[Correction, ...] = ()
     servo: Servo | None = None
+    right: Righted | None = None
 
     @property
     def effect(self) -> str | None:
@@ -87,23 +91,30 @@ def improved(measured: Measured, told: Told = lambda what: None) -> tuple[tuple[
             steps.append(first)
         while len(steps) <= MOST:
             told("diagnose")
-            found = diagnosed(_with(parts, steps[-1].profile)[0])
-            said = found.diagnosis
+            found = diagnosed(_with(parts, steps[-1].profile)[0], calibrate=len(steps) == 1)
+            said, own = found.diagnosis, found.diagnosis.corrections
+            if found.calibration:
+                if not (more := _calibrated(parts, steps[-1], found.calibration, own)):
+                    why = NOTHING_HELPS
+                    break
+                parts = _righted(parts, found.calibration.righted)
+                steps.append(more)
+                own = tuple(one for one in own if one not in more.corrections)
             steps[-1] = replace(steps[-1], diagnosis=said)
             if said.doubt:
                 why = said.summary
                 break
-            right = None if steps[-1].corrections else found.corrected
-            if right and (
-                more := _set_right(parts, steps[-1].error, right, said.corrections, told)
-            ):
+            anew = found.calibration or not steps[-1].corrections
+            right = found.corrected if anew else None
+            if right and (more := _set_right(parts, steps[-1].error, right, own, told)):
                 parts = _driven(parts, more.servo)
-                steps.append(more)
+                steps.append(replace(more, right=steps[-1].right))
                 continue
             if not (stairs := _next(parts, steps[-1], found, told)):
                 why = NOTHING_HELPS if said.verdict == "missing_effect" else said.summary
                 break
-            steps += [replace(step, servo=steps[-1].servo) for step in stairs]
+            last = steps[-1]
+            steps += [replace(step, servo=last.servo, right=last.right) for step in stairs]
             steps = _named_anew(parts, steps, told)
     except KeyboardInterrupt:
         why = INTERRUPTED
@@ -120,6 +131,23 @@ def _numbers_first(parts: Parts, before: Error, told: Told) -> Step | None:
         right = corrected(begun, found, OFF, begun.fit.x)
     own = corrections(found, begun.base.profile.joint, OFF)
     return _set_right(parts, before, right, own, told) if right else None
+
+
+def _calibrated(
+    parts: Parts, last: Step, found: Calibration, said: Sequence[Correction]
+) -> Step | None:
+    """The joint and its runs with numbers set right, if that lowers the error held out."""
+    after = error(_righted(parts, found.righted)[1].changed(last.profile))
+    if after.window > WORTH * last.error.window:
+        return None
+    own = tuple(one for one in said if one.parameter in found.names)
+    return Step(None, last.profile, after, corrections=own, right=found.righted)
+
+
+def _righted(parts: Parts, right: Righted) -> Parts:
+    """Both with numbers set right."""
+    train, held = parts
+    return right.of(train), right.of(held)
 
 
 def _set_right(
@@ -195,7 +223,7 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
         told(f"asking again what {step.effect} is")
         others = [one.added for one in added if one is not step]
         without = divided(added[-1].profile, step.effect or "", begin.profile)[1]
-        found = diagnosed(_with(parts, without)[0]).diagnosis
+        found = diagnosed(_with(parts, without)[0], calibrate=False).diagnosis
         if found.verdict != "missing_effect" or found.effects[0].effect in [
             one.effect for one in added
         ]:
@@ -204,7 +232,8 @@ def _named_anew(parts: Parts, steps: list[Step], told: Told) -> list[Step]:
         for place in sorted({k, len(others)}):  # where it was, and last
             stairs = _stairs(parts, begin, [*others[:place], instead, *others[place:]], told)
             if stairs and stairs[-1].error.window < AS_GOOD * added[-1].error.window:
-                return [*before, begin, *(replace(one, servo=begin.servo) for one in stairs[1:])]
+                own = (replace(s, servo=begin.servo, right=begin.right) for s in stairs[1:])
+                return [*before, begin, *own]
     return steps
 
 

@@ -1,19 +1,24 @@
 """Around a mended joint: its runs read, its scene, profile and picture written."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from joda.diagnosis.mending import Error
+from joda.diagnosis.righted import Righted
 from joda.files import check_targets, named_like
+from joda.measured.corrections_file import corrections_beside, corrections_text
 from joda.measured.errors import MULTIPLE
 from joda.measured.excerpts import excerpts
 from joda.measured.maps import draw_models, draw_runs, shade
 from joda.measured.reading import Measured, read_measured
 from joda.measured.runs import check_known
+from joda.measured.sensing import RIGHT
+from joda.measured.trust import trusting
 from joda.measured.visited import unvisited
 from joda.pictures.changes import draw_channels
 from joda.pictures.style import house_style
@@ -24,21 +29,30 @@ from joda.scenes.attaching import attached
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
+NO_TRUST: Mapping[str, float] = MappingProxyType({})
+"""Nothing is told of how far off a number may be."""
 PARTED = 5.0
 """Whole runs that are missed by so many times more than windows have parted from the measured."""
 
 
 def read_runs(
-    model: str | Path, joint: str, runs: Sequence[str | Path], passive: bool = False
+    model: str | Path,
+    joint: str,
+    runs: Sequence[str | Path],
+    passive: bool = False,
+    trust: Mapping[str, float] = NO_TRUST,
 ) -> Measured:
     """As `joda.measured.reading.read_measured`, but of long runs only parts.
 
-    It is noted where that is so, and that curves beside runs say nothing.
+    It is noted where that is so, and that curves beside runs say nothing. `trust`: how far off
+    numbers may be (`joda.measured.trust`).
 
     Raises:
-        JodaError: a file cannot be read, or what it holds cannot be of this joint.
+        JodaError: a file cannot be read, or what it holds cannot be of this joint; or no such
+            number may be off.
     """
-    measured = read_measured(model, joint, runs, passive)
+    told = trusting(trust)
+    measured = replace(read_measured(model, joint, runs, passive), trust=told)
     check_known(measured.runs)
     ignored = tuple(
         f"{one.curve.name}: a quasi-static curve, not used as there are timed runs."
@@ -52,19 +66,24 @@ def read_runs(
 def beside(
     scene: Path, force: bool, inputs: Sequence[str | Path], report: str | Path | None = None
 ) -> tuple[Path, Path]:
-    """The profile's and the picture's file beside a scene.
+    """The profile's and the picture's file beside a scene, where corrections may be too.
 
     Raises:
         JodaError: one of them, or of the report, exists, is read (`inputs`) or cannot be made.
     """
     composed, picture = (named_like(scene, suffix) for suffix in (".composed.json", ".png"))
     more = [Path(report)] if report else []
-    check_targets([scene, composed, picture, *more], force, inputs)
+    check_targets([scene, composed, picture, corrections_beside(scene), *more], force, inputs)
     return composed, picture
 
 
 def scene_files(
-    model: Path, profile: Profile, scene: Path, composed: Path, servo: Servo | None = None
+    model: Path,
+    profile: Profile,
+    scene: Path,
+    composed: Path,
+    servo: Servo | None = None,
+    right: Righted | None = None,
 ) -> tuple[dict[Path, bytes | str], list[str]]:
     """What a scene with a whole profile (`joda.scenes.native`) and the profile's file hold.
 
@@ -73,12 +92,21 @@ def scene_files(
         profile: of its joint.
         scene, composed: to be written.
         servo: of the joint's actuators, with another gain or delay; None: as they are.
+        right: what was set right of what the joint moves and of the measurement.
 
     Returns:
         contents by path, and what is done there, a sentence each.
     """
-    content, notes, _ = attached(model, profile, scene, joint=profile.joint.name, servo=servo)
-    return {scene: content, composed: profile.to_json()}, notes
+    name, heavier = profile.joint.name, right.heavier if right else None
+    content, notes, _ = attached(model, profile, scene, joint=name, servo=servo, heavier=heavier)
+    files: dict[Path, bytes | str] = {scene: content, composed: profile.to_json()}
+    if right and right.sensing != RIGHT:
+        own = corrections_beside(scene)
+        files[own] = corrections_text({name: right.sensing})
+        notes.append(
+            f"What the measurement has wrong is in {own}: joda compare --corrections reads it."
+        )
+    return files, notes
 
 
 def parting(after: Error, noise: float, blocks: bool) -> list[str]:

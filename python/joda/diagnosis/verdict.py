@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joda.diagnosis.asking import Asked
+from joda.diagnosis.asking import Asked, asked
 from joda.diagnosis.baseline import joined, usable, windows_for
+from joda.diagnosis.calibrating import Calibration, calibrated
 from joda.diagnosis.corrections import (
     FAR_OFF,
     OFF,
@@ -122,6 +123,8 @@ class Diagnosed:
         puzzling: the first look's ranking, where no effect explained the runs; else None.
         looks: the evidence of each look.
         corrected: the joint with its own numbers as the runs show them; None if none is off.
+        calibration: numbers of its body and of the measurement that were set right first; None if
+            none is off.
     """
 
     diagnosis: Diagnosis
@@ -130,12 +133,14 @@ class Diagnosed:
     puzzling: Ranking | None = None
     looks: tuple[Evidence, ...] = ()
     corrected: Corrected | None = None
+    calibration: Calibration | None = None
 
 
 def diagnosed(
     measured: Measured,
     exclude: Collection[str] = (),
     told: Told = lambda done, total, what: None,
+    calibrate: bool = True,
 ) -> Diagnosed:
     """Finds what a model lacks.
 
@@ -143,6 +148,7 @@ def diagnosed(
         measured: the joint and its runs.
         exclude: effects that are not considered.
         told: how much is done, of how much, and what.
+        calibrate: whether numbers of the joint's body and of the measurement may be off.
     """
     if not usable(windows_for(measured)).any():
         return Diagnosed(_said(measured, "insufficient_data", TOO_SHORT, (), None))
@@ -151,8 +157,31 @@ def diagnosed(
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
-    looks = looked(measured, exclude, told)
-    return replace(_concluded(measured, looks), looks=looks.evidence)
+    if not calibrate:
+        looks = looked(measured, exclude, told)
+        return replace(_concluded(measured, looks), looks=looks.evidence)
+    begun = asked(measured)
+    found = calibrated(measured, begun)
+    right = found.righted.of(measured) if found else measured
+    looks = looked(right if found and found.alone else measured, exclude, told)
+    if found and not found.alone:
+        if not found.beats(begun, looks.first[0].guesses):
+            found, right = None, measured
+        else:
+            looks = looked(right, exclude, told)
+    out = replace(_concluded(right, looks), looks=looks.evidence)
+    return _with_numbers(out, found, measured) if found else out
+
+
+def _with_numbers(out: Diagnosed, found: Calibration, measured: Measured) -> Diagnosed:
+    """What was found of a joint and runs whose numbers were set right, with these."""
+    numbers = found.corrections(measured)
+    said = out.diagnosis
+    summary = " ".join(
+        [said.summary, "Beside it numbers are off:", *(n.explanation for n in numbers)]
+    )
+    told = replace(said, summary=summary, corrections=(*numbers, *said.corrections))
+    return replace(out, diagnosis=told, calibration=found)
 
 
 def _concluded(measured: Measured, looks: Looked) -> Diagnosed:

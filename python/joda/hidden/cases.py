@@ -61,7 +61,8 @@ class Case:
         held_out_clean: those held out, without noise.
         seal: what is hidden: effect (None for nothing), interval, direction, magnitude, unit,
             visible, in_catalogue, also_right (names of laws that are the same here), and under
-            `second` the same of a second effect.
+            `second` the same of a second effect; `wrong`, where numbers are: these by the names of
+            a diagnosis' corrections, true over the model's, of a measurement in its units.
         noise: standard deviation of the encoder, rad or m.
         quantised: whether its error is that of steps, sqrt(12) times as large, and not Gaussian.
         visible: how far the effect moves the joint, in standard deviations of the encoder.
@@ -179,7 +180,7 @@ def _attempt(
         train,
         held_out,
         clean,
-        _seal(of, bare.joint, names, hidden, visible, forced),
+        _seal(of, bare.joint, names, hidden, visible, forced) | _wrong(truth, encoder),
         encoder.sigma,
         encoder.quantised,
         min(visible, default=np.inf),
@@ -218,6 +219,14 @@ def _seal(
     if not seals:
         return {"effect": None}
     return seals[0] | ({"second": seals[1]} if len(seals) > 1 else {})
+
+
+def _wrong(truth: Truth, encoder: Encoder) -> dict[str, Any]:
+    """Numbers that the base model or the measurement has wrong."""
+    wrong = encoder.instrument.wrong
+    if truth.believed:
+        wrong["mass"] = truth.joint.inertia / truth.believed.inertia
+    return {"wrong": wrong} if wrong else {}
 
 
 def _called(name: str, hidden: Hidden) -> str:

@@ -77,7 +77,7 @@ def _joint(rng: np.random.Generator, heavy: bool, gravity: bool) -> Joint:
 
 def base_model(truth: Truth, name: str) -> str:
     """MJCF of the joint as its base model has it."""
-    joint = truth.joint
+    joint = truth.believed or truth.joint
     if joint.kind == "hinge":
         axis, inertial, mass = _hinge(joint)
     else:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from joda.hidden.instrument import TRUE, Instrument
 from joda.hidden.laws import Array
 from joda.hidden.motions import FLICKS, FORCED, FREE, GUARD, KNOCKS, Draw, Ground, Hands, release
 from joda.hidden.simulator import Tape, Trace, simulate
@@ -61,6 +62,7 @@ class Encoder:
         force: noise of the force, of its root mean square.
         step: of a position that has Gaussian noise before it is rounded, rad or m.
         rate: samples per second; None for as many as suit the runs' length.
+        instrument: what of it is wrong.
     """
 
     sigma: float
@@ -69,6 +71,7 @@ class Encoder:
     force: float
     step: float = 0.0
     rate: float | None = None
+    instrument: Instrument = TRUE
 
 
 def draw_encoder(rng: np.random.Generator, joint: Joint) -> Encoder:
@@ -190,6 +193,8 @@ def measure(
     period = 1 / encoder.rate if encoder.rate else float(np.clip(steps * h / 1000, 0.001, 0.005))
     stride = round(period / h)
     clean: list[Run] = []
+    logged: list[Run] = []
+    ahead = round(encoder.instrument.delay / h)
     for lane, end in enumerate(motions.ends):
         name = f"run{lane + 1}" if lane < motions.train else f"held_out{lane - motions.train + 1}"
         step = max(min(stride, end // SHORTEST), 1)
@@ -207,7 +212,9 @@ def measure(
                 motions.forced,
             )
         )
-    noisy = [spoil(rng, run, encoder) for run in clean]
+        later = trace.force[np.minimum(at + ahead, steps - 1), lane]
+        logged.append(replace(clean[-1], force=later))
+    noisy = [encoder.instrument.logged(spoil(rng, run, encoder)) for run in logged]
     return noisy[: motions.train], noisy[motions.train :], clean[motions.train :]
 
 

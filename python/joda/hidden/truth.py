@@ -189,6 +189,7 @@ class Truth:
             model has.
         limit_model: the base model's solreflimit; None for MuJoCo's default.
         tight: whether the base model holds its dry friction tightly.
+        believed: the mechanics that the base model has instead; None for the true ones.
     """
 
     joint: Joint
@@ -201,6 +202,7 @@ class Truth:
     spring: tuple[float, float] = (0.0, 0.0)
     limit_model: tuple[float, float] | None = None
     tight: bool = False
+    believed: Joint | None = None
 
     def bare(self) -> Self:
         """The same without what is hidden."""

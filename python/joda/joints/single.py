@@ -71,6 +71,19 @@ class Single:
         """The same for steps of h (s) that stand for no steps, see `Servo.stepped`."""
         return replace(self, servo=self.servo.stepped(h)) if self.servo else self
 
+    def heavier(self, inertia: float, gravity: float, turned: float = 0.0) -> "Single":
+        """The same with factors of its inertia and of gravity's force, and with the centre of mass
+        turned about a hinge by so much, rad."""
+        a, b = self.weight
+        cos, sin = float(np.cos(turned)), float(np.sin(turned))
+        a, b = a * cos + b * sin, b * cos - a * sin
+        return replace(
+            self,
+            inertia=inertia * self.inertia,
+            row_inertia=inertia * self.row_inertia,
+            weight=(gravity * a, gravity * b),
+        )
+
     def weight_at(self, position: Array) -> Array:
         """Gravity's force at positions (rad or m), N·m or N; shape (n,)."""
         a, b = self.weight

@@ -18,6 +18,7 @@ from joda.measured.runs import (
     read_measurement,
     read_together,
 )
+from joda.measured.sensing import RIGHT, Sensing
 from joda.measured.table import header
 from joda.measured.touching import touching
 from joda.scenes.actuators import Drive, Servo, actuators_on, drive_of
@@ -46,7 +47,11 @@ class Logs:
 
 
 def read_logs(
-    model: mujoco.MjModel, joint: int, paths: Sequence[str | Path], passive: bool
+    model: mujoco.MjModel,
+    joint: int,
+    paths: Sequence[str | Path],
+    passive: bool,
+    sensing: Sensing = RIGHT,
 ) -> Logs:
     """Reads measurements of a joint, and notes which of their columns are not used.
 
@@ -55,6 +60,7 @@ def read_logs(
         joint: its id.
         paths: CSV files, as `joda.measured.runs.read_measurement` reads them.
         passive: whether the actuators on the joint were off while it was measured.
+        sensing: what is wrong with them.
 
     Raises:
         JodaError: a file cannot be read; or an actuator acts on the joint, and what it did is not
@@ -73,6 +79,7 @@ def read_logs(
         if isinstance(one, Run):
             one, note = evened(one)
             notes += [note] if note else []
+            one = sensing.of(one, whole=bool(positions))
             if drive and not commanded:
                 raise JodaError(
                     f"{path}: no column '{drive.columns[0]}', which other runs have; give runs in "
@@ -84,7 +91,9 @@ def read_logs(
                 f"'ctrl:{acting[0]}' nor 'force'; record its signal or the whole force on the "
                 "joint, or say with --passive that the actuator was off."
             )
-        if isinstance(one, Run) and positions:
+        if not isinstance(one, Run):
+            one = sensing.of_curve(one)
+        elif positions:
             one, more = _among_others(model, joint, one, positions)
             notes += more
         if first := next((other for other in read if _copies(one, other)), None):
@@ -94,7 +103,8 @@ def read_logs(
             )
             continue
         read.append(one)
-    return Logs(tuple(read), drive.servo if drive else None, tuple(notes))
+    servo = sensing.driving(drive.servo) if drive else None
+    return Logs(tuple(read), servo, tuple(notes))
 
 
 def joints_in(model: mujoco.MjModel, path: Path) -> list[str]:

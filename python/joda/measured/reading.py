@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 from joda.errors import JodaError
 from joda.joints.single import Single, single, weighing
 from joda.measured import smoothing
+from joda.measured.corrections_file import sensing_of
 from joda.measured.driven import read_logs
 from joda.measured.gauge import Gauged, gauged
 from joda.measured.misfit import missed
 from joda.measured.obstructed import Clear, clear_of_contacts
 from joda.measured.replay import WINDOW, Replayer
 from joda.measured.runs import QuasiStatic, Run
+from joda.measured.sensing import Sensing
 from joda.measured.slow import as_curve
 from joda.measured.suspicions import suspicions
+from joda.measured.trust import USUAL, Trust
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.angles import range_doubt
@@ -69,6 +72,7 @@ class Measured:
         contacts: of the scene that resist the joint where it was measured.
         whole: whether all that acts on the joint there is replayed, and all of the runs.
         barred: the note on where the scene would not have let the joint; empty if there is none.
+        trust: how far off its numbers, and those of the measurement, may be.
     """
 
     context: Context
@@ -84,6 +88,11 @@ class Measured:
     contacts: tuple[Contact, ...]
     whole: bool
     barred: str
+    trust: Trust = USUAL
+
+    def sensed(self, sensing: Sensing) -> "Measured":
+        """The same joint with runs as they would be if what is wrong with them were right."""
+        return replace(self, runs=tuple(map(sensing.of, self.runs)))
 
     def changed(
         self,
@@ -188,11 +197,20 @@ def checked(read: Sequence[Run | QuasiStatic], found: Context, timestep: float) 
 
 
 def read_measured(
-    model: str | Path, joint: str, runs: Sequence[str | Path], passive: bool = False
+    model: str | Path,
+    joint: str,
+    runs: Sequence[str | Path],
+    passive: bool = False,
+    corrections: str | Path | None = None,
 ) -> Measured:
     """Reads a joint and what was measured; raises JodaError, also for what cannot be of it.
 
-    `passive`: the actuators on the joint were off.
+    Args:
+        model: MJCF or URDF.
+        joint: its name or address.
+        runs: CSV files.
+        passive: whether the actuators on the joint were off.
+        corrections: a file of what is wrong with the runs (`joda.measured.corrections_file`).
     """
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
@@ -203,7 +221,7 @@ def read_measured(
     found = context(source, name)
     bare = Profile(joint=describe_joint(compiled, number))
     profile = whole_profile(compiled, number, profiles_of(compiled).get(name, bare))
-    logs = read_logs(compiled, number, runs, passive)
+    logs = read_logs(compiled, number, runs, passive, sensing_of(corrections, name))
     notes = [*checked(logs.read, found, float(compiled.opt.timestep)), *logs.notes]
     clear = clear_of_contacts(compiled, number, found, profile, logs.read)
     notes += clear.notes

@@ -22,6 +22,7 @@ from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.editing import EditedScene
 from joda.scenes.model import find_joint, joint_name, load, sentence
+from joda.scenes.weights import Heavier
 
 SAME = (
     *("nq", "nu", "nbody", "ngeom", "nsensor", "jnt_type", "jnt_axis", "jnt_pos", "jnt_range"),
@@ -91,10 +92,14 @@ def attached(
     native: Literal["replace", "keep"] = "replace",
     also: Mapping[str, str] = MappingProxyType({}),
     servo: Servo | None = None,
+    heavier: Heavier | None = None,
 ) -> Attached:
     """The scene that `attach`, with the same arguments, writes to `output`.
 
-    `servo`: of the actuators on the (only) joint, with another gain or delay; None: as they are.
+    Args:
+        model, profiles, output, joint, native, also: as there.
+        servo: of the actuators on the (only) joint, with another gain or delay; None: as they are.
+        heavier: what the (only) joint moves is so much so; None: it is as it was.
     """
     model = Path(model)
     items = [profiles] if isinstance(profiles, str | Path | Profile) else list(profiles)
@@ -109,12 +114,15 @@ def attached(
 
     scene = EditedScene(model, spec, compiled, targets)
     for target, profile in zip(targets, loaded, strict=True):
-        scene.add(target, profile, native, also)
+        scene.add(target, profile, native, also, heavier)
     if servo is not None:
         scene.drive(targets[0], servo)
+    if heavier is not None:
+        scene.weigh(targets[0], heavier)
     content = scene.finish(output.parent)
     changed = ["dof_invweight0"] * (scene.heavier or "armature" in also)
     changed += ["actuator_gainprm"] * (servo is not None)
+    changed += ["body_mass"] * (heavier is not None)
     after = _verify(output, content, compiled, changed)
     return Attached(content, scene.notes, after)
 

@@ -29,6 +29,7 @@ from joda.scenes.scene import (
     prefix,
     profiles_of,
 )
+from joda.scenes.weights import Heavier, gravcomp, inertial, moved_bodies
 
 DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
 """Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
@@ -95,8 +96,15 @@ class EditedScene:
             raise JodaError(f"{error}: a name in it is not XML; give it another one.") from None
         return source, dict(enumerate(source.joints()))
 
-    def add(self, joint: int, profile: Profile, native: str, also: Mapping[str, str]) -> None:
-        """Edits the text for one joint."""
+    def add(
+        self,
+        joint: int,
+        profile: Profile,
+        native: str,
+        also: Mapping[str, str],
+        heavier: Heavier | None = None,
+    ) -> None:
+        """Edits the text for one joint; `heavier`: what it moves is so much so."""
         kind = joint_type(self.model, joint)
         if kind != profile.joint.type:
             raise JodaError(
@@ -108,7 +116,7 @@ class EditedScene:
         changes |= self._limit(joint, profile)
         if "solimplimit" not in changes:
             changes |= self._bearing(joint, profile, changes)
-        changes |= self._inertia(joint, profile)
+        changes |= self._inertia(joint, profile, heavier.inertia if heavier else 1.0)
         if is_discrete(self.model):
             changes |= self._discrete(joint)
         if not self.names[joint]:
@@ -141,6 +149,33 @@ class EditedScene:
             told = f"gainprm {values['gainprm']}, biasprm {values['biasprm']}"
             told += f", delay {values['delay']} s" if "delay" in values else ""
             self._note(joint, f"has its actuator as <general> with {told}")
+
+    def weigh(self, joint: int, heavier: Heavier) -> None:
+        """Makes what a joint moves heavier, all of its bodies by the same factors."""
+        ids = moved_bodies(self.model, joint)
+        bodies = [one for one in self.joints[joint][0].walk() if one.tag == "body"]
+        if len(bodies) != len(ids):
+            raise JodaError(
+                f"{self.source.main.path}: the bodies that joint "
+                f"'{joint_name(self.model, joint)}' moves are not all written there, and their "
+                "masses cannot be changed."
+            )
+        for body, element in zip(ids, bodies, strict=True):
+            if self.model.body_mass[body] <= 0:
+                continue
+            values = inertial(self.model, joint, body, heavier)
+            text = f"<inertial {' '.join(f'{a}={quoted(x)}' for a, x in values.items())}/>"
+            own = next((one for one in element.children if one.tag == "inertial"), None)
+            if own:
+                own.replace(text)
+            else:
+                element.insert_first(text)
+            if carried := gravcomp(self.model, body, heavier):
+                element.set(gravcomp=carried)
+        self.heavier = True
+        told = f"moves masses and inertias {heavier.inertia:.3g} times as large as before"
+        lifted = f", of whose weight gravcomp takes {heavier.lifted:.3g}"
+        self._note(joint, told + (lifted if abs(heavier.lifted) > 1e-9 else ""))
 
     def finish(self, folder: Path) -> bytes:
         """The text with the plugin's instances in it, for a file that will lie in `folder`."""
@@ -289,16 +324,18 @@ class EditedScene:
         self._note(joint, "has firmer limits now, to bear the force with which the profile presses")
         return dict(zip(("solreflimit", "solimplimit"), firm, strict=True))
 
-    def _inertia(self, joint: int, profile: Profile) -> dict[str, str]:
-        """The armature with the profile's added inertia, without that of the one it replaces."""
+    def _inertia(self, joint: int, profile: Profile, factor: float) -> dict[str, str]:
+        """The armature with the profile's added inertia, without that of the one it replaces;
+        `factor`: of what is left."""
         name = joint_name(self.model, joint)
         replaced = profiles_of(self.model).get(name)
         before, after = replaced.added_inertia if replaced else 0.0, profile.added_inertia
-        if before == after:
-            return {}
         own = float(self.model.dof_armature[self.model.jnt_dofadr[joint]])
+        left = factor * max(own - before, 0.0)
+        if before == after and factor == 1:
+            return {}
         self.heavier = True
-        return {"armature": f"{max(own - before, 0.0) + after:.9g}"}
+        return {"armature": f"{left + after:.9g}"}
 
     def _note(self, joint: int, text: str) -> None:
         name = self.names[joint] or joint_name(self.model, joint)

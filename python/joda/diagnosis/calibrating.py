@@ -1,0 +1,233 @@
+"""Finds which numbers of a joint's body and of its measurement are off, if these explain the runs.
+
+All are set free at once, each with a prior whose width is how far off it usually is, or as told;
+then one after the other is held again, as long as the runs do not miss it. What an effect explains
+as well, with less of a surprise, is left to it.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from joda.diagnosis.asking import Asked
+from joda.diagnosis.corrections import ANYTHING, Correction
+from joda.diagnosis.doubted import Doubted, Numbers, doubted
+from joda.diagnosis.guessing import Guess
+from joda.diagnosis.judge import BEND, BLAS, Fit, Judge, excess
+from joda.diagnosis.righted import Righted, righted
+from joda.diagnosis.told import told
+from joda.measured.reading import Measured
+
+Array = NDArray[np.float64]
+
+WORTH = 40.0
+"""Gain in loss, less the price of its numbers, from which numbers are worth a word."""
+NEXT = 25.0
+"""Loss that a number must spare to be free beside the others."""
+ALIKE = 9.0
+"""Gain in loss up to which data cannot tell one number from another."""
+CALM, PART = 0.05, 0.01
+"""What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
+NEARLY = 0.01
+"""Part of the best effect's gain by which numbers may explain less and still be what is wrong."""
+CLEARLY = 3.0
+"""How many of its errors, by the data alone, a number is off by at the least."""
+BETWEEN = 0.04
+"""Error of a delay, in samples: what the force is between two of them is not known."""
+LEVEL, FIRST = 1e5, 8
+"""Mean square residual from which a window counts as its logarithm in the first iterations of some
+fits, which then go where all windows are better, and how many these are."""
+EQUIVALENT = (
+    *("added_inertia", "gravity_offset"),
+    *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
+)
+"""Effects that may be the same as one of the numbers."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Numbers that explain runs better than a model as it is.
+
+    Attributes:
+        numbers: those that are off.
+        fit: of the model with them.
+        errors: their standard errors, as they are fitted.
+        loss: with the price of the numbers.
+        alone: whether they leave nothing that an effect would explain better.
+        others: of each number, those that the data cannot tell from it, with their values.
+    """
+
+    numbers: Numbers
+    fit: Fit
+    errors: Array
+    loss: float
+    alone: bool
+    others: tuple[tuple[tuple[Doubted, float], ...], ...]
+
+    @property
+    def names(self) -> tuple[Doubted, ...]:
+        """Of the numbers."""
+        return self.numbers.names
+
+    @property
+    def righted(self) -> Righted:
+        """What is to be set right."""
+        return righted({str(name): x for name, x in self.numbers.values(self.fit.x).items()})
+
+    def beats(self, begun: Asked, guesses: Sequence[Guess]) -> bool:
+        """Whether no effect explains clearly more."""
+        least = min((g.fit.loss + g.cost for g in guesses), default=begun.fit.loss)
+        return self.loss < least + NEARLY * max(begun.fit.loss - least, 0.0)
+
+    def corrections(self, measured: Measured) -> tuple[Correction, ...]:
+        """What is off, for the user.
+
+        Args:
+            measured: the joint as it was given.
+        """
+        values = self.numbers.values(self.fit.x).items()
+        return tuple(
+            told(measured, name, value, float(error), others)
+            for (name, value), error, others in zip(values, self.errors, self.others, strict=True)
+        )
+
+
+def calibrated(measured: Measured, begun: Asked) -> Calibration | None:
+    """The numbers that are off; None where none is, or where they explain little.
+
+    Args:
+        measured: the joint and its runs.
+        begun: the model fitted to them.
+    """
+    every = doubted(measured, begun.base)
+    if not measured.runs or not every.names:
+        return None
+    with threadpool_limits(1, BLAS):
+        return _calibrated(begun, every)
+
+
+def _calibrated(begun: Asked, every: Numbers) -> Calibration | None:
+    found = _Search(begun, every)
+    whole, first = found.fitted(every.names), found.fitted(()).loss
+    if first - whole.loss < WORTH:
+        return None
+    names, best = every.names, whole
+    while names:
+        tried = [tuple(one for one in names if one != name) for name in names]
+        fits = [found.near(fewer, (names, best)) for fewer in tried]
+        fit, fewer = min(zip(fits, tried, strict=True), key=lambda pair: pair[0].loss)
+        if fit.loss - best.loss > NEXT:
+            break
+        best, names = fit, fewer
+    if first - best.loss < WORTH + found.price * len(names):
+        return None
+    return _concluded(found, names, best, whole)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Fits of numbers to windows, in long steps."""
+
+    begun: Asked
+    every: Numbers
+
+    @property
+    def price(self) -> float:
+        """Of a number, in loss."""
+        return float(np.log(max(self.begun.judge.samples, 2.0)))
+
+    def fitted(
+        self, names: Sequence[Doubted], near: tuple[Sequence[Doubted], Fit] | None = None
+    ) -> Fit:
+        """Some of the numbers, from those of another fit and from the model as it is."""
+        own, base, judge = self.every.coarser().only(names), self.begun.base, self._judge
+        none = np.append(base.unknowns.mean, np.zeros(len(names)))
+        fits = [self.near(names, near), self._from(own, none, judge.windows.start)]
+        return min((judge.refit(own.make, own.unknowns, one) for one in fits), key=_loss)
+
+    def near(
+        self, names: Sequence[Doubted], near: tuple[Sequence[Doubted], Fit] | None = None
+    ) -> Fit:
+        """Some of the numbers, from those of another fit."""
+        own = self.every.coarser().only(names)
+        x, start = self.begun.fit.x, self.begun.fit.start
+        if near is None:
+            return self._from(own, np.append(x, np.zeros(len(names))), start)
+        return self._from(own, self.every.only(near[0]).taken(near[1].x, names), near[1].start)
+
+    @property
+    def _judge(self) -> Judge:
+        return self.begun.judge.coarser
+
+    def _from(self, own: Numbers, x: Array, start: Array) -> Fit:
+        """From numbers and starts: at once, and such that windows that are far off count first."""
+        judge, fits = self._judge, []
+        for bend in (LEVEL, BEND):
+            first = judge.fit(own.make, own.unknowns, x, start, FIRST, bend)
+            fits.append(judge.fit(own.make, own.unknowns, first.x, first.start))
+        return min(fits, key=_loss)
+
+
+def _loss(fit: Fit) -> float:
+    return fit.loss
+
+
+def _concluded(
+    found: _Search, names: tuple[Doubted, ...], rough: Fit, whole: Fit
+) -> Calibration | None:
+    """The numbers in usual steps, with their errors and what the data cannot tell from them."""
+    begun, judge, every = found.begun, found.begun.judge, found.every
+    own = every.only(names)
+    fit = judge.fit(own.make, own.unknowns, rough.x, rough.start)
+    fit = judge.refit(own.make, own.unknowns, fit)
+    sure = np.abs(fit.x[begun.base.count :]) > CLEARLY * _errors(found, own, fit, every.names)
+    if not sure.all():  # long steps asked for more
+        kept = tuple(name for name, there in zip(names, sure, strict=True) if there)
+        fewer = replace(fit, x=own.taken(fit.x, kept))
+        return _concluded(found, kept, fewer, whole) if kept else None
+    loss = fit.loss + found.price * len(names)
+    samples = max(judge.samples, 1.0)
+    left, before = excess(fit.loss, samples), excess(begun.fit.loss, samples)
+    alone = left < max(CALM, PART * before) and not any(
+        one.fit.loss + one.cost < loss for one in _equivalent(begun)
+    )
+    others = []
+    for name in names:
+        rest = tuple(one for one in names if one != name)
+        swapped: list[tuple[Doubted, float]] = []
+        for other in every.names:
+            if other in names:
+                continue
+            instead = (*rest, other)
+            tried = found.near(instead, (every.names, whole))
+            if tried.loss < rough.loss + ALIKE:
+                swapped.append((other, every.only(instead).values(tried.x)[other]))
+        others.append(tuple(swapped))
+    alike = {name for one in others for name, _ in one}
+    return Calibration(own, fit, _errors(found, own, fit, alike), loss, alone, tuple(others))
+
+
+def _errors(found: _Search, own: Numbers, fit: Fit, alike: Collection[Doubted]) -> Array:
+    """Standard errors of numbers, shape (k,): by the data, and by how far off the others may be
+    that are not set free, but for those that are an alternative to one of these."""
+    judge, base = found.begun.judge, found.begun.base
+    rest = [name for name in found.every.names if name not in (*own.names, *alike)]
+    wider = found.every.only((*own.names, *rest))
+    there = replace(fit, x=np.append(fit.x, np.zeros(len(rest))))
+    doubt = wider.unknowns.doubt
+    doubt[base.count :][: len(own.names)] = ANYTHING
+    covariance = judge.covariance(wider.make, wider.unknowns, there, doubt)
+    errors = np.sqrt(np.diag(covariance))[base.count :][: len(own.names)]
+    late = [name == "time_delay" for name in own.names]
+    return np.hypot(
+        errors, BETWEEN * float(np.median(np.diff(judge.windows.time))) * np.array(late)
+    )
+
+
+def _equivalent(begun: Asked) -> list[Guess]:
+    """The effects that may be the same as a number, fitted."""
+    there = [one for one in begun.hypotheses if one.effect in EQUIVALENT]
+    return [begun.finished(begun.rough(one)) for one in there]
