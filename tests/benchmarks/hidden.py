@@ -6,14 +6,15 @@ python tests/benchmarks hidden forced --cases 50      one line
 python tests/benchmarks hidden forced --seed 7 --out forced.jsonl    goes on where it was stopped
 python tests/benchmarks hidden families --family all --cases 2       every effect of every family
 python tests/benchmarks hidden families --family switches --free --no-add    named, not added
+python tests/benchmarks hidden field --cases 30                      numbers that are off
 
 Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
-few, families, all. `few`: one to three of the runs only, and adding what is named first. `cover`:
-whether the true size and place lie within what is said, where only the true effect is asked for.
-`sure`: forced and free, the same and how sure the answers are. `families`: nothing, every effect
-with force and by positions only, and laws of no catalogue, so many cases of each; a table family by
-effect, and the error on unseen whole runs. Every run draws a new master seed, from which all cases
-follow.
+few, families, field, all. `few`: one to three of the runs only, and adding what is named first.
+`cover`: whether the true size and place lie within what is said, where only the true effect is
+asked for. `sure`: forced and free, the same and how sure the answers are. `families`: nothing,
+every effect with force and by positions only, and laws of no catalogue, so many cases of each; a
+table family by effect, and the error on unseen whole runs. `field`: the family of that name, every
+third case hides nothing. Every run draws a new master seed, from which all cases follow.
 """
 
 import argparse
@@ -31,6 +32,7 @@ from pathlib import Path
 
 from hidden_cases import Job, case_of, job_of, read, spread
 from hidden_families import by_effect
+from hidden_field import by_numbers
 from hidden_figures import fine, table, told
 from hidden_floor import floor_of
 
@@ -43,9 +45,9 @@ from joda.hidden.cases import FAMILY
 from joda.measured.reading import Measured
 
 CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
-CASES |= {"two": 10, "cover": 96, "few": 50, "families": 1}
+CASES |= {"field": 100, "two": 10, "cover": 96, "few": 50, "families": 1}
 """Groups of cases, and how many there are unless told; of `families`, of each effect."""
-APART = ("place", "cover", "few", "families")
+APART = ("place", "cover", "few", "families", "field")
 NEEDS = {"all": [group for group in CASES if group not in APART]}
 NEEDS |= {"sure": ["forced", "free"]}
 NEEDS |= {"confident": ["none", "forced", "free", "hard", "outside"]}
@@ -91,6 +93,7 @@ def said(train: Measured, exclude: tuple[str, ...] = ()) -> dict:
         "seconds": time.perf_counter() - begun,
         "verdict": diagnosis.verdict,
         "looks": [asdict(look) for look in found.looks],
+        "corrections": [asdict(one) for one in diagnosis.corrections],
         "named": [{key: getattr(one, key) for key in keys} for one in diagnosis.effects],
     }
 
@@ -212,6 +215,8 @@ def main() -> None:
     args = parser.parse_args()
     if args.family != FAMILY and {"add", "two"} & set(NEEDS[args.line]):
         parser.error(f"{args.line} needs the true joint as a profile, which only {FAMILY} has")
+    if args.line == "field":
+        args.family = "field"
     path = args.out or Path(tempfile.gettempdir()) / f"hidden_bench_{args.seed}.jsonl"
     print(f"master seed {args.seed}, rows in {path}\n", flush=True)
     jobs = [
@@ -222,7 +227,9 @@ def main() -> None:
     ]
     jobs = [replace(job, adds=not args.no_add) for job in jobs if not (args.free and job.forced)]
     rows = bench(jobs, args.workers, path.resolve())
-    if args.line == "families":
+    if args.line == "field":
+        by_numbers(rows)
+    elif args.line == "families":
         by_effect(rows)
     else:
         table(rows)

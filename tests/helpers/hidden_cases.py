@@ -89,6 +89,8 @@ def job_of(master: int, group: str, number: int, family: str = FAMILY) -> Job:
     if group == "families":
         effect, forced = spread(family)[number % len(spread(family))]
         return replace(one, effect=effect, forced=forced)
+    if group == "field":
+        return one if number % 3 == 0 else replace(one, effect=turn(EFFECTS))
     if group == "none":
         return replace(one, forced=number % 2 == 0)
     if group == "free":

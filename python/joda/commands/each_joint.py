@@ -32,7 +32,7 @@ class Compared:
     Attributes:
         joints: each joint by itself, what the others do to it as a force on it, by name.
         together: replays of the scene as it is, all joints at once; none where a command of one of
-            their actuators, or a force, is not known.
+            their actuators, or a force, is not known, or runs were corrected.
     """
 
     joints: dict[str, Comparison]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.asking import Asked
+from joda.diagnosis.baseline import base_of, single_for, usable, windows_for
 from joda.diagnosis.corrections import ANYTHING, Correction
 from joda.diagnosis.doubted import Doubted, Numbers, doubted
 from joda.diagnosis.guessing import Guess
@@ -31,10 +32,10 @@ ALIKE = 9.0
 """Gain in loss up to which data cannot tell one number from another."""
 CALM, PART = 0.05, 0.01
 """What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
-NEARLY = 0.01
-"""Part of the best effect's gain by which numbers may explain less and still be what is wrong."""
 CLEARLY = 3.0
 """How many of its errors, by the data alone, a number is off by at the least."""
+LONGEST = 1.5
+"""Length of the windows in which numbers are fitted at last, s."""
 BETWEEN = 0.04
 """Error of a delay, in samples: what the force is between two of them is not known."""
 LEVEL, FIRST = 1e5, 8
@@ -78,9 +79,8 @@ class Calibration:
         return righted({str(name): x for name, x in self.numbers.values(self.fit.x).items()})
 
     def beats(self, begun: Asked, guesses: Sequence[Guess]) -> bool:
-        """Whether no effect explains clearly more."""
-        least = min((g.fit.loss + g.cost for g in guesses), default=begun.fit.loss)
-        return self.loss < least + NEARLY * max(begun.fit.loss - least, 0.0)
+        """Whether no effect explains as much."""
+        return self.loss < min((g.fit.loss + g.cost for g in guesses), default=begun.fit.loss)
 
     def corrections(self, measured: Measured) -> tuple[Correction, ...]:
         """What is off, for the user.
@@ -106,7 +106,24 @@ def calibrated(measured: Measured, begun: Asked) -> Calibration | None:
     if not measured.runs or not every.names:
         return None
     with threadpool_limits(1, BLAS):
-        return _calibrated(begun, every)
+        found = _calibrated(begun, every)
+        return _longer(measured, found) if found and found.alone else found
+
+
+def _longer(measured: Measured, found: Calibration) -> Calibration:
+    """The same fitted on in long windows, in which a small error shows; as it was where its numbers
+    are others there."""
+    windows = windows_for(measured, LONGEST)
+    judge, old = Judge(windows, usable(windows)), found.numbers.base
+    single = replace(single_for(measured, windows.h), friction_row=old.single.friction_row)
+    base = base_of(measured.profile, single, windows.h, measured.trust)
+    own = replace(found.numbers, base=base)
+    start = judge.started(own.make(found.fit.x)).start
+    fit = judge.fit(own.make, own.unknowns, found.fit.x, start)
+    moved = np.abs(fit.x - found.fit.x)[base.count :]
+    if np.any(moved > CLEARLY * found.errors):
+        return found
+    return replace(found, numbers=own, fit=fit)
 
 
 def _calibrated(begun: Asked, every: Numbers) -> Calibration | None:

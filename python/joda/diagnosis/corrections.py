@@ -59,7 +59,6 @@ class Correction:
         error: its standard error.
         unit: of both.
         explanation: for a person.
-        alternatives: other numbers one of which may be off instead: the data cannot tell.
     """
 
     parameter: Parameter
@@ -69,7 +68,6 @@ class Correction:
     error: float
     unit: str
     explanation: str
-    alternatives: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ def read_runs(
             number may be off.
     """
     told = trusting(trust)
-    measured = replace(read_measured(model, joint, runs, passive), trust=told)
+    measured = read_measured(model, joint, runs, passive).trusting(told)
     check_known(measured.runs)
     ignored = tuple(
         f"{one.curve.name}: a quasi-static curve, not used as there are timed runs."

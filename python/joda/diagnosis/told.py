@@ -50,7 +50,6 @@ def told(
         error=whole * error,
         unit=unit,
         explanation=f"{words[0].upper()}{words[1:]}.{more}",
-        alternatives=tuple(other for other, _ in others),
     )
 
 

@@ -2,7 +2,8 @@
 
 The model's mass is up to 60 % off, or the force is logged at half to 1.6 times of what it is; its
 offset, its clock (up to 40 ms) and the encoder's zero are wrong now and then. 30 to 200 Hz, uneven,
-in coarse steps. Laws are those of the other families, drawn from all of them.
+in coarse steps; hands and motors whose force such a rate can follow. Laws are those of the other
+families, drawn from all of them.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ import numpy as np
 from joda.hidden import household, machinery, switches
 from joda.hidden.die import Builder, Die, Hidden
 from joda.hidden.family import Family
-from joda.hidden.gestures import Session, perform, shove, some, steps, sweep, toss, track, trembling
+from joda.hidden.gestures import Session, perform, shove, some, sweep, toss, track
 from joda.hidden.instrument import drawn
 from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
@@ -80,10 +81,9 @@ def _encoder(rng: np.random.Generator, joint: Joint) -> Encoder:
 def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: bool) -> Motions:
     pushed: tuple[Draw, ...] = (
         track((0.15, 0.35), 0.8),
-        trembling(hand(1.2, (6.0, 15.0)), 0.3),
+        hand(1.2, (6.0, 15.0)),
         sweep((0.5, 1.5), (4.0, 10.0)),
         ramp,
-        steps(1.2, (4.0, 9.0)),
         reversals,
     )
     left: tuple[Draw, ...] = (flick(0.5), toss(0.6), drop, flick(0.9))

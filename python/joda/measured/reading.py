@@ -90,6 +90,10 @@ class Measured:
     barred: str
     trust: Trust = USUAL
 
+    def trusting(self, trust: Trust) -> "Measured":
+        """The same joint and runs, whose numbers may be so far off."""
+        return replace(self, trust=trust)
+
     def sensed(self, sensing: Sensing) -> "Measured":
         """The same joint with runs as they would be if what is wrong with them were right."""
         return replace(self, runs=tuple(map(sensing.of, self.runs)))
