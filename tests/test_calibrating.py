@@ -19,8 +19,8 @@ ARM = """<mujoco>
   <compiler angle="radian"/>
   <option timestep="0.001" integrator="implicitfast"/>
   <worldbody><body>
-    <joint name="arm" type="hinge" axis="0 1 0" limited="true" range="-3 3" damping="0.1"
-           frictionloss="0.15"/>
+    <joint name="arm" type="hinge" axis="0 1 0" limited="true" range="-4 4" damping="0.1"
+           frictionloss="0.15" solreffriction="0.002 1" solimpfriction="0.99 0.9999 0.001 0.5 2"/>
     <inertial pos="0.3 0 0" mass="{mass}" diaginertia="{own} {own} {own}"/>
   </body></worldbody>
 </mujoco>
@@ -41,24 +41,24 @@ def arm(mass=1.0):
 
 
 def logged(folder, rng, scale=1.0, offset=0.0, delay=0.0, zero=0.0, extra=lambda q: 0.0):
-    """Five runs of 4 s of the arm in MuJoCo at 200 Hz, with what is wrong of what is logged."""
+    """Four runs of 2 s of the arm in MuJoCo at 200 Hz, with what is wrong of what is logged."""
     model = mujoco.MjModel.from_xml_string(arm())
     ahead, names = round(delay / model.opt.timestep), []
-    for k in range(5):
+    for k in range(4):
         data, rows = mujoco.MjData(model), []
         data.qpos[0] = rng.uniform(-1.5, 1.5)
         rates, phases = rng.uniform(2, 7, 3), rng.uniform(0, 6, 3)
         sizes = rng.uniform(0.5, 1.2, 3)
         held, stiff = data.qpos[0], 1.5
-        for _ in range(4000 + ahead):
+        for _ in range(2000 + ahead):
             push = float(sizes @ np.sin(rates * data.time + phases))
             force = push - stiff * (data.qpos[0] - held)
             rows.append((data.time, data.qpos[0], force))
             data.qfrc_applied[0] = force + extra(data.qpos[0])
             mujoco.mj_step(model, data)
         time, position, force = np.array(rows).T
-        later = force[ahead:][:4000:5]
-        at = np.arange(0, 4000, 5)
+        later = force[ahead:][:2000:5]
+        at = np.arange(0, 2000, 5)
         seen = position[at] + zero + SIGMA * rng.standard_normal(len(at))
         names.append(folder / f"run{k}.csv")
         write_run(

@@ -58,7 +58,7 @@ def pushed(folder, rng, count=2):
     out = []
     for k in range(count):
         data, rows = mujoco.MjData(model), []
-        size, rate, phase = rng.uniform(1, 2), rng.uniform(3, 6), rng.uniform(0, 6)
+        size, rate, phase = rng.uniform(0.3, 0.8), rng.uniform(3, 6), rng.uniform(0, 6)
         for _ in range(3000):
             data.qfrc_applied[0] = size * np.sin(rate * data.time + phase)
             rows.append((data.time, data.qpos[0], data.qfrc_applied[0]))
@@ -160,7 +160,7 @@ def test_a_scene_gets_the_masses_gravity_and_centre_of_mass_asked_for(tmp_path, 
         data, M = mujoco.MjData(model), np.zeros((1, 1))
         data.qpos[0] = q
         mujoco.mj_forward(model, data)
-        mujoco.mj_fullM(model, M, data.qM)
+        mujoco.mj_fullM(model, data, M)
         return float(M[0, 0]), float(data.qfrc_gravcomp[0] - data.qfrc_bias[0])
 
     for q in rng.uniform(-3, 3, 5):

@@ -29,8 +29,10 @@ WORTH = 40.0
 NEXT = 25.0
 """Loss that a number must spare to be free beside the others."""
 ALIKE = 9.0
-"""Gain in loss up to which data cannot tell one number from another."""
-CALM, PART = 0.05, 0.01
+"""Gain in loss up to which data cannot tell one number from another, nor from an effect."""
+MOST = 0.5
+"""Part of the loss that all numbers together may leave for a closer look."""
+CALM, PART = 0.05, 0.02
 """What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
 CLEARLY = 3.0
 """How many of its errors, by the data alone, a number is off by at the least."""
@@ -80,7 +82,8 @@ class Calibration:
 
     def beats(self, begun: Asked, guesses: Sequence[Guess]) -> bool:
         """Whether no effect explains as much."""
-        return self.loss < min((g.fit.loss + g.cost for g in guesses), default=begun.fit.loss)
+        least = min((g.fit.loss + g.cost for g in guesses), default=begun.fit.loss)
+        return self.loss < least + ALIKE
 
     def corrections(self, measured: Measured) -> tuple[Correction, ...]:
         """What is off, for the user.
@@ -89,9 +92,11 @@ class Calibration:
             measured: the joint as it was given.
         """
         values = self.numbers.values(self.fit.x).items()
+        rows = zip(values, self.errors, self.others, self.numbers.little(self.fit.x), strict=True)
         return tuple(
             told(measured, name, value, float(error), others)
-            for (name, value), error, others in zip(values, self.errors, self.others, strict=True)
+            for (name, value), error, others, little in rows
+            if not little
         )
 
 
@@ -107,6 +112,8 @@ def calibrated(measured: Measured, begun: Asked) -> Calibration | None:
         return None
     with threadpool_limits(1, BLAS):
         found = _calibrated(begun, every)
+        if found and all(found.numbers.little(found.fit.x)):
+            return None
         return _longer(measured, found) if found and found.alone else found
 
 
@@ -129,7 +136,7 @@ def _longer(measured: Measured, found: Calibration) -> Calibration:
 def _calibrated(begun: Asked, every: Numbers) -> Calibration | None:
     found = _Search(begun, every)
     whole, first = found.fitted(every.names), found.fitted(()).loss
-    if first - whole.loss < WORTH:
+    if first - whole.loss < WORTH or whole.loss > MOST * first:
         return None
     names, best = every.names, whole
     while names:
@@ -209,7 +216,7 @@ def _concluded(
     samples = max(judge.samples, 1.0)
     left, before = excess(fit.loss, samples), excess(begun.fit.loss, samples)
     alone = left < max(CALM, PART * before) and not any(
-        one.fit.loss + one.cost < loss for one in _equivalent(begun)
+        one.fit.loss + one.cost < loss - ALIKE for one in _equivalent(begun)
     )
     others = []
     for name in names:

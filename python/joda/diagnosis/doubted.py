@@ -49,6 +49,15 @@ FAR = 20.0
 STEPS = {"factor": 0.01, "time_delay": 2e-4, "other": 0.05}
 """Of differences: of a logarithm, of a delay (s), of others in what they usually are."""
 
+LEAST, TENTH = {"factor": 0.02, "time_delay": 1e-3}, 0.1
+"""By how much a logarithm or a delay (s) must be off to be worth a word; others by this part of
+what they usually are."""
+
+
+def _kind(name: Doubted) -> str:
+    """What it is in tables of bounds."""
+    return "factor" if name in FACTORS else name
+
 
 class Seen:
     """A joint as its measurement sees it: stepped under the true force, told as it is logged."""
@@ -100,7 +109,7 @@ class Numbers:
         doubt = np.array(self.doubts)
         most, step = [], []
         for name, width in zip(self.names, self.doubts, strict=True):
-            kind = "factor" if name in FACTORS else name
+            kind = _kind(name)
             most.append(MOST.get(kind, FAR * width))
             step.append(STEPS.get(kind, STEPS["other"] * width))
         high = np.array(most)
@@ -122,6 +131,12 @@ class Numbers:
         """Factors, and the other numbers in their units."""
         own = zip(self.names, map(float, x[self.base.count :]), strict=True)
         return {name: float(np.exp(v)) if name in FACTORS else v for name, v in own}
+
+    def little(self, x: Array) -> list[bool]:
+        """Which of them are off by too little to be worth a word."""
+        own = zip(self.names, self.doubts, x[self.base.count :], strict=True)
+        least = (LEAST.get(_kind(name), TENTH * width) - abs(value) for name, width, value in own)
+        return [float(left) > 0 for left in least]
 
     def body(self, single: Single, x: Array) -> Single:
         """The joint with the numbers of its body."""
