@@ -43,8 +43,11 @@ BETWEEN = 0.04
 LEVEL, FIRST = 1e5, 8
 """Mean square residual from which a window counts as its logarithm in the first iterations of some
 fits, which then go where all windows are better, and how many these are."""
+HEAVIER = "added_inertia"
+"""An effect that without gravity is a force of another scale but for what else resists: it is named
+where it is any likelier."""
 EQUIVALENT = (
-    *("added_inertia", "gravity_offset"),
+    *(HEAVIER, "gravity_offset"),
     *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
 )
 """Effects that may be the same as one of the numbers."""
@@ -216,7 +219,8 @@ def _concluded(
     samples = max(judge.samples, 1.0)
     left, before = excess(fit.loss, samples), excess(begun.fit.loss, samples)
     alone = left < max(CALM, PART * before) and not any(
-        one.fit.loss + one.cost < loss - ALIKE for one in _equivalent(begun)
+        one.fit.loss + one.cost < loss - ALIKE * (one.hypothesis.effect != HEAVIER)
+        for one in _equivalent(begun)
     )
     others = []
     for name in names:
@@ -229,6 +233,8 @@ def _concluded(
             tried = found.near(instead, (every.names, whole))
             if tried.loss < rough.loss + ALIKE:
                 swapped.append((other, every.only(instead).values(tried.x)[other]))
+        if name == "force_scale" and "mass" not in every.names:  # then all but friction is as well
+            swapped.append(("mass", 1 / own.values(fit.x)["force_scale"]))
         others.append(tuple(swapped))
     alike = {name for one in others for name, _ in one}
     return Calibration(own, fit, _errors(found, own, fit, alike), loss, alone, tuple(others))
