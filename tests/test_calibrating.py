@@ -181,3 +181,19 @@ def test_trust_is_an_option_of_what_finds_and_mends(tmp_path, rng):
         joda.diagnose(tmp_path / "arm.xml", "arm", [run], trust={"ghost": 1.0})
     with pytest.raises(JodaError, match="no number 'ghost'"):
         joda.improve(tmp_path / "arm.xml", "arm", [run], tmp_path / "new.xml", trust={"ghost": 1.0})
+
+
+@pytest.mark.long
+def test_improve_writes_what_is_wrong_and_compare_reads_it(tmp_path, rng):
+    runs = logged(tmp_path, rng, offset=0.1, delay=0.02, zero=0.08)
+    (tmp_path / "arm.xml").write_text(arm(1 / 1.4))
+    *learnt, unseen = runs
+    new = tmp_path / "new.xml"
+    done = joda.improve(tmp_path / "arm.xml", "arm", learnt, new)
+    assert done.corrections == tmp_path / "new.corrections.json"
+    assert not any(step.effect for step in done.steps)
+    heavier = mujoco.MjModel.from_xml_path(str(new)).body_mass[1]
+    assert heavier == pytest.approx(0.5, rel=0.03)
+    before = joda.compare(tmp_path / "arm.xml", "arm", [unseen]).rmse_window
+    after = joda.compare(new, "arm", [unseen], corrections=done.corrections).rmse_window
+    assert after < 2 * SIGMA < 0.2 * before
