@@ -137,7 +137,7 @@ def without_its_own(profile):
 
 def test_a_number_that_need_not_vanish_stays(rubbing, monkeypatch):
     start = without_its_own(rubbing.profile)
-    monkeypatch.setattr(mending, "_starts", lambda *_: [start])
+    monkeypatch.setattr(mending, "starts", lambda *_: [start])
     mended = mend(*parted(rubbing), ADDED)
     assert mended.effect == ADDED, mended.reason
     own, added = (max(part.y) for part in mended.profile.channels.friction.components)

@@ -51,7 +51,7 @@ class Joint:
         monkeypatch.setattr(improving, "_with", lambda parts, profile: (profile, None))
         monkeypatch.setattr(improving, "error", lambda held: Error(1.0, 1.0))
 
-    def diagnosed(self, without):
+    def diagnosed(self, without, calibrate):
         """Unexplained as a whole; of what was taken out that it is that; else adequate."""
         if isinstance(without, str):
             self.asked.append(without)
@@ -72,12 +72,13 @@ def finding(effect):
 
 
 def said(verdict, *effects):
+    effects = [*map(finding, effects)]
     told = SimpleNamespace(
-        verdict=verdict, effects=[*map(finding, effects)], summary="The end.", doubt=None
+        verdict=verdict, effects=effects, corrections=(), summary="The end.", doubt=None
     )
     puzzling = verdict == "unexplained"
     return SimpleNamespace(
-        diagnosis=told, candidates=told.effects, puzzling=puzzling, corrected=None
+        diagnosis=told, candidates=effects, puzzling=puzzling, corrected=None, calibration=None
     )
 
 

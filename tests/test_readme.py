@@ -55,7 +55,14 @@ def test_every_command_has_an_example():
         assert all(line.startswith(f"joda {name}") for line in lines)
 
 
-@pytest.mark.parametrize("command", [line for line in COMMANDS if line.split()[1] != "studio"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(line, marks=[pytest.mark.long] * ("--alien" in line))
+        for line in COMMANDS
+        if line.split()[1] != "studio"
+    ],
+)
 def test_command(command, folder):
     result = shell(command, folder)
     assert result.returncode == 0, result.stderr

@@ -119,7 +119,8 @@ def test_compare_replays_with_what_is_wrong_set_right(tmp_path, rng):
     runs = sorted(tmp_path.glob("run*.csv"))
     as_logged = joda.compare(model, "arm", runs)
     right = joda.compare(model, "arm", runs, corrections=file)
-    assert right.rmse_window < 3 * SIGMA < 0.1 * as_logged.rmse_window
+    assert right.rmse < 1.1 * SIGMA  # windows begin with a measured speed, which is noisier
+    assert as_logged.rmse_window > 30 * SIGMA
     assert read_corrections(file) == {"arm": wrong}
     schema = joda.schema("corrections")
     assert set(json.loads(file.read_text())) <= set(schema["properties"])
@@ -145,11 +146,12 @@ def test_a_file_that_is_none_is_named(tmp_path, rng, text, said):
 
 
 def test_a_scene_gets_the_masses_gravity_and_centre_of_mass_asked_for(tmp_path, rng):
-    own = Heavier(*map(float, rng.uniform(0.4, 1.6, 2)), float(rng.uniform(-0.3, 0.3)))
+    gravity, inertia = sorted(map(float, rng.uniform(0.4, 1.6, 2)))
+    own = Heavier(inertia, gravity, float(rng.uniform(-0.3, 0.3)))
     (tmp_path / "arm.xml").write_text(PENDULUM)
     before = mujoco.MjModel.from_xml_string(PENDULUM)
     bare = Profile(joint=describe_joint(before, 0))
-    content, notes = attached(tmp_path / "arm.xml", bare, tmp_path / "new.xml", heavier=own)
+    content, notes, _ = attached(tmp_path / "arm.xml", bare, tmp_path / "new.xml", heavier=own)
     (tmp_path / "new.xml").write_bytes(content)
     after = mujoco.MjModel.from_xml_path(str(tmp_path / "new.xml"))
     np.testing.assert_allclose(after.body_mass, own.inertia * before.body_mass, rtol=1e-6)
@@ -168,6 +170,16 @@ def test_a_scene_gets_the_masses_gravity_and_centre_of_mass_asked_for(tmp_path, 
         turned = at(before, q + own.turned)
         assert new[0] == pytest.approx(own.inertia * old[0], rel=1e-5)
         assert new[1] == pytest.approx(own.gravity * turned[1], rel=1e-4, abs=1e-5)
+
+
+def test_that_gravity_pulls_more_than_masses_make_it_is_said_to_be_left_out(tmp_path):
+    (tmp_path / "arm.xml").write_text(PENDULUM)
+    before = mujoco.MjModel.from_xml_string(PENDULUM)
+    bare = Profile(joint=describe_joint(before, 0))
+    made = attached(tmp_path / "arm.xml", bare, tmp_path / "new.xml", heavier=Heavier(1.1, 1.4))
+    (said,) = (note for note in made.notes if "masses and inertias 1.1 times" in note)
+    assert "gravity pulls 1.4 times as much MJCF cannot say, and is left out" in said
+    assert not made.model.body_gravcomp.any()
 
 
 def test_bodies_that_are_not_written_there_are_named(tmp_path):

@@ -24,9 +24,10 @@ FINEST = 2e-5
 
 
 def noise(runs: Sequence[Run], span: float) -> float:
-    """Of the position of runs of a joint whose range is that wide, rad or m."""
+    """Of the position of runs of a joint whose range is that wide, rad or m; where there are none,
+    the least that is believed."""
     usual = [smoothing.noise(run.time, run.position) for run in runs]
-    return max(float(np.median(usual)), FINEST * span)
+    return max(float(np.median(usual or 0.0)), FINEST * span)
 
 
 class Engine(Protocol):

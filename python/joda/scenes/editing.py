@@ -29,7 +29,7 @@ from joda.scenes.scene import (
     prefix,
     profiles_of,
 )
-from joda.scenes.weights import Heavier, gravcomp, inertial, moved_bodies
+from joda.scenes.weights import LEAST, Heavier, gravcomp, inertial, moved_bodies
 
 DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
 """Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
@@ -174,8 +174,14 @@ class EditedScene:
                 element.set(gravcomp=carried)
         self.heavier = True
         told = f"moves masses and inertias {heavier.inertia:.3g} times as large as before"
-        lifted = f", of whose weight gravcomp takes {heavier.lifted:.3g}"
-        self._note(joint, told + (lifted if abs(heavier.lifted) > 1e-9 else ""))
+        if heavier.lifted > LEAST:
+            told += f", of whose weight gravcomp takes {heavier.lifted:.3g}"
+        elif heavier.lifted < -LEAST:
+            told += (
+                f"; that gravity pulls {heavier.gravity:.3g} times as much MJCF cannot say, and is "
+                "left out"
+            )
+        self._note(joint, told)
 
     def finish(self, folder: Path) -> bytes:
         """The text with the plugin's instances in it, for a file that will lie in `folder`."""

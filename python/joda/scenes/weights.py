@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+LEAST = 1e-9
+"""Part of a weight that is worth carrying."""
+
 
 @dataclass(frozen=True)
 class Heavier:
@@ -22,7 +25,8 @@ class Heavier:
 
     @property
     def lifted(self) -> float:
-        """Part of the new masses' weight that something carries: MuJoCo's `gravcomp`."""
+        """Part of the new masses' weight that something carries: MuJoCo's `gravcomp`; less than 0
+        where gravity pulls more than the new masses make it, which MJCF cannot say."""
         return 1 - self.gravity / self.inertia
 
 
@@ -46,18 +50,21 @@ def inertial(model: mujoco.MjModel, joint: int, body: int, heavier: Heavier) -> 
     R, own, anchor = turn.reshape(3, 3), data.xmat[body].reshape(3, 3), data.xanchor[joint]
     place = anchor + R @ (data.xipos[body] - anchor)
     mujoco.mju_mat2Quat(quat, (own.T @ R @ data.ximat[body].reshape(3, 3)).ravel())
+    moments = heavier.inertia * model.body_inertia[body]
+    most = int(np.argmax(moments))  # MuJoCo takes no more than the sum of the others
+    moments[most] = min(moments[most], moments.sum() - moments[most])
     values = {
         "pos": own.T @ (place - data.xpos[body]),
         "quat": quat,
         "mass": [heavier.inertia * model.body_mass[body]],
-        "diaginertia": heavier.inertia * model.body_inertia[body],
+        "diaginertia": moments,
     }
-    return {name: " ".join(f"{x:.9g}" for x in np.ravel(value)) for name, value in values.items()}
+    return {name: " ".join(f"{x:.17g}" for x in np.ravel(value)) for name, value in values.items()}
 
 
 def gravcomp(model: mujoco.MjModel, body: int, heavier: Heavier) -> str | None:
     """A body's new `gravcomp`; None where it stays as it is."""
-    if abs(heavier.lifted) < 1e-9:
+    if heavier.lifted < LEAST:
         return None
     carried = 1 - (1 - heavier.lifted) * (1 - float(model.body_gravcomp[body]))
     return f"{carried:.9g}"
