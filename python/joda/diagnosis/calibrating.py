@@ -36,6 +36,9 @@ CALM, PART = 0.05, 0.02
 """What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
 CLEARLY = 3.0
 """How many of its errors, by the data alone, a number is off by at the least."""
+SURPRISE = 4.0
+"""How many of its widths a number may be off: a zero that is far off looks like a force beside a
+spring."""
 LONGEST = 1.5
 """Length of the windows in which numbers are fitted at last, s."""
 BETWEEN = 0.04
@@ -151,6 +154,12 @@ def _calibrated(begun: Asked, every: Numbers) -> Calibration | None:
         best, names = fit, fewer
     if first - best.loss < WORTH + found.price * len(names):
         return None
+    own = every.only(names)
+    widths = np.abs(best.x[begun.base.count :]) / own.doubts
+    if np.any(widths > SURPRISE):  # it stands in for what is missing
+        surprising = {name for name, off in zip(names, widths, strict=True) if off > SURPRISE}
+        rest = tuple(name for name in every.names if name not in surprising)
+        return _calibrated(begun, every.only(rest)) if rest else None
     return _concluded(found, names, best, whole)
 
 
