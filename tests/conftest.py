@@ -1,5 +1,5 @@
 """Sweeps: of many cases of one test, and of the tests that take long, some are drawn anew in every
-session; `--whole` runs all."""
+session; `--whole` runs all. And the random numbers of tests that ask for them (`rng`)."""
 
 import os
 import random
@@ -8,12 +8,23 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
+import pytest
+
 sys.path[:0] = [str(Path(__file__).parent / name) for name in ("helpers", "benchmarks")]
 # tests run side by side: threads within matrix products would only be in each other's way
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SEED = "JODA_SWEEPS"
 LONG, FEW = 0.08, 10
 """Part of the long tests that a session of more than so many files draws."""
+
+
+@pytest.fixture
+def rng():
+    import numpy as np  # after the threads are told
+
+    seed = int(np.random.default_rng().integers(2**31))
+    print(seed)  # shown where a test fails
+    return np.random.default_rng(seed)
 
 
 def pytest_addoption(parser):

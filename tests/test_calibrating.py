@@ -28,13 +28,6 @@ ARM = """<mujoco>
 SIGMA = 5e-4
 
 
-@pytest.fixture
-def rng():
-    seed = int(np.random.default_rng().integers(2**31))
-    print(seed)  # shown where a test fails
-    return np.random.default_rng(seed)
-
-
 def arm(mass=1.0):
     """The arm, all of whose mass and inertia is so many times as large."""
     return ARM.format(mass=0.5 * mass, own=0.02 * mass)

@@ -27,13 +27,6 @@ UNITS = {"damping": "N·m·s/rad", "frictionloss": "N·m", "stiffness": "N·m/ra
 SIGMA = 5e-4
 
 
-@pytest.fixture
-def rng():
-    seed = int(np.random.default_rng().integers(2**31))
-    print(seed)  # shown where a test fails
-    return np.random.default_rng(seed)
-
-
 def text_of(numbers):
     return DOOR.format(numbers=" ".join(f'{name}="{x}"' for name, x in numbers.items()))
 

@@ -20,13 +20,6 @@ from joda.measured.whiteness import drift, drifts, free_parts, long_run_variance
 SAMPLES = 600
 
 
-@pytest.fixture
-def rng():
-    seed = int(np.random.default_rng().integers(2**31))
-    print(seed)  # shown where a test fails
-    return np.random.default_rng(seed)
-
-
 def compared(folder, count):
     return compare(folder / "model.xml", "lid", [folder / f"run{k}.csv" for k in range(count)])
 

@@ -21,14 +21,6 @@ from joda.effects import GravityOffset, StribeckFriction
 from joda.measured.reading import read_measured
 from joda.profile import Joint, Profile
 
-
-@pytest.fixture
-def rng():
-    seed = int(np.random.default_rng().integers(2**31))
-    print(seed)  # shown where a test fails
-    return np.random.default_rng(seed)
-
-
 LID = Profile(joint=Joint(name="lid", type="hinge", range=(0.0, 2.0), unit="rad"))
 
 

@@ -31,11 +31,6 @@ STEEP = LearnedForce(velocities=(-1.0, -0.005, 0.0, 0.005, 1.0), y=((-3.0, -3.0,
 NONE = {"velocities": (-1.0, 0.0, 1.0), "y": ((0.0, 0.0, 0.0),)}
 
 
-@pytest.fixture
-def rng():
-    return np.random.default_rng()
-
-
 # --- the table
 
 

@@ -36,13 +36,6 @@ PENDULUM = """<mujoco>
 SIGMA = 1e-4
 
 
-@pytest.fixture
-def rng():
-    seed = int(np.random.default_rng().integers(2**31))
-    print(seed)  # shown where a test fails
-    return np.random.default_rng(seed)
-
-
 def drawn(rng):
     return Sensing(
         force_scale=float(rng.uniform(0.5, 1.6)),

@@ -19,13 +19,6 @@ def moving(run):
     return np.abs(run.position - run.position[-100:].mean()) > 5 * SIGMA
 
 
-@pytest.fixture
-def rng():
-    seed = int(np.random.default_rng().integers(2**31))
-    print(seed)  # shown where a test fails
-    return np.random.default_rng(seed)
-
-
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_of_few_runs_some_of_the_motion_is_held_out(tmp_path, rng, count):
     measured = thrown(tmp_path, rng, count, drag=0.02)

@@ -9,7 +9,7 @@ from gauging import FRICTION, SCENE
 from scenes import write as write_scene
 from test_compare import door, runs_of, scene_of
 
-from joda import add, compare, diagnose
+from joda import JodaError, add, compare, diagnose
 from joda.commands.hidden_effect import _judged
 from joda.diagnosis import verdict
 from joda.diagnosis.asking import asked
@@ -177,11 +177,13 @@ def test_a_recorded_force_that_is_off_by_a_factor_is_no_missing_inertia(tmp_path
         run = read_run(path)
         write_run(path, replace(run, force=1.6 * run.force))
     told = diagnose(model, "joint", runs)
-    assert told.doubt and "by one factor, about 1.6" in told.doubt
-    assert told.summary.startswith("Best guess")
+    assert (told.verdict, told.effects) == ("adequate", ())
+    (scale,) = (one for one in told.corrections if one.parameter == "force_scale")
+    assert scale.factor == pytest.approx(1 / 1.6, abs=4 * scale.error)
+    assert scale.error < 0.05 and "As likely by these data: the mass is 1.6" in scale.explanation
     (tmp_path / "said.json").write_text(told.to_json())
-    refused = add(model, "joint", tmp_path / "said.json", runs, tmp_path / "new.xml")
-    assert not refused.added and told.doubt in refused.reason
+    with pytest.raises(JodaError, match="names no effect to add"):
+        add(model, "joint", tmp_path / "said.json", runs, tmp_path / "new.xml")
     assert not (tmp_path / "new.xml").exists()
 
 

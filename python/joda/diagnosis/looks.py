@@ -51,24 +51,25 @@ class Looked:
     free: FreeRuns | None = None
 
 
-def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
+def looked(measured: Measured, begun: Asked, exclude: Collection[str], told: Told) -> Looked:
     """Ranks what may be missing; once more in longer windows, where these leave a question, and the
     best in longer and longer ones, while none is sure.
 
     Args:
         measured: the joint and its runs or curves.
+        begun: the model fitted to them, in usual windows.
         exclude: effects that are not considered.
         told: how much is done, of how much, and what.
     """
     needs = Needs(measured)
 
-    def ranked(begun: Asked) -> Ranking:
+    def ranked(model: Asked) -> Ranking:
         """What may be missing and needs no more force than the measurements can."""
         return rank(
-            begun, exclude, told, possible=lambda *one: not needs.exceeded(needs.exerted(*one))
+            model, exclude, told, possible=lambda *one: not needs.exceeded(needs.exerted(*one))
         )
 
-    ranking = ranked(asked(measured))
+    ranking = ranked(begun)
     strictness = LOOSELY if moved_one_way(measured) else 1.0
     found = [evidence(ranking)]
     weighed = decide(found[0], strictness)
@@ -77,9 +78,9 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
     longer = _longer(measured, ranking.asked)
     if weighed.verdict != "missing_effect":
         drifts = bool(free and free.drifting)
-        begun = _shown(longer, first, drifts) if measured.runs else _noisier(measured, first)
-        if begun is not None:
-            again = ranked(begun)
+        other = _shown(longer, first, drifts) if measured.runs else _noisier(measured, first)
+        if other is not None:
+            again = ranked(other)
             found.append(evidence(again))
             if measured.runs:
                 anew = decide(found[-1], SETTINGS.strictly, wholly=True)
@@ -87,8 +88,8 @@ def looked(measured: Measured, exclude: Collection[str], told: Told) -> Looked:
                 anew = replace(decide(found[-1], strictness), verdict="unexplained")
             if second_counts(weighed, anew):
                 ranking, weighed = again, anew
-    while _unsure(ranking, weighed) and (begun := next(longer, None)):
-        closer = narrowed(begun, ranking, told)
+    while _unsure(ranking, weighed) and (other := next(longer, None)):
+        closer = narrowed(other, ranking, told)
         found.append(evidence(closer))
         anew = decide(found[-1], strictness)
         if not closer_counts(weighed, anew):

@@ -157,18 +157,15 @@ def diagnosed(
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
-    if not calibrate:
-        looks = looked(measured, exclude, told)
-        return replace(_concluded(measured, looks), looks=looks.evidence)
     begun = asked(measured)
-    found = calibrated(measured, begun)
+    found = calibrated(measured, begun) if calibrate else None
     right = found.righted.of(measured) if found else measured
-    looks = looked(right if found and found.alone else measured, exclude, told)
-    if found and not found.alone:
-        if not found.beats(begun, looks.first[0].guesses):
+    if found is None or not found.alone:
+        looks = looked(measured, begun, exclude, told)
+        if found and not found.beats(begun, looks.first[0].guesses):
             found, right = None, measured
-        else:
-            looks = looked(right, exclude, told)
+    if found:
+        looks = looked(right, asked(right), exclude, told)
     out = replace(_concluded(right, looks), looks=looks.evidence)
     return _with_numbers(out, found, measured) if found else out
 

@@ -82,7 +82,7 @@ def account(
         known: the effect that a diagnosis found likeliest.
     """
     learner, law = Learner(train), learned.law
-    x, draws = learned.fit.x[learner.base.count :], drawn(learner, learned)
+    x, draws = learner.numbers(learned), drawn(learner, learned)
     remembers = law.terms.memory != "none"
     gain, time = of_memory(law, x, draws) if remembers else (None, None)
     return Account(
@@ -92,9 +92,9 @@ def account(
         memory=law.terms.memory,
         gain=gain,
         time=time,
-        formula=formula(train, held, learned, unseen),
+        formula=formula(learner, held, learned, draws, unseen),
         nearest=nearest(train, held, known, unseen) if known else None,
-        next_experiment=narrowing(train, learned),
+        next_experiment=narrowing(learner, learned),
         unit=train.profile.joint.unit,
         force_unit=train.profile.joint.force_unit,
     )

@@ -52,7 +52,6 @@ class Learning:
     def __init__(self, train: Measured, held: Measured, told: Callable[[str], None]) -> None:
         """Args: the joint and runs to fit; the same with runs held out; told what is done."""
         self.learner, self.unseen, self.told = Learner(train), Likelihood(held), told
-        self.own = self.unseen.loss(train.profile)
 
     def tried(self, terms: Terms, near: Tried | None = None) -> Tried:
         """A law with these terms, fitted; from one that only lacks the memory, if that is near."""

@@ -8,7 +8,6 @@ from joda.diagnosis.judge import Judge
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import Law
 from joda.diagnosis.probes import Model, means_of, menu, recorded
-from joda.measured.reading import Measured
 
 Array = NDArray[np.float64]
 
@@ -16,17 +15,17 @@ NARROWER = 0.9
 """Part of the band's width to which a motion worth making brings it."""
 
 
-def narrowing(train: Measured, learned: Learned) -> str | None:
+def narrowing(learner: Learner, learned: Learned) -> str | None:
     """What to do next with the joint, a sentence; None if no motion of the menu tells much more, or
     nothing moved in what there is.
 
     Args:
-        train: the joint and runs that were fitted.
+        learner: of the joint and the runs that were fitted.
         learned: the law; it counts as true.
     """
+    train, law = learner.train, learned.law
     if not train.runs:
         return None
-    learner, law = Learner(train), learned.law
     unknowns, fit = learner.unknowns(law), learned.fit
     means = means_of(train, learned.judge.windows, learned.judge.windows.h)
 

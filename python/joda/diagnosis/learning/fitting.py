@@ -96,6 +96,10 @@ class Learner:
         )
         return replace(both, constraints=every)
 
+    def numbers(self, learned: Learned) -> Array:
+        """The law's own numbers, without the model's factors."""
+        return learned.fit.x[self.base.count :]
+
     def written(self, law: Law, x: Array) -> Profile:
         """The whole profile with a law."""
         n, bounds = self.base.count, self.base.unknowns

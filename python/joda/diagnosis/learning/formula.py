@@ -136,23 +136,25 @@ class Terse(Law):
         return np.stack(columns, axis=1) * self._scales(what) if columns else np.zeros((len(at), 0))
 
 
-def formula(train: Measured, held: Measured, learned: Learned, unseen: float) -> Formula | None:
+def formula(
+    learner: Learner, held: Measured, learned: Learned, draws: Array, unseen: float
+) -> Formula | None:
     """A formula for a law; None if none does as well or is stable, or resistances differ along the
     way, or it only remembers.
 
     Args:
-        train: the joint and runs to fit.
-        held: the same with runs held out.
+        learner: of the joint and the runs to fit.
+        held: the joint with runs held out.
         learned: the law.
-        unseen: its error on these, in windows.
+        draws: its ensemble, see `drawn`.
+        unseen: its error on what was held out, in windows.
     """
-    law, learner = learned.law, Learner(train)
+    law = learned.law
     if law.terms.along or not (law.terms.position or law.terms.speed):
         return None
-    x, draws = learned.fit.x[learner.base.count :], drawn(learner, learned)
-    curves, others = _curves(law, x), [_curves(law, one) for one in draws]
+    curves, others = _curves(law, learner.numbers(learned)), [_curves(law, one) for one in draws]
     errors = [np.std(each, axis=0) for each in zip(*others, strict=True)]
-    lo = train.profile.joint.range[0]
+    lo = learner.train.profile.joint.range[0]
     for made_of in _candidates(law, lo, curves, errors):
         if not _stable(law, lo, made_of, others, errors):
             continue
@@ -160,14 +162,13 @@ def formula(train: Measured, held: Measured, learned: Learned, unseen: float) ->
         for found in learner.learned(terse):
             ratio = error(held, found.profile).window / unseen
             if ratio <= AS_GOOD:
-                return Formula(_told(learner, found, terse, train), ratio)
+                return Formula(_told(learner, found, terse), ratio)
     return None
 
 
-def _told(learner: Learner, found: Learned, terse: Terse, train: Measured) -> tuple[Told, ...]:
+def _told(learner: Learner, found: Learned, terse: Terse) -> tuple[Told, ...]:
     """The terms with their factors, and the errors of these over an ensemble."""
-    joint, n = train.profile.joint, learner.base.count
-    factors = terse.factors(found.fit.x[n:])
+    joint, factors = learner.train.profile.joint, terse.factors(learner.numbers(found))
     errors = np.std([terse.factors(one) for one in drawn(learner, found)], axis=0)
     return tuple(
         Told(one.text, factor, float(sd), joint.force_unit + one.unit.format(x=joint.unit))
