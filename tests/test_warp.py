@@ -279,7 +279,7 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(joda.JodaError, match=r"mask has the shape \(3,\)"):
         fields.reset([True] * 3)
     elsewhere = SimpleNamespace(nworld=2, qpos=SimpleNamespace(device="cuda:0"))
-    fields = joda.warp.put_fields(model, STEEL, 2)
+    fields = joda.warp.put_fields(model, STEEL, 2, device="cpu")
     with pytest.raises(joda.JodaError, match="the data are on cuda:0 and the fields on cpu"):
         joda.warp.attach(m, elsewhere, fields)
     with pytest.raises(joda.JodaError, match="at least one world"):

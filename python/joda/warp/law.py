@@ -12,9 +12,18 @@ import mujoco
 import warp as wp
 
 from joda.warp import laws, learned
-from joda.warp.curves import Curves, descent, value
+from joda.warp.curves import Curves, Values, descent, values
 from joda.warp.numbers import Curve, Number, Place, Row, State
 
+wp.set_module_options({"max_unroll": max(len(Number), len(State))})
+Numbers = wp.types.vector(length=len(Number), dtype=float)
+"""All numbers of a joint in a world, by `Number`."""
+Memory = wp.types.vector(length=len(State), dtype=float)
+"""What a joint in a world remembers, by `State`."""
+
+BLOCK = 64
+"""Threads of a block: the kernel keeps so much in registers that larger ones leave
+multiprocessors without work."""
 NO_SPRING = wp.constant(int(mujoco.mjtDisableBit.mjDSBL_SPRING))
 NO_DAMPER = wp.constant(int(mujoco.mjtDisableBit.mjDSBL_DAMPER))
 NO_FRICTION = wp.constant(int(mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS))
@@ -48,13 +57,15 @@ class Profiles:
 
 
 @wp.struct
-class Joint:
-    """A joint in a world, in the step being computed."""
+class Resisting:
+    """Of a joint in a step: what resists it, at any speed.
 
-    variant: int
-    world: int
-    index: int
-    s: float
+    Attributes:
+        damping, friction: at any speed.
+        load: that friction depends on.
+        damps, rubs: 0 where the model switches damping or friction off.
+    """
+
     damping: float
     friction: float
     load: float
@@ -74,59 +85,50 @@ def find_row(
 ) -> int:
     """The row of that kind and object among [first, last), -1: none. They come in any order."""
     end = wp.min(last, kinds.shape[0])
-    if expected >= first and expected < end and kinds[expected] == kind and ids[expected] == id:
-        return expected
+    if expected >= first and expected < end:
+        expected_kind, expected_id = kinds[expected], ids[expected]
+        if expected_kind == kind and expected_id == id:
+            return expected
     for row in range(first, end):
-        if kinds[row] == kind and ids[row] == id:
+        if ids[row] == id and kinds[row] == kind:
             return row
     return -1
 
 
 @wp.func
-def along(profiles: Profiles, joint: Joint, up: int, number: int, v: float) -> float:
+def along(curves: Values, up: int, v: float) -> float:
     """A curve of the direction of the motion, of two that follow each other; 0 at rest."""
     if wp.abs(v) < laws.STILL:
         return 0.0
-    curve = wp.where(v < 0.0, up + 1, up)
-    strength = profiles.numbers[number, joint.world, joint.index]
-    return strength * value(profiles.curves, joint.variant, joint.index, curve, joint.s)
+    return wp.where(v < 0.0, curves[up + 1], curves[up])
 
 
 @wp.func
-def resist(profiles: Profiles, joint: Joint, v: float) -> wp.vec3:
+def resist(n: Numbers, curves: Values, joint: Resisting, v: float) -> wp.vec3:
     """Damping, and friction in positive and in negative motion, of the joint that moves at v."""
     drag = joint.damping
     if joint.damps != 0:
-        extra = along(
-            profiles,
-            joint,
-            int(Curve.DAMPING_UP),
-            int(Number.DIRECTION_DEPENDENT_DAMPING_STRENGTH),
-            v,
-        ) + wp.abs(v) * along(
-            profiles, joint, int(Curve.QUADRATIC_UP), int(Number.QUADRATIC_DAMPING_STRENGTH), v
+        directed = n[int(Number.DIRECTION_DEPENDENT_DAMPING_STRENGTH)]
+        quadratic = n[int(Number.QUADRATIC_DAMPING_STRENGTH)]
+        extra = directed * along(curves, int(Curve.DAMPING_UP), v) + wp.abs(v) * (
+            quadratic * along(curves, int(Curve.QUADRATIC_UP), v)
         )
         drag += wp.max(0.0, extra)
     if joint.rubs == 0:
         return wp.vec3(drag, joint.friction, joint.friction)
-    w, j, k = joint.world, joint.index, joint.variant
-    n = profiles.numbers
-    excess = n[int(Number.STRIBECK_FRICTION_STRENGTH), w, j] * value(
-        profiles.curves, k, j, int(Curve.STRIBECK), joint.s
-    )
     both = (
         joint.friction
         + laws.stribeck(
-            excess,
-            n[int(Number.STRIBECK_FRICTION_VELOCITY), w, j],
-            n[int(Number.STRIBECK_FRICTION_EXPONENT), w, j],
+            n[int(Number.STRIBECK_FRICTION_STRENGTH)] * curves[int(Curve.STRIBECK)],
+            n[int(Number.STRIBECK_FRICTION_VELOCITY)],
+            n[int(Number.STRIBECK_FRICTION_EXPONENT)],
             v,
         )
-        + n[int(Number.LOAD_DEPENDENT_FRICTION_COEFFICIENT), w, j] * wp.abs(joint.load)
+        + n[int(Number.LOAD_DEPENDENT_FRICTION_COEFFICIENT)] * wp.abs(joint.load)
     )
-    strength = n[int(Number.ASYMMETRIC_FRICTION_STRENGTH), w, j]
-    up = strength * value(profiles.curves, k, j, int(Curve.ASYMMETRY_UP), joint.s)
-    down = strength * value(profiles.curves, k, j, int(Curve.ASYMMETRY_DOWN), joint.s)
+    strength = n[int(Number.ASYMMETRIC_FRICTION_STRENGTH)]
+    up = strength * curves[int(Curve.ASYMMETRY_UP)]
+    down = strength * curves[int(Curve.ASYMMETRY_DOWN)]
     return wp.vec3(drag, wp.max(0.0, both + up), wp.max(0.0, both + down))
 
 
@@ -140,85 +142,83 @@ def exerted(hinge: int, axis: wp.vec3, anchor: wp.vec3, force: wp.vec3, point: w
 
 @wp.func
 def implicit_stiffness(
-    profiles: Profiles, joint: Joint, field: bool, h: float, v: float, force: float, inertia: float
+    curves: Curves,
+    variant: int,
+    joint: int,
+    n: Numbers,
+    s: float,
+    field: bool,
+    h: float,
+    v: float,
+    force: float,
+    inertia: float,
 ) -> float:
     """The part of the springs that must act implicitly, N·m/rad: as in cpp/stiffness.h."""
-    w, j = joint.world, joint.index
-    n = profiles.numbers
-    per_range = 1.0 / (n[int(Number.RANGE_HI), w, j] - n[int(Number.RANGE_LO), w, j])
+    per_range = 1.0 / (n[int(Number.RANGE_HI)] - n[int(Number.RANGE_LO)])
     soft = laws.EXPLICIT_STIFFNESS * inertia / (h * h)
-    sine, cosine = n[int(Number.GRAVITY_OFFSET_SIN), w, j], n[int(Number.GRAVITY_OFFSET_COS), w, j]
+    sine, cosine = n[int(Number.GRAVITY_OFFSET_SIN)], n[int(Number.GRAVITY_OFFSET_COS)]
     gravity = wp.sqrt(sine * sine + cosine * cosine)
-    landing = joint.s + h * (v + h / inertia * force) * per_range
-    if (joint.s < 0.0 and landing < 0.0) or (joint.s > 1.0 and landing > 1.0):
+    landing = s + h * (v + h / inertia * force) * per_range
+    if (s < 0.0 and landing < 0.0) or (s > 1.0 and landing > 1.0):
         return wp.max(0.0, gravity - soft)
-    strength = n[int(Number.CONSERVATIVE_STRENGTH), w, j] * per_range
+    strength = n[int(Number.CONSERVATIVE_STRENGTH)] * per_range
     steepest = float(0.0)
-    curve = int(Curve.CONSERVATIVE)
     if field:
-        steepest = strength * profiles.curves.steepest[joint.variant, j, curve]
+        steepest = strength * curves.steepest[variant, joint]
     stiffness = wp.abs(force) * per_range / laws.STRIDE
     if steepest + gravity > soft:
         reach = h * (wp.abs(v) + h / inertia * wp.abs(force)) * per_range
-        near = strength * descent(
-            profiles.curves, joint.variant, j, curve, joint.s - reach, joint.s + reach
-        )
+        near = strength * descent(curves, variant, joint, s - reach, s + reach)
         stiffness = wp.max(stiffness, gravity + wp.min(near, steepest))
     return wp.max(0.0, stiffness - soft)
 
 
 @wp.func
-def force_of(profiles: Profiles, kind: int, w: int, j: int, forces: wp.array[float]) -> float:
-    """The force of a joint's row in the last step, 0 where there was none."""
-    row = profiles.rows[kind, w, j]
+def force_of(row: int, forces: wp.array[float]) -> float:
+    """The force of a row in the last step, 0 where there was none."""
     return wp.where(row >= 0, forces[wp.max(row, 0)], 0.0)
 
 
 @wp.func
-def remember(
-    profiles: Profiles,
-    w: int,
-    j: int,
+def recall(
+    before: Memory,
+    n: Numbers,
+    rows: wp.vec3i,
     t: float,
     h: float,
     v: float,
     forces: wp.array[float],
     constraint: float,
     actuator: float,
-):
-    """Takes from the last step what the joint remembers, if one was taken; forgets if reset."""
-    state = profiles.state
-    seen = state[int(State.TIME), w, j]
+) -> Memory:
+    """What the joint remembers of the last step, if one was taken; nothing if it was reset."""
+    seen = before[int(State.TIME)]
     if seen < 0.0 or t < seen:
-        state[int(State.FRICTION), w, j] = 0.0
-        state[int(State.UNKNOWN_LOAD), w, j] = 0.0
-        state[int(State.GAP), w, j] = 0.0
-        state[int(State.SPEED), w, j] = 0.0
-        state[int(State.REMEMBERED), w, j] = 0.0
-    elif t > seen:
-        psi = force_of(profiles, int(Row.FRICTION), w, j, forces)
-        damping = force_of(profiles, int(Row.DAMPING), w, j, forces)
-        limit = force_of(profiles, int(Row.LIMIT), w, j, forces)
-        own = psi + damping + state[int(State.STOP_SIDE), w, j] * limit
-        state[int(State.FRICTION), w, j] = psi + state[int(State.BESIDE_ROW), w, j]
-        state[int(State.UNKNOWN_LOAD), w, j] = constraint - own - actuator
-        gap = float(state[int(State.NEXT_GAP), w, j])
-        speed = float(state[int(State.NEXT_SPEED), w, j])
-        if profiles.numbers[int(Number.BACKLASH_LOAD), w, j] > 0.0:
-            play = profiles.numbers[int(Number.BACKLASH_PLAY), w, j]
-            after = laws.settle(play, h, state[int(State.NEXT_SIDE), w, j], gap, speed, v)
-            gap = after[0]
-            speed = after[1]
-        state[int(State.GAP), w, j] = gap
-        state[int(State.SPEED), w, j] = speed
-        state[int(State.REMEMBERED), w, j] = learned.recalled(
-            profiles.numbers[int(Number.LEARNED_FORCE_CHANGE), w, j],
-            profiles.numbers[int(Number.LEARNED_FORCE_TIME), w, j],
+        return Memory()
+    out = before
+    if t > seen:
+        psi = force_of(rows[int(Row.FRICTION)], forces)
+        damping = force_of(rows[int(Row.DAMPING)], forces)
+        limit = force_of(rows[int(Row.LIMIT)], forces)
+        own = psi + damping + before[int(State.STOP_SIDE)] * limit
+        out[int(State.FRICTION)] = psi + before[int(State.BESIDE_ROW)]
+        out[int(State.UNKNOWN_LOAD)] = constraint - own - actuator
+        gap, speed = before[int(State.NEXT_GAP)], before[int(State.NEXT_SPEED)]
+        out[int(State.GAP)] = gap
+        out[int(State.SPEED)] = speed
+        if n[int(Number.BACKLASH_LOAD)] > 0.0:
+            side = before[int(State.NEXT_SIDE)]
+            after = laws.settle(n[int(Number.BACKLASH_PLAY)], h, side, gap, speed, v)
+            out[int(State.GAP)] = after[0]
+            out[int(State.SPEED)] = after[1]
+        out[int(State.REMEMBERED)] = learned.recalled(
+            n[int(Number.LEARNED_FORCE_CHANGE)],
+            n[int(Number.LEARNED_FORCE_TIME)],
             h,
             v,
-            state[int(State.REMEMBERED), w, j],
+            before[int(State.REMEMBERED)],
         )
-    state[int(State.TIME), w, j] = t
+    return out
 
 
 @wp.kernel(enable_backward=False)
@@ -262,80 +262,87 @@ def act(
     efc_frictionloss: wp.array2d[float],
     qfrc_passive: wp.array2d[float],
 ):
-    """One joint in one world; dimensions (worlds, joints)."""
+    """One joint in one world; dimensions (worlds, joints).
+
+    All is read before anything is written, so that a device waits for memory as seldom as it can.
+    """
     w, j = wp.tid()
-    n = profiles.numbers
+    n = Numbers()
+    for number in range(wp.static(len(Number))):
+        n[number] = profiles.numbers[number, w, j]
+    before = Memory()
+    for number in range(wp.static(len(State))):
+        before[number] = profiles.state[number, w, j]
+    rows = wp.vec3i(profiles.rows[0, w, j], profiles.rows[1, w, j], profiles.rows[2, w, j])
     id, dof = profiles.places[j, int(Place.JOINT)], profiles.places[j, int(Place.DOF)]
-    h = timestep[w % timestep.shape[0]]
+    equality = profiles.places[j, int(Place.EQUALITY)]
+    equalities, ends, limited = ne[w], ne[w] + nf[w], nl[w]
+    t, h = time[w], timestep[w % timestep.shape[0]]
     q, v = qpos[w, profiles.places[j, int(Place.QPOS)]], qvel[w, dof]
     inertia = 1.0 / dof_invweight0[w % dof_invweight0.shape[0], dof]
+    limits = jnt_range[w % jnt_range.shape[0], id]
+    native = dof_frictionloss[w % dof_frictionloss.shape[0], dof]
     constraint, actuator = qfrc_constraint[w, dof], qfrc_actuator[w, dof]
-    remember(profiles, w, j, time[w], h, v, efc_force[w], constraint, actuator)
-    held = profiles.state[int(State.FRICTION), w, j]
-    gap, speed = profiles.state[int(State.GAP), w, j], profiles.state[int(State.SPEED), w, j]
+    applied = qfrc_applied[w, dof]
+    ahead = v + h * qacc_warmstart[w, dof]
+    memory = recall(before, n, rows, t, h, v, efc_force[w], constraint, actuator)
+    held, gap, speed = (
+        memory[int(State.FRICTION)],
+        memory[int(State.GAP)],
+        memory[int(State.SPEED)],
+    )
 
-    joint = Joint()
-    joint.world = w
-    joint.index = j
-    joint.variant = w % profiles.curves.first.shape[0]
-    lo, hi = n[int(Number.RANGE_LO), w, j], n[int(Number.RANGE_HI), w, j]
-    joint.s = (q - lo) / (hi - lo)
+    variant = w % profiles.curves.where.shape[0]
+    lo, hi = n[int(Number.RANGE_LO)], n[int(Number.RANGE_HI)]
+    s = (q - lo) / (hi - lo)
+    curves = values(profiles.curves, variant, j, s)
+    joint = Resisting()
     joint.damps = wp.where((disabled & NO_DAMPER) == 0, 1, 0)
     joint.rubs = wp.where((disabled & NO_FRICTION) == 0, 1, 0)
 
     kinds, ids = efc_type[w], efc_id[w]
-    ends = ne[w] + nf[w]
-    row = find_row(kinds, ids, ne[w], ends, profiles.rows[int(Row.FRICTION), w, j], FRICTION, dof)
+    row = find_row(kinds, ids, equalities, ends, rows[int(Row.FRICTION)], FRICTION, dof)
     damping_row = int(-1)
-    equality = profiles.places[j, int(Place.EQUALITY)]
     if equality >= 0:
-        damping_row = find_row(kinds, ids, 0, ne[w], equality, EQUALITY, equality)
-    coefficient = n[int(Number.LOAD_DEPENDENT_FRICTION_COEFFICIENT), w, j]
-    low = n[int(Number.END_STOP_RESTITUTION_LOW), w, j]
-    high = n[int(Number.END_STOP_RESTITUTION_HIGH), w, j]
-    limits = jnt_range[w % jnt_range.shape[0], id]
+        expected = rows[int(Row.DAMPING)]
+        damping_row = find_row(kinds, ids, 0, equalities, expected, EQUALITY, equality)
+    coefficient = n[int(Number.LOAD_DEPENDENT_FRICTION_COEFFICIENT)]
+    low, high = n[int(Number.END_STOP_RESTITUTION_LOW)], n[int(Number.END_STOP_RESTITUTION_HIGH)]
     side = wp.where(q - limits[0] < limits[1] - q, 1.0, -1.0)
     stop = int(-1)
     if coefficient > 0.0 or low >= 0.0 or high >= 0.0:
-        stop = find_row(kinds, ids, ends, ends + nl[w], -1, LIMIT, id)
-    profiles.rows[int(Row.FRICTION), w, j] = row
-    profiles.rows[int(Row.DAMPING), w, j] = damping_row
-    profiles.rows[int(Row.LIMIT), w, j] = stop
-    profiles.state[int(State.STOP_SIDE), w, j] = side
+        stop = find_row(kinds, ids, ends, ends + limited, -1, LIMIT, id)
 
-    sine, cosine = n[int(Number.GRAVITY_OFFSET_SIN), w, j], n[int(Number.GRAVITY_OFFSET_COS), w, j]
-    spring = n[int(Number.GRAVITY_OFFSET_FORCE), w, j] + sine * wp.sin(q) + cosine * wp.cos(q)
+    sine, cosine = n[int(Number.GRAVITY_OFFSET_SIN)], n[int(Number.GRAVITY_OFFSET_COS)]
+    spring = float(n[int(Number.GRAVITY_OFFSET_FORCE)])
+    if sine != 0.0 or cosine != 0.0:
+        spring += sine * wp.sin(q) + cosine * wp.cos(q)
     field = (disabled & NO_SPRING) == 0
     if field:
-        spring += n[int(Number.CONSERVATIVE_STRENGTH), w, j] * value(
-            profiles.curves, joint.variant, j, int(Curve.CONSERVATIVE), joint.s
-        )
-    yielding = h * implicit_stiffness(profiles, joint, field, h, v, spring, inertia)
+        spring += n[int(Number.CONSERVATIVE_STRENGTH)] * curves[int(Curve.CONSERVATIVE)]
+    yielding = h * implicit_stiffness(
+        profiles.curves, variant, j, n, s, field, h, v, spring, inertia
+    )
     if joint.damps != 0:
-        table = learned.resistance(profiles.tables, joint.variant, j, joint.s, v)
+        table = learned.resistance(profiles.tables, variant, j, s, v)
         pushed = learned.push(
-            n[int(Number.LEARNED_FORCE_STRENGTH), w, j] * table,
-            n[int(Number.LEARNED_FORCE_STIFFNESS), w, j],
-            n[int(Number.LEARNED_FORCE_CHANGE), w, j],
-            n[int(Number.LEARNED_FORCE_TIME), w, j],
+            n[int(Number.LEARNED_FORCE_STRENGTH)] * table,
+            n[int(Number.LEARNED_FORCE_STIFFNESS)],
+            n[int(Number.LEARNED_FORCE_CHANGE)],
+            n[int(Number.LEARNED_FORCE_TIME)],
             h,
             v,
-            profiles.state[int(State.REMEMBERED), w, j],
+            memory[int(State.REMEMBERED)],
         )
         spring += pushed[0]
         yielding += pushed[1]
-        joint.damping = n[int(Number.DAMPING_STRENGTH), w, j] * value(
-            profiles.curves, joint.variant, j, int(Curve.DAMPING), joint.s
-        )
+        joint.damping = n[int(Number.DAMPING_STRENGTH)] * curves[int(Curve.DAMPING)]
     if joint.rubs != 0:
-        joint.friction = n[int(Number.FRICTION_STRENGTH), w, j] * value(
-            profiles.curves, joint.variant, j, int(Curve.FRICTION), joint.s
-        )
+        joint.friction = n[int(Number.FRICTION_STRENGTH)] * curves[int(Curve.FRICTION)]
     if row >= 0:
-        joint.friction += dof_frictionloss[w % dof_frictionloss.shape[0], dof]
+        joint.friction += native
 
-    applied = qfrc_applied[w, dof]
-    load = n[int(Number.BACKLASH_LOAD), w, j]
+    load = n[int(Number.BACKLASH_LOAD)]
     external = float(applied)
     if coefficient > 0.0 or load > 0.0:
         body, hinge = profiles.places[j, int(Place.BODY)], profiles.places[j, int(Place.HINGE)]
@@ -351,86 +358,103 @@ def act(
             external += exerted(hinge, axis, anchor, wp.spatial_top(push), xipos[w, b])
             if hinge != 0:
                 external += wp.dot(axis, wp.spatial_bottom(push))
-        joint.load = external + profiles.state[int(State.UNKNOWN_LOAD), w, j]
+        joint.load = external + memory[int(State.UNKNOWN_LOAD)]
 
-    own = resist(profiles, joint, v)
-    play = n[int(Number.BACKLASH_PLAY), w, j]
+    own = resist(n, curves, joint, v)
+    play = n[int(Number.BACKLASH_PLAY)]
     passage = laws.alone()
     force = float(0.0)
     if load > 0.0:
         passage = laws.meet(
             play,
             load,
-            n[int(Number.BACKLASH_SHARE), w, j],
+            n[int(Number.BACKLASH_SHARE)],
             h,
             profiles.inertia[j],
             spring + external,
             v,
             own,
             yielding,
-            resist(profiles, joint, v + speed),
+            resist(n, curves, joint, v + speed),
             gap,
             speed,
         )
         force = passage.force + (passage.scale - 1.0) * external
         spring *= passage.scale
         yielding *= passage.scale
-        profiles.state[int(State.NEXT_SIDE), w, j] = passage.side
-        profiles.state[int(State.NEXT_GAP), w, j] = passage.gap
-        profiles.state[int(State.NEXT_SPEED), w, j] = passage.speed
     against = passage.resistance * own
     drag = against[0] + yielding
     dry = wp.where(v < 0.0, against[2], against[1])
 
     beside = float(0.0)
+    bound = float(0.0)
+    stiffness = float(0.0)
+    toward = float(0.0)
     if row >= 0:
         bound = 0.5 * (against[1] + against[2])
         psi = wp.clamp(held, -bound, bound)
-        D = laws.STIFF_ROW * inertia
-        bristles = passage.resistance * n[int(Number.PRESLIDING_FRICTION_STIFFNESS), w, j]
+        stiffness = laws.STIFF_ROW * inertia
+        bristles = passage.resistance * n[int(Number.PRESLIDING_FRICTION_STIFFNESS)]
         if bristles > 0.0:
-            breakaway = n[int(Number.PRESLIDING_FRICTION_BREAKAWAY), w, j]
+            breakaway = n[int(Number.PRESLIDING_FRICTION_BREAKAWAY)]
             left = laws.bristle_left(breakaway, psi, bound, v)
-            D = laws.bristle_row(left, h, bristles, inertia)
+            stiffness = laws.bristle_row(left, h, bristles, inertia)
             if joint.damps != 0:
-                rate = n[int(Number.PRESLIDING_FRICTION_DAMPING), w, j]
+                rate = n[int(Number.PRESLIDING_FRICTION_DAMPING)]
                 drag += passage.resistance * rate * left
             # near slip a soft row that holds so much would cost so much that float32 loses the
             # others: what it held acts beside it, and the row adds what the bristles still can
-            ahead = v + h * qacc_warmstart[w, dof]
-            if psi * ahead < 0.0 and bound * bound > D * laws.MOST_COST:
+            if psi * ahead < 0.0 and bound * bound > stiffness * laws.MOST_COST:
                 beside = psi
                 bound -= wp.abs(psi)
                 psi = 0.0
-        efc_D[w, row] = D
-        efc_aref[w, row] = psi / D - v / h
-        efc_frictionloss[w, row] = bound
+        toward = psi / stiffness - v / h
         force += beside + 0.5 * (against[2] - against[1])  # as the row is symmetric
         dry = 0.0
-    profiles.state[int(State.BESIDE_ROW), w, j] = beside
+    implicit = wp.max(h * drag, laws.IDLE_ROW * inertia)
     if damping_row >= 0:
-        efc_D[w, damping_row] = wp.max(h * drag, laws.IDLE_ROW * inertia)
-        efc_aref[w, damping_row] = -v / h
         drag = 0.0
     else:
         spring /= 1.0 + h * yielding / inertia
     force += laws.resisting(dry, drag, v, h, inertia)
 
-    inertia_before = n[int(Number.BACKLASH_HANDLE), w, j]
+    next_gap = float(passage.gap)
+    next_speed = float(passage.speed)
+    inertia_before = n[int(Number.BACKLASH_HANDLE)]
     if inertia_before > 0.0:
         moved = laws.handle(play, inertia_before, h, applied, v, gap, speed)
         force += moved[0] - applied
-        profiles.state[int(State.NEXT_GAP), w, j] = moved[1]
-        profiles.state[int(State.NEXT_SPEED), w, j] = moved[2]
-    qfrc_passive[w, dof] += spring + force
+        next_gap = moved[1]
+        next_speed = moved[2]
+    depth = float(0.0)
+    if stop >= 0:
+        depth = efc_pos[w, stop] - efc_margin[w, stop]
 
+    qfrc_passive[w, dof] += spring + force
+    if row >= 0:
+        efc_D[w, row] = stiffness
+        efc_aref[w, row] = toward
+        efc_frictionloss[w, row] = bound
+    if damping_row >= 0:
+        efc_D[w, damping_row] = implicit
+        efc_aref[w, damping_row] = -v / h
     damping = wp.where(side > 0.0, low, high)
     if stop >= 0 and damping >= 0.0:
-        depth = efc_pos[w, stop] - efc_margin[w, stop]
         efc_D[w, stop] = laws.STOP_IMPEDANCE / (1.0 - laws.STOP_IMPEDANCE) * inertia
         efc_aref[w, stop] = (
             -damping / (laws.STOP_IMPEDANCE * h) * side * v - laws.STOP_STIFFNESS / (h * h) * depth
         )
+    profiles.rows[int(Row.FRICTION), w, j] = row
+    profiles.rows[int(Row.DAMPING), w, j] = damping_row
+    profiles.rows[int(Row.LIMIT), w, j] = stop
+    memory[int(State.TIME)] = t
+    memory[int(State.STOP_SIDE)] = side
+    memory[int(State.BESIDE_ROW)] = beside
+    memory[int(State.NEXT_SIDE)] = passage.side
+    memory[int(State.NEXT_GAP)] = next_gap
+    memory[int(State.NEXT_SPEED)] = next_speed
+    for number in range(wp.static(len(State))):
+        profiles.state[number, w, j] = memory[number]
 
 
 @wp.kernel(enable_backward=False)
@@ -469,5 +493,6 @@ def launch(m: Any, d: Any, profiles: Profiles) -> None:
             profiles,
         ],
         outputs=[efc.D, efc.aref, efc.frictionloss, d.qfrc_passive],
+        block_dim=BLOCK,
         device=d.qpos.device,
     )

@@ -20,7 +20,7 @@ from joda.effects import (
     StribeckFriction,
 )
 from joda.profile import CHANNELS, Profile
-from joda.warp.curves import Curves
+from joda.warp.curves import BUCKETS, Curves
 from joda.warp.numbers import Curve, Number
 
 Array = NDArray[np.float64]
@@ -102,51 +102,97 @@ def curves_of(profile: Profile) -> dict[Curve, tuple[str, str]]:
 
 
 def make_curves(variants: Sequence[Mapping[str, Profile]], device: Any) -> Curves:
-    """The table of all curves; the same curve stands in it once."""
-    shape = (len(variants), len(variants[0]), len(Curve))
-    first, pieces = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+    """The lists of all curves; joints with the same curves share them."""
+    shape = (len(variants), len(variants[0]))
+    where = np.zeros((*shape, 4), np.int32)
+    slots = np.full((*shape, len(Curve) + 1), -1, np.int32)
     steepest = np.zeros(shape, np.float32)
-    table: list[tuple[Array, ...]] = []
-    found: dict[tuple[str, str], tuple[int, int, float]] = {}
-    size = 0
+    lists: dict[str, list[Array]] = {
+        "knots": [],
+        "descents": [],
+        "starts": [],
+        "at": [np.zeros(1)],
+        "cubics": [np.zeros((1, 4))],
+    }
+    found: dict[Any, tuple[list[int], float]] = {}
     for k, profiles in enumerate(variants):
         for j, profile in enumerate(profiles.values()):
-            for curve, text in curves_of(profile).items():
-                if text not in found:
-                    merged = _merge(*text)
-                    found[text] = (size, len(merged[0]) - 1, float(merged[3].max()))
-                    table.append(merged)
-                    size += len(merged[0])
-                first[k, j, curve], pieces[k, j, curve], steepest[k, j, curve] = found[text]
-    knots, at, cubics, descents = (
-        (np.concatenate(parts) for parts in zip(*table, strict=True))
-        if table
-        else (np.zeros(1), np.zeros(1), np.zeros((1, 4)), np.zeros(1))
-    )
+            own = curves_of(profile)
+            key = tuple(own.items())
+            if key not in found:
+                joint = _joint(own)
+                place = [sum(map(len, lists[name])) for name in ("knots", "starts", "cubics")]
+                place.insert(1, len(joint["knots"]) - 1)
+                found[key] = (place, float(joint["descents"].max()))
+                for name, more in joint.items():
+                    lists[name].append(more)
+            where[k, j], steepest[k, j] = found[key]
+            slots[k, j, list(own)] = range(len(own))
+            slots[k, j, -1] = len(own)
     out = Curves()
-    out.first = wp.array(first, dtype=int, device=device)
-    out.pieces = wp.array(pieces, dtype=int, device=device)
+    out.where = wp.array(where, dtype=wp.vec4i, device=device)
+    out.slots = wp.array(slots, dtype=int, device=device)
     out.steepest = wp.array(steepest, dtype=float, device=device)
-    out.knots = wp.array(knots, dtype=float, device=device)
-    out.at = wp.array(at, dtype=float, device=device)
-    out.cubics = wp.array(cubics, dtype=wp.vec4, device=device)
-    out.descents = wp.array(descents, dtype=float, device=device)
+    for name, dtype in (
+        ("knots", float),
+        ("descents", float),
+        ("starts", int),
+        ("at", float),
+        ("cubics", wp.vec4),
+    ):
+        setattr(out, name, wp.array(np.concatenate(lists[name]), dtype=dtype, device=device))
     return out
 
 
+def _joint(curves: Mapping[Curve, tuple[str, str]]) -> dict[str, Array]:
+    """A joint's part of each list of `Curves`."""
+    channels = [_merged(*text) for text in curves.values()]
+    knots = np.unique(np.concatenate([[0.0, 1.0], *(channel.knots for channel in channels)]))
+    at = np.array([channel(knots)[0] for channel in channels]).reshape(len(channels), -1)
+    cubics = np.array([_about(channel, knots) for channel in channels]).reshape(*at.shape, 4)
+    begins = np.arange(BUCKETS) / BUCKETS
+    starts = np.searchsorted(knots.astype(np.float32), begins, side="right") - 1
+    descents = np.zeros(len(knots))
+    if Curve.CONSERVATIVE in curves:
+        descents = _descents(channels[list(curves).index(Curve.CONSERVATIVE)], knots)
+    return {
+        "knots": knots,
+        "descents": descents,
+        "starts": starts,
+        "at": at.T.ravel(),
+        "cubics": cubics.swapaxes(0, 1).reshape(-1, 4),
+    }
+
+
 @lru_cache(maxsize=4096)
-def _merge(text: str, combine: str) -> tuple[Array, Array, Array, Array]:
-    """Knots, values there, cubics from each knot on, and their largest descents."""
-    channel = core.Channel(text, combine)
-    knots, cubics = channel.knots, channel.coefficients
-    width = np.diff(knots)
-    _, c1, c2, c3 = cubics
+def _merged(text: str, combine: str) -> core.Channel:
+    return core.Channel(text, combine)
+
+
+def _pieces(channel: core.Channel, knots: Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Which piece of a channel begins at or before each knot, and whether it reaches beyond."""
+    piece = np.searchsorted(channel.knots, knots, side="right") - 1
+    inside = (piece >= 0) & (piece < len(channel.knots) - 1)
+    return np.where(inside, piece, 0), inside
+
+
+def _about(channel: core.Channel, knots: Array) -> Array:
+    """Coefficients about each of these knots, shape (knots, 4); 0 outside the channel's own."""
+    piece, inside = _pieces(channel, knots)
+    c0, c1, c2, c3 = channel.coefficients[:, piece]
+    t = knots - channel.knots[piece]
+    about = (((c3 * t + c2) * t + c1) * t + c0, (3 * c3 * t + 2 * c2) * t + c1, 3 * c3 * t + c2, c3)
+    return np.where(inside[:, None], np.stack(about, axis=1), 0)
+
+
+def _descents(channel: core.Channel, knots: Array) -> Array:
+    """The largest descent on the channel's piece that begins at or before each knot, or 0."""
+    width = np.diff(channel.knots)
+    _, c1, c2, c3 = channel.coefficients
     slopes = [c1, c1 + width * (2 * c2 + 3 * width * c3)]
     with np.errstate(divide="ignore", invalid="ignore"):
         vertex = -c2 / (3 * c3)
-    inside = (vertex > 0) & (vertex < width)
-    vertex = np.where(inside, vertex, 0)
+    vertex = np.where((vertex > 0) & (vertex < width), vertex, 0)
     slopes.append(c1 + vertex * (2 * c2 + 3 * vertex * c3))
-    descents = np.maximum(0, -np.min(slopes, axis=0))
-    last = np.zeros((1, 4))
-    return knots, channel(knots)[0], np.vstack((cubics.T, last)), np.append(descents, 0)
+    piece, inside = _pieces(channel, knots)
+    return np.where(inside, np.maximum(0, -np.min(slopes, axis=0))[piece], 0)
