@@ -281,6 +281,7 @@ def test_refine_tells_errors_in_the_joints_unit(kind, unit, tmp_path, monkeypatc
     result = Refined(
         **{name: tmp_path / path for name, path in files.items()},
         composed=tmp_path / "composed.json",
+        corrections=None,
         changes=(),
         before=0.02,
         after=0.001,

@@ -277,6 +277,28 @@ def test_a_force_of_the_other_sign_bends_nothing(tmp_path):
     assert not (tmp_path / "better.xml").exists()
 
 
+@pytest.mark.long
+def test_runs_are_set_right_as_the_corrections_say(tmp_path):
+    wrong = float(np.random.default_rng().uniform(0.4, 0.6))
+    runs = planted_runs(tmp_path, wrong)
+    text = json.dumps({"joints": {"joint": {"force_scale": 1 / wrong}}})
+    write(tmp_path, text, "scene.corrections.json")
+    given = ("--corrections", "scene.corrections.json", "--json")
+    before = content(tmp_path)
+    done = command(tmp_path, *runs, *given, "--scene", joint="joint")
+    assert done.returncode == 2 and "here the whole scene is simulated" in done.stderr
+    assert content(tmp_path) == before
+    done = command(tmp_path, *runs, *given, joint="joint")
+    assert (done.returncode, done.stderr) == (0, "")
+    told, beside = json.loads(done.stdout), tmp_path / "better.corrections.json"
+    assert Path(told["corrections"]).name == beside.name
+    assert told["windows"][1] < 2 * told["noise"] < 5 * told["noise"] < told["windows"][0]
+    after = compare(
+        tmp_path / "better.xml", "joint", [tmp_path / name for name in runs], corrections=beside
+    )
+    assert after.rmse == pytest.approx(told["after"], rel=1e-3)
+
+
 def test_what_changes_where_no_run_was_is_said():
     def rubbing(y):
         part = Component(label="rub", interval=(0, 1), x=(0, 0.5, 1), y=(y, y, y))

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from joda.cli.options import (
+    Corrections,
     Force,
     Joint,
     Joints,
@@ -67,12 +68,14 @@ def refine(
             show_default=False,
         ),
     ] = None,
+    corrections: Corrections = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Bend a joint's profile until it moves as was measured.
 
-    Leaves, beside the scene, its .composed.json, .png and .history.json. Example:
+    Leaves, beside the scene, its .composed.json, .png and .history.json, and .corrections.json
+    where what is wrong with the runs was given. Example:
 
         joda refine oven/scene.xml out/let_go_5.csv out/let_go_45.csv --joint door -o better.xml
     """
@@ -84,7 +87,7 @@ def refine(
             model, joint, runs, output, check=check or (), iterations=iterations,
             fit=[name.strip() for name in fit.split(",") if name.strip()],  # type: ignore[misc]
             keep_shape=not free_shape, finer=finer, passive=passive, scene=scene,
-            force=force, progress=bar,
+            corrections=corrections, force=force, progress=bar,
         )  # fmt: skip
     if as_json:
         print_json(with_text_paths(asdict(result)))
@@ -93,7 +96,8 @@ def refine(
     tell_errors(result, Profile.read(result.composed).joint.unit)
     for note in result.notes:
         say(note)
-    for path in (result.scene, result.composed, result.picture, result.history):
+    beside = result.composed, result.picture, result.history, result.corrections
+    for path in filter(None, (result.scene, *beside)):
         say(path)
 
 
@@ -110,13 +114,7 @@ def compare(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
     ] = None,
-    corrections: Annotated[
-        Path | None,
-        typer.Option(
-            help="What is wrong with the runs: the NEW.corrections.json that add or improve left "
-            "beside NEW.xml."
-        ),
-    ] = None,
+    corrections: Corrections = None,
     passive: Passive = False,
     force: Force = False,
 ) -> None:

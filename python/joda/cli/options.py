@@ -33,6 +33,13 @@ Joints = Annotated[
 Passive = Annotated[
     bool, typer.Option("--passive", help="The joint's actuators were off while it was measured.")
 ]
+Corrections = Annotated[
+    Path | None,
+    typer.Option(
+        help="What is wrong with the runs: the NEW.corrections.json that add or improve left "
+        "beside NEW.xml."
+    ),
+]
 Trust = Annotated[
     list[str] | None,
     typer.Option(

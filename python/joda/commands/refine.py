@@ -16,12 +16,14 @@ from joda.diagnosis.reshaping import resolved
 from joda.errors import JodaError
 from joda.files import check_targets, named_like, write_together
 from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
+from joda.measured.corrections_file import corrections_beside, corrections_text, sensing_of
 from joda.measured.driven import read_logs
 from joda.measured.excerpts import excerpts
 from joda.measured.gauge import compared
 from joda.measured.obstructed import clear_of_contacts
 from joda.measured.reading import Measured, checked, taken
 from joda.measured.runs import QuasiStatic, Run, check_known
+from joda.measured.sensing import RIGHT
 from joda.measured.visited import unvisited
 from joda.pictures.changes import changes
 from joda.pictures.style import png
@@ -53,6 +55,7 @@ class Refined:
 
     Attributes:
         scene, composed, picture, history: the files that were written.
+        corrections: what the runs have wrong, beside the scene; None where they were not said to.
         changes: a line per changed component.
         before, after: RMS position error of whole runs, as `joda compare` tells it, rad or m; of
             curves, RMS error of the force, N·m or N.
@@ -68,6 +71,7 @@ class Refined:
     composed: Path
     picture: Path
     history: Path
+    corrections: Path | None
     changes: tuple[str, ...]
     before: float
     after: float
@@ -92,6 +96,7 @@ def refine(
     finer: int = 0,
     passive: bool = False,
     scene: bool | None = None,
+    corrections: str | Path | None = None,
     force: bool = False,
     progress: Callable[[str, int, int, float], None] = lambda stage, number, total, rms: None,
 ) -> Refined:
@@ -118,6 +123,8 @@ def refine(
         passive: whether the actuators on the joint, if there are any, were off.
         scene: whether the whole scene is simulated, in MJX, instead of the joint by itself; None:
             where other joints of the logs, or contacts, move the joint.
+        corrections: what is wrong with the runs, as `joda.improve` or `joda.add` wrote it beside
+            their scene; it is written beside the new one too. Of a joint by itself only.
         force: overwrite what exists.
         progress: told the stage, the iteration, of how many at most, and the RMS misfit (rad or m;
             N·m or N of curves).
@@ -134,7 +141,10 @@ def refine(
     others = {
         kind: named_like(target, f".{kind}") for kind in ("composed.json", "png", "history.json")
     }
-    check_targets([target, *others.values()], force, [*runs, *check])
+    if corrections:
+        others["corrections"] = corrections_beside(target)
+    read = [*runs, *check, *([corrections] if corrections else [])]
+    check_targets([target, *others.values()], force, read)
     if twice := _both(runs, check):
         raise JodaError(f"{twice}: is fitted too; what is held out (--check) must not be.")
     if unknown := set(fit) - set(KINDS):
@@ -143,15 +153,23 @@ def refine(
         raise JodaError("no runs; give at least one CSV file with time and position.")
     compiled = load_model(source)
     number = find_joint(compiled, joint)
+    name = joint_name(compiled, number)
+    sensing = sensing_of(corrections, name)
     jointly, notes = together(compiled, number, runs, check, passive, scene)
+    if jointly and sensing != RIGHT:
+        raise JodaError(
+            f"{corrections}: corrects the runs of a joint by itself, and here the whole scene is "
+            "simulated; leave it out, or say --no-scene."
+        )
     fitted, kept = (
-        jointly.logs(compiled, paths) if jointly else read_logs(compiled, number, paths, passive)
+        jointly.logs(compiled, paths)
+        if jointly
+        else read_logs(compiled, number, paths, passive, sensing)
         for paths in (runs, check)
     )
     measured, held_out, servo = fitted.read, kept.read, fitted.servo or kept.servo
     if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
         raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
-    name = joint_name(compiled, number)
     profiles = profiles_of(compiled)
     if name not in profiles:
         raise JodaError(
@@ -225,16 +243,17 @@ def refine(
     balance = np.array(found.positions), -np.array(found.gravity_force)
     paths = was, problem.paths(result.theta)
     figure = picture(before, after, balance, problem, paths, hidden)
-    write_together(
-        {
-            target: written,
-            others["composed.json"]: after.to_json(),
-            others["png"]: png(figure),
-            others["history.json"]: history(
-                result, _told(errors), problem.sigma, _told(apart) if apart else None, hidden
-            ),
-        }
-    )
+    files: dict[Path, bytes | str] = {
+        target: written,
+        others["composed.json"]: after.to_json(),
+        others["png"]: png(figure),
+        others["history.json"]: history(
+            result, _told(errors), problem.sigma, _told(apart) if apart else None, hidden
+        ),
+    }
+    if corrections:
+        files[others["corrections"]] = corrections_text({name: sensing})
+    write_together(files)
     notes += parting(errors[1], problem.sigma, blocks=False)
     if apart and (times := _told(apart)[1] / max(_told(errors)[1], problem.sigma)) > ELSEWHERE:
         notes.append(
@@ -253,6 +272,7 @@ def refine(
         composed=others["composed.json"],
         picture=others["png"],
         history=others["history.json"],
+        corrections=others.get("corrections"),
         changes=tuple(changes(before, after)),
         before=_told(errors)[0],
         after=_told(errors)[1],
