@@ -33,7 +33,9 @@ def arm(mass=1.0):
     return ARM.format(mass=0.5 * mass, own=0.02 * mass)
 
 
-def logged(folder, rng, scale=1.0, offset=0.0, delay=0.0, zero=0.0, extra=lambda q: 0.0):
+def logged(
+    folder, rng, scale=1.0, offset=0.0, delay=0.0, zero=0.0, extra=lambda q: 0.0, noise=SIGMA
+):
     """Four runs of 2 s of the arm in MuJoCo at 200 Hz, with what is wrong of what is logged."""
     model = mujoco.MjModel.from_xml_string(arm())
     ahead, names = round(delay / model.opt.timestep), []
@@ -52,7 +54,7 @@ def logged(folder, rng, scale=1.0, offset=0.0, delay=0.0, zero=0.0, extra=lambda
         time, position, force = np.array(rows).T
         later = force[ahead:][:2000:5]
         at = np.arange(0, 2000, 5)
-        seen = position[at] + zero + SIGMA * rng.standard_normal(len(at))
+        seen = position[at] + zero + noise * rng.standard_normal(len(at))
         names.append(folder / f"run{k}.csv")
         write_run(
             names[-1], Run(f"run{k}.csv", time[at], seen, None, (later - offset) / scale, True)
@@ -97,6 +99,15 @@ def test_a_force_of_another_scale_is_told(tmp_path, rng):
 def test_a_late_log_is_told(tmp_path, rng):
     late = round(float(rng.uniform(0.005, 0.04)), 3)
     check(*found_of(tmp_path, rng, delay=late), "time_delay", late)
+
+
+def test_what_is_smaller_than_the_noise_is_told_too(tmp_path, rng):
+    late = round(float(rng.uniform(0.010, 0.014)), 3)
+    measured, found = found_of(tmp_path, rng, delay=late, noise=20 * SIGMA)
+    assert found is not None and found.names == ("time_delay",)
+    (told,) = found.corrections(measured)
+    assert abs(told.value - late) < 4 * told.error
+    assert asked(measured).fit.loss < 1.8 * found.loss  # most of what is missed is noise
 
 
 def test_an_encoders_zero_is_told(tmp_path, rng):

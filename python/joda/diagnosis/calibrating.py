@@ -31,7 +31,7 @@ NEXT = 25.0
 ALIKE = 9.0
 """Gain in loss up to which data cannot tell one number from another, nor from an effect."""
 MOST = 0.5
-"""Part of the loss that all numbers together may leave for a closer look."""
+"""Part of what the model leaves beyond noise that all numbers together may leave for a closer look."""
 CALM, PART = 0.05, 0.02
 """What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
 CLEARLY = 3.0
@@ -142,7 +142,9 @@ def _longer(measured: Measured, found: Calibration) -> Calibration:
 def _calibrated(begun: Asked, every: Numbers) -> Calibration | None:
     found = _Search(begun, every)
     whole, first = found.fitted(every.names), found.fitted(()).loss
-    if first - whole.loss < WORTH or whole.loss > MOST * first:
+    samples = max(begun.judge.samples, 1.0)
+    most = MOST * max(excess(first, samples), 0.0)
+    if first - whole.loss < WORTH or excess(whole.loss, samples) > most:
         return None
     names, best = every.names, whole
     while names:

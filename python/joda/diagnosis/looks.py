@@ -50,6 +50,11 @@ class Looked:
     evidence: tuple[Evidence, ...]
     free: FreeRuns | None = None
 
+    @property
+    def closer(self) -> bool:
+        """Whether something shows in longer windows that did not in the usual ones."""
+        return self.ranking is not self.first[0] and self.weighed.verdict != "adequate"
+
 
 def looked(measured: Measured, begun: Asked, exclude: Collection[str], told: Told) -> Looked:
     """Ranks what may be missing; once more in longer windows, where these leave a question, and the

@@ -162,8 +162,13 @@ def diagnosed(
     right = found.righted.of(measured) if found else measured
     if found is None or not found.alone:
         looks = looked(measured, begun, exclude, told)
-        if found and not found.beats(begun, looks.first[0].guesses):
-            found, right = None, measured
+        ranking = looks.first[0]
+        if calibrate and found is None and looks.closer:  # what shows late may be a number too
+            ranking = looks.ranking
+            found = calibrated(measured, ranking.asked)
+        if found and not found.beats(ranking.asked, ranking.guesses):
+            found = None
+        right = found.righted.of(measured) if found else measured
     if found:
         looks = looked(right, asked(right), exclude, told)
     out = replace(_concluded(right, looks), looks=looks.evidence)
