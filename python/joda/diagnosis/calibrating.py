@@ -31,7 +31,7 @@ NEXT = 25.0
 ALIKE = 9.0
 """Gain in loss up to which data cannot tell one number from another, nor from an effect."""
 MOST = 0.5
-"""Part of what the model leaves beyond noise that all numbers together may leave for a closer look."""
+"""Part of what the model leaves beyond noise that all numbers together leave at most."""
 CALM, PART = 0.05, 0.02
 """What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
 CLEARLY = 3.0
