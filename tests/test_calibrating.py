@@ -62,13 +62,13 @@ def logged(
     return names
 
 
-def found_of(folder, rng, trust=None, mass=1.0, **wrong):
+def found_of(folder, rng, trust=None, mass=1.0, beside=False, **wrong):
     """What is found of runs, with a model whose mass is off by a factor."""
     runs = logged(folder, rng, **wrong)
     (folder / "arm.xml").write_text(arm(1 / mass))
     measured = read_measured(folder / "arm.xml", "arm", runs)
     measured = measured.trusting(trusting(trust or {}))
-    return measured, calibrated(measured, asked(measured))
+    return measured, calibrated(measured, asked(measured), beside)
 
 
 def check(measured, found, name, right):
@@ -103,7 +103,7 @@ def test_a_late_log_is_told(tmp_path, rng):
 
 def test_what_is_smaller_than_the_noise_is_told_too(tmp_path, rng):
     late = round(float(rng.uniform(0.010, 0.014)), 3)
-    measured, found = found_of(tmp_path, rng, delay=late, noise=20 * SIGMA)
+    measured, found = found_of(tmp_path, rng, beside=True, delay=late, noise=20 * SIGMA)
     assert found is not None and found.names == ("time_delay",)
     (told,) = found.corrections(measured)
     assert abs(told.value - late) < 4 * told.error

@@ -31,7 +31,8 @@ NEXT = 25.0
 ALIKE = 9.0
 """Gain in loss up to which data cannot tell one number from another, nor from an effect."""
 MOST = 0.5
-"""Part of what the model leaves beyond noise that all numbers together leave at most."""
+"""Part of the loss that all numbers together leave at most; of what is beyond noise, where effects
+were looked for too."""
 CALM, PART = 0.05, 0.02
 """What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
 CLEARLY = 3.0
@@ -86,10 +87,10 @@ class Calibration:
         """What is to be set right."""
         return righted({str(name): x for name, x in self.numbers.values(self.fit.x).items()})
 
-    def beats(self, begun: Asked, guesses: Sequence[Guess]) -> bool:
-        """Whether no effect explains as much."""
+    def beats(self, begun: Asked, guesses: Sequence[Guess], clearly: bool) -> bool:
+        """Whether no effect explains as much, or each clearly less."""
         least = min((g.fit.loss + g.cost for g in guesses), default=begun.fit.loss)
-        return self.loss < least + ALIKE
+        return self.loss < least + (-ALIKE if clearly else ALIKE)
 
     def corrections(self, measured: Measured) -> tuple[Correction, ...]:
         """What is off, for the user.
@@ -106,18 +107,19 @@ class Calibration:
         )
 
 
-def calibrated(measured: Measured, begun: Asked) -> Calibration | None:
+def calibrated(measured: Measured, begun: Asked, beside: bool = False) -> Calibration | None:
     """The numbers that are off; None where none is, or where they explain little.
 
     Args:
         measured: the joint and its runs.
         begun: the model fitted to them.
+        beside: whether effects were looked for too, so that these can be compared.
     """
     every = doubted(measured, begun.base)
     if not measured.runs or not every.names:
         return None
     with threadpool_limits(1, BLAS):
-        found = _calibrated(begun, every)
+        found = _calibrated(begun, every, beside)
         if found and all(found.numbers.little(found.fit.x)):
             return None
         return _longer(measured, found) if found and found.alone else found
@@ -139,12 +141,12 @@ def _longer(measured: Measured, found: Calibration) -> Calibration:
     return replace(found, numbers=own, fit=fit)
 
 
-def _calibrated(begun: Asked, every: Numbers) -> Calibration | None:
+def _calibrated(begun: Asked, every: Numbers, beside: bool) -> Calibration | None:
     found = _Search(begun, every)
     whole, first = found.fitted(every.names), found.fitted(()).loss
-    samples = max(begun.judge.samples, 1.0)
-    most = MOST * max(excess(first, samples), 0.0)
-    if first - whole.loss < WORTH or excess(whole.loss, samples) > most:
+    count = max(begun.judge.samples, 1.0)
+    all_of_it, left = (excess(x, count) * count if beside else x for x in (first, whole.loss))
+    if first - whole.loss < WORTH or left > MOST * max(all_of_it, 0.0):
         return None
     names, best = every.names, whole
     while names:
@@ -161,7 +163,7 @@ def _calibrated(begun: Asked, every: Numbers) -> Calibration | None:
     if np.any(widths > SURPRISE):  # it stands in for what is missing
         surprising = {name for name, off in zip(names, widths, strict=True) if off > SURPRISE}
         rest = tuple(name for name in every.names if name not in surprising)
-        return _calibrated(begun, every.only(rest)) if rest else None
+        return _calibrated(begun, every.only(rest), beside) if rest else None
     return _concluded(found, names, best, whole)
 
 

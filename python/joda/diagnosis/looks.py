@@ -50,21 +50,18 @@ class Looked:
     evidence: tuple[Evidence, ...]
     free: FreeRuns | None = None
 
-    @property
-    def closer(self) -> bool:
-        """Whether something shows in longer windows that did not in the usual ones."""
-        return self.ranking is not self.first[0] and self.weighed.verdict != "adequate"
 
-
-def looked(measured: Measured, begun: Asked, exclude: Collection[str], told: Told) -> Looked:
+def looked(
+    measured: Measured, exclude: Collection[str], told: Told, begun: Asked | None = None
+) -> Looked:
     """Ranks what may be missing; once more in longer windows, where these leave a question, and the
     best in longer and longer ones, while none is sure.
 
     Args:
         measured: the joint and its runs or curves.
-        begun: the model fitted to them, in usual windows.
         exclude: effects that are not considered.
         told: how much is done, of how much, and what.
+        begun: the model fitted to them, in usual windows; None: it is fitted.
     """
     needs = Needs(measured)
 
@@ -74,7 +71,7 @@ def looked(measured: Measured, begun: Asked, exclude: Collection[str], told: Tol
             model, exclude, told, possible=lambda *one: not needs.exceeded(needs.exerted(*one))
         )
 
-    ranking = ranked(begun)
+    ranking = ranked(begun or asked(measured))
     strictness = LOOSELY if moved_one_way(measured) else 1.0
     found = [evidence(ranking)]
     weighed = decide(found[0], strictness)

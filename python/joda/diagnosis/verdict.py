@@ -159,24 +159,23 @@ def diagnosed(
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     begun = asked(measured)
     found = calibrated(measured, begun) if calibrate else None
-    right = found.righted.of(measured) if found else measured
-    if found is None or not found.alone:
-        looks = looked(measured, begun, exclude, told)
-        ranking = looks.first[0]
-        if calibrate and found is None and looks.closer:  # what shows late may be a number too
-            ranking = looks.ranking
-            found = calibrated(measured, ranking.asked)
-        if found and not found.beats(ranking.asked, ranking.guesses):
-            found = None
-        right = found.righted.of(measured) if found else measured
-    if found:
-        looks = looked(right, asked(right), exclude, told)
-    out = replace(_concluded(right, looks), looks=looks.evidence)
-    return _with_numbers(out, found, measured) if found else out
+    if found and found.alone:
+        return _set_right(measured, found, looked(found.righted.of(measured), exclude, told))
+    plain = looked(measured, exclude, told, begun)
+    ranking, beside = plain.first[0], False
+    if calibrate and found is None and plain.weighed.verdict != "adequate":
+        ranking, beside = plain.ranking, True
+        found = calibrated(measured, ranking.asked, beside)
+    if found and found.beats(ranking.asked, ranking.guesses, clearly=beside):
+        looks = looked(found.righted.of(measured), exclude, told)
+        if looks.weighed.verdict != "unexplained" or plain.weighed.verdict == "unexplained":
+            return _set_right(measured, found, looks)
+    return replace(_concluded(measured, plain), looks=plain.evidence)
 
 
-def _with_numbers(out: Diagnosed, found: Calibration, measured: Measured) -> Diagnosed:
-    """What was found of a joint and runs whose numbers were set right, with these."""
+def _set_right(measured: Measured, found: Calibration, looks: Looked) -> Diagnosed:
+    """What looking at a joint and runs says whose numbers were set right, with these."""
+    out = replace(_concluded(found.righted.of(measured), looks), looks=looks.evidence)
     numbers = found.corrections(measured)
     said = out.diagnosis
     summary = " ".join(
