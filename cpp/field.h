@@ -134,6 +134,17 @@ inline Sample CombineSamples(const std::vector<Sample>& samples, Combine combine
 // One channel, ready to evaluate. Immutable after construction.
 class PiecewiseCubic {
  public:
+  // A cubic with all that its evaluation reads, in one line of the processor's cache.
+  struct alignas(64) Piece {
+    double left = 0, right = 0;  // it covers [left, right)
+    Coefficients c = {};         // about the left end
+    Sample at_left;              // exact, also where closed intervals meet
+
+    bool Covers(double s) const { return left <= s && s < right; }
+
+    Sample At(double s) const { return s == left ? at_left : internal::Cubic(c, s - left); }
+  };
+
   PiecewiseCubic() = default;  // zero everywhere
 
   PiecewiseCubic(const std::vector<Component>& components, Combine combine) {
@@ -166,10 +177,20 @@ class PiecewiseCubic {
     const bool beyond = s < 0 || s > 1;
     s = std::clamp(s, 0.0, 1.0);
     if (!(first_ <= s && s <= last_)) return {};  // also where s is not a number
-    const Piece& piece = pieces_[Find(s)];
-    Sample out = s == piece.left ? piece.at_left : internal::Cubic(piece.c, s - piece.left);
+    Sample out = pieces_[Find(s)].At(s);
     if (beyond) out.slope = 0;
     return out;
+  }
+
+  // The value at s, where it is asked for again and again: `last` is a copy of the piece that was
+  // found last, or an empty one.
+  double Value(double s, Piece* last) const {
+    s = std::clamp(s, 0.0, 1.0);
+    if (!last->Covers(s)) {
+      if (!(first_ <= s && s <= last_)) return 0;
+      *last = pieces_[Find(s)];
+    }
+    return last->At(s).value;
   }
 
   // Steepest descent max(-dF/ds, 0) met anywhere on the channel: its largest stiffness.
@@ -212,13 +233,6 @@ class PiecewiseCubic {
   }
 
  private:
-  // A cubic with all that its evaluation reads, in one line of the processor's cache.
-  struct alignas(64) Piece {
-    double left, right;
-    Coefficients c;  // about the left end
-    Sample at_left;  // exact, also where closed intervals meet
-  };
-
   static constexpr size_t kBuckets = 32;
 
   // How many cubics there are.

@@ -116,6 +116,7 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
                                   "room in the model; attach the profile and compile anew");
     }
     mine.profile = std::move(profile);
+    mine.conservative = mine.friction = mine.damping = {};
     mine.load = {};
     return;
   }
@@ -123,19 +124,19 @@ void JointDynamics::SetProfile(const mjModel* m, int joint, Profile profile) {
 }
 
 double JointDynamics::SetFrictionRow(const Step& step, mjData* d, int row, const Joint& joint,
-                                     double bound, double state, double inertia) {
+                                     double bound, double state, double inertia, double part) {
   const double held = step.keeps_rows ? std::clamp(state, -bound, bound) : 0;
   const Effects* effects = step.keeps_rows ? joint.profile.effects.get() : nullptr;
-  const FrictionRow stiffened = StiffenFrictionRow(effects, step.h, held, bound, d->qvel[joint.dof],
-                                                   inertia, joint.load.resistance);
+  const FrictionRow stiffened =
+      StiffenFrictionRow(effects, step.h, held, bound, d->qvel[joint.dof], inertia, part);
   SetRow(step, d, row, stiffened.D, bound, held);
   return stiffened.damping;
 }
 
-void JointDynamics::SetStops(const mjModel* m, const Step& step, mjData* d, const Joint& joint) {
+void JointDynamics::SetStops(const Step& step, mjData* d, const Joint& joint) {
   const EndStops& stops = joint.profile.effects->stops;
   if (!stops.low && !stops.high) return;
-  ForEachLimit(m, d, step.sparse, joint.id, joint.dof, [&](int row, mjtNum side) {
+  ForEachLimit(step.m, d, joint.id, joint.dof, [&](int row, mjtNum side) {
     const std::optional<double>& damping = side > 0 ? stops.low : stops.high;
     if (damping) SetStop(step, d, row, MakeStopRow(*damping, step.h, 1 / RowMobility(d, row)));
   });
@@ -146,7 +147,7 @@ double JointDynamics::UnknownLoad(const mjModel* m, const mjData* d, const Joint
   for (const int row : {FindFrictionRow(d, joint), FindDampingRow(d, joint)}) {
     if (row >= 0) own += d->efc_force[row];
   }
-  ForEachLimit(m, d, mj_isSparse(m), joint.id, joint.dof,
+  ForEachLimit(m, d, joint.id, joint.dof,
                [&](int row, mjtNum side) { own += side * d->efc_force[row]; });
   return d->qfrc_constraint[joint.dof] - own - d->qfrc_actuator[joint.dof];
 }
@@ -170,10 +171,10 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
     const double h = step.h, inertia = 1 / m->dof_invweight0[joint.dof], v = d->qvel[joint.dof];
     const double q = d->qpos[joint.qpos], s = (q - p.lo) * p.per_range;
 
-    double spring = step.spring ? p.conservative(s).value : 0;
+    double spring = step.spring ? p.conservative.Value(s, &joint.conservative) : 0;
     if (effects) {
       spring += OffsetForce(effects->gravity, q);
-      SetStops(m, step, d, joint);
+      SetStops(step, d, joint);
     }
     double yielding = h * ImplicitStiffness(p, step.spring, h, s, v, spring, inertia);
     if (effects && step.damper) {
@@ -184,8 +185,8 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
     }
 
     const int friction_row = FindFrictionRow(d, joint);
-    const double damping = step.damper ? p.damping(s).value : 0;
-    double friction = step.friction ? p.friction(s).value : 0;
+    const double damping = step.damper ? p.damping.Value(s, &joint.damping) : 0;
+    double friction = step.friction ? p.friction.Value(s, &joint.friction) : 0;
     if (friction_row >= 0) friction += m->dof_frictionloss[joint.dof];
     const bool rubs_by_load = effects && effects->load > 0;
     const bool needs_external = rubs_by_load || HasLoad(effects);
@@ -197,7 +198,8 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
       if (effects && step.friction) out.dry = BoundFriction(*effects, friction, s, velocity, load);
       return out;
     };
-    const Resistance own = resist(v);
+    Resistance own = resist(v);
+    double part = 1;
     joint.applied = d->qfrc_applied[joint.dof];
     double force = 0;
     if (HasLoad(effects)) {
@@ -208,12 +210,14 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
       force = joint.load.force + (joint.load.scale - 1) * known;
       spring *= joint.load.scale;
       yielding *= joint.load.scale;
+      part = joint.load.resistance;
+      own = joint.load.On(own);
     }
-    FrictionBounds bounds = joint.load.On(own).dry;
-    double drag = joint.load.On(own).drag + yielding;
+    FrictionBounds bounds = own.dry;
+    double drag = own.drag + yielding;
     if (friction_row >= 0) {
-      const double bristle =
-          SetFrictionRow(step, d, friction_row, joint, bounds.Bound(), state[joint.state], inertia);
+      const double bristle = SetFrictionRow(step, d, friction_row, joint, bounds.Bound(),
+                                            state[joint.state], inertia, part);
       if (step.damper) drag += bristle;
       force += bounds.Shift();  // as the row is symmetric
       bounds = {0, 0};

@@ -50,6 +50,7 @@ class JointDynamics {
 
  private:
   struct Joint {
+    // what a step reads of a joint without effects comes first, in as few lines of the cache
     int id;              // joint
     int dof;             // its degree of freedom
     int qpos;            // its place in qpos
@@ -57,19 +58,21 @@ class JointDynamics {
     int equality;        // equality constraint whose row carries the damping, -1: none
     int friction_row;    // expected place of its friction row among the friction rows
     int state;           // its place in the instance's state
-    Loose handle;        // after the step being computed, until Advance
-    Passage load;        // in the step being computed, until Advance
     double applied = 0;  // the force that Compute knew of, until Advance
-    Profile profile;
+    PiecewiseCubic::Piece conservative, friction, damping;  // where the channels were last
+    alignas(64) Profile profile;
+    Loose handle;  // after the step being computed, until Advance
+    Passage load;  // in the step being computed, until Advance
   };
 
   // Rows of this step's constraints, -1: none.
   static int FindFrictionRow(const mjData* d, const Joint& joint);
   static int FindDampingRow(const mjData* d, const Joint& joint);
 
-  // Sets the joint's friction row, whose last force is `state`; returns the bristle's damping.
+  // Sets the joint's friction row, whose last force is `state`, for the `part` of the bristle that
+  // is there; returns the bristle's damping.
   static double SetFrictionRow(const Step& step, mjData* d, int row, const Joint& joint,
-                               double bound, double state, double inertia);
+                               double bound, double state, double inertia, double part);
 
   // Where the last number of the joint's state is.
   static int LastState(const Joint& joint) {
@@ -86,7 +89,7 @@ class JointDynamics {
   static double UnknownLoad(const mjModel* m, const mjData* d, const Joint& joint);
 
   // Sets the rows of those ends of the joint's range that have a restitution of their own.
-  static void SetStops(const mjModel* m, const Step& step, mjData* d, const Joint& joint);
+  static void SetStops(const Step& step, mjData* d, const Joint& joint);
 
   // Moves the joint's handle; returns what it exerts on the part beyond the applied force.
   static double PushThroughPlay(const mjData* d, const mjtNum* state, double h, Joint* joint);

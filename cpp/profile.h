@@ -24,10 +24,10 @@ inline constexpr const char* kTextNames[kTexts] = {
 struct Profile {
   double lo = 0;                           // joint position at s = 0 (rad or m)
   double per_range = 1;                    // ds/dq = 1 / (position at s = 1 - lo)
+  std::shared_ptr<const Effects> effects;  // null: none
   PiecewiseCubic conservative;             // N m or N
   PiecewiseCubic friction;                 // N m or N
   PiecewiseCubic damping;                  // N m s/rad or N s/m
-  std::shared_ptr<const Effects> effects;  // null: none
 };
 
 // A profile from its texts; throws std::invalid_argument, one sentence, in which `prefix` stands

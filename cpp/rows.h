@@ -31,8 +31,7 @@ inline int FindRow(const mjData* d, int first, int last, int expected, int type,
 // Calls visit(row, side) for the rows of the joint's limit; side is 1 at the low end, -1 at the
 // high one. A margin may bring both ends near.
 template <typename Visit>
-void ForEachLimit(const mjModel* m, const mjData* d, bool sparse, int joint, int dof,
-                  const Visit& visit) {
+void ForEachLimit(const mjModel* m, const mjData* d, int joint, int dof, const Visit& visit) {
   const int first = d->ne + d->nf, last = first + d->nl;
   const auto is_own = [&](int row) {
     return row >= first && row < last && d->efc_type[row] == mjCNSTR_LIMIT_JOINT &&
@@ -42,37 +41,39 @@ void ForEachLimit(const mjModel* m, const mjData* d, bool sparse, int joint, int
   if (is_own(row - 1)) --row;
   for (; is_own(row); ++row) {
     const std::ptrdiff_t dense = static_cast<std::ptrdiff_t>(row) * m->nv + dof;
-    visit(row, d->efc_J[sparse ? d->efc_J_rowadr[row] : dense]);
+    visit(row, d->efc_J[mj_isSparse(m) ? d->efc_J_rowadr[row] : dense]);
   }
 }
 
 // What of the step is the same for all joints.
 struct Step {
+  const mjModel* m;
   double h, per_h;
   bool spring, damper, friction;  // not disabled
   bool keeps_rows;                // the solver will use the rows as they are set here
-  bool dual, sparse;
 
   explicit Step(const mjModel* m)
-      : h(m->opt.timestep),
+      : m(m),
+        h(m->opt.timestep),
         per_h(1 / h),
         spring(!(m->opt.disableflags & kNoSpring)),
         damper(!(m->opt.disableflags & kNoDamper)),
         friction(!(m->opt.disableflags & mjDSBL_FRICTIONLOSS)),
         // the discrete integrator makes the rows anew behind the plugin, and noslip drops the
         // compliance of friction rows
-        keeps_rows(!IsDiscrete(m) && m->opt.noslip_iterations == 0),
-        dual(m->opt.solver == mjSOL_PGS || m->opt.noslip_iterations > 0),
-        sparse(mj_isSparse(m)) {}
+        keeps_rows(!IsDiscrete(m) && m->opt.noslip_iterations == 0) {}
+
+  // Whether the solver takes the rows in their dual form.
+  bool IsDual() const { return m->opt.solver == mjSOL_PGS || m->opt.noslip_iterations > 0; }
 };
 
 // Gives the row another D, wherever the solvers read it.
 inline void SetD(const Step& step, mjData* d, int row, double D) {
   const double R = 1 / D;
   // the dual solvers see R on the diagonal of A + R, which mj_inverse does not make
-  if (step.dual && d->efc_AR) {
+  if (step.IsDual() && d->efc_AR) {
     mjtNum* diagonal = d->efc_AR + static_cast<std::ptrdiff_t>(row) * (d->nefc + 1);
-    if (step.sparse) {
+    if (mj_isSparse(step.m)) {
       const int* colind = d->efc_AR_colind + d->efc_AR_rowadr[row];
       const int* found = std::find(colind, colind + d->efc_AR_rownnz[row], row);
       diagonal = d->efc_AR + (found - d->efc_AR_colind);
