@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -101,6 +102,12 @@ def test_modules_that_are_missing_and_broken(tmp_path):
     assert "jax is torn" in mjx["found"]
     assert "'scipy>=" in libraries["remedy"]
     assert found["key: Claude"]["state"] == "missing"
+
+
+def test_every_library_that_joda_requires_is_tried():
+    """Diagnosis may need one that other commands do without."""
+    required = {re.match("[a-z-]+", one).group() for one in doctor._required()} - {"mujoco"}
+    assert required == {{"PIL": "pillow"}.get(name, name) for name in doctor.LIBRARIES}
 
 
 def test_it_says_which_joda_this_is():

@@ -228,7 +228,7 @@ def test_the_sdf_is_the_scene(scene, model, tmp_path):
     root = ET.parse(tmp_path / "o.sdf").getroot().find("model")
     anchors, axes = poses(model, JOINTS, dict.fromkeys(JOINTS, 0.0))
     for name, anchor, axis in zip(JOINTS, anchors, axes, strict=True):
-        position, turn = sdf_frame(root, name)
+        position, turn = sdf_frame(root, f"{name}_link")  # a joint has the body's name
         assert np.allclose(position, anchor, atol=1e-7)
         element = root.find(f"joint[@name='{name}']/axis")
         written = np.array(element.findtext("xyz").split(), float)
@@ -245,7 +245,120 @@ def test_the_sdf_is_the_scene(scene, model, tmp_path):
     assert root.find("joint[@name='ball_joint']") is None  # it is free
     assert root.find("link[@name='ball']") is not None
     uri = root.findtext(".//mesh/uri")
-    assert (tmp_path / uri).stat().st_size == 84 + 4 * 50
+    lines = [line.split() for line in (tmp_path / uri).read_text().splitlines()]
+    corners = np.array([line[1:] for line in lines if line[0] == "v"], float)
+    faces = np.array([line[1:] for line in lines if line[0] == "f"], int) - 1
+    assert len(corners) == len(faces) == 4 and len(lines) == 8
+    assert np.linalg.norm(np.cross(*np.diff(corners[faces], axis=1).swapaxes(0, 1)), axis=1).all()
+    volume = np.linalg.det(corners[faces]).sum() / 6
+    assert volume == pytest.approx(0.2 * 0.3 * 0.1 / 6)
+
+
+BESIDE = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 .1"/>
+    <body name="ground">
+      <geom size=".1"/>
+      <body name="lid"><joint name="lid" range="0 90" limited="true"/><geom size=".1" pos=".2 0 0"/>
+        <body name="sensor" pos=".1 0 0"/>
+        <body name="lid_link" pos="0 .2 0">
+          <joint name="hatch" axis="0 1 0" damping="10" frictionloss=".5" armature=".1"
+            stiffness="3" springref="30"/>
+          <geom size=".05"/>
+          <body name="sensor_joint"><joint name="bare" axis="1 0 0"/><geom size=".05"/></body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"""
+"""One joint has a profile, one native elements, one nothing; and names that may collide."""
+ONLY_LID = Profile(
+    joint=Joint(name="lid", type="hinge", range=(0, np.pi / 2), unit="rad"),
+    channels=Channels(friction=Resistance(components=(part(0, 1, 0.4, 0.2),))),
+)
+
+
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("beside")
+    (folder / "plain.xml").write_text(BESIDE)
+    joda.attach(folder / "plain.xml", ONLY_LID, folder / "scene.xml")
+    return folder / "scene.xml"
+
+
+def test_in_sdf_all_of_a_model_have_names_of_their_own(beside, tmp_path):
+    export(beside, "sdf", tmp_path / "o.sdf")
+    root = ET.parse(tmp_path / "o.sdf").getroot().find("model")
+    names = [one.get("name") for one in root if one.tag in ("link", "joint")]
+    assert len(set(names)) == len(names) == 6 + 6 and "world" not in names
+    links = {one.get("name") for one in root.findall("link")}
+    for joint in root.findall("joint"):
+        assert joint.findtext("child") in links
+        assert joint.findtext("parent") in links | {"world"}
+    assert {"lid", "hatch", "bare"} <= {one.get("name") for one in root.findall("joint")}
+
+
+def test_what_has_no_mass_weighs_next_to_nothing(beside, tmp_path):
+    """An SDF link without a mass weighs 1 kg, one of USD what its shapes make of it."""
+    export(beside, "sdf", tmp_path / "o.sdf")
+    root = ET.parse(tmp_path / "o.sdf").getroot().find("model")
+    masses = [float(one.findtext("inertial/mass")) for one in root.findall("link")]
+    whole = mujoco.MjModel.from_xml_path(str(beside)).body_mass.sum()
+    assert sum(masses) == pytest.approx(whole, rel=1e-8) and all(mass > 0 for mass in masses)
+    assert all(float(one.text) > 0 for one in root.iterfind("link/inertial/inertia/*"))
+
+    from pxr import Usd, UsdPhysics
+
+    export(beside, "usd", tmp_path / "o.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "o.usda"))
+    bodies = [one for one in stage.Traverse() if one.HasAPI(UsdPhysics.RigidBodyAPI)]
+    masses = [UsdPhysics.MassAPI(one).GetMassAttr().Get() for one in bodies]
+    assert len(masses) == 5 and sum(masses) == pytest.approx(whole) and all(m > 0 for m in masses)
+
+
+def test_a_joint_without_a_profile_keeps_what_the_scene_gives_it(beside, tmp_path):
+    told = export(beside, "urdf", tmp_path / "o.urdf")
+    assert [one.joint for one in told.joints] == ["lid"]  # errors are those of profiles
+    assert set(told.notes) == {
+        "1 joint armature is left out",
+        "1 native spring is left out",
+        "URDF has no plane: 1 plane is left out",
+    }
+    urdf = mujoco.MjModel.from_xml_path(str(tmp_path / "o.urdf"))
+    assert [float(urdf.joint("hatch").damping[0]), *urdf.joint("hatch").frictionloss] == [10, 0.5]
+    assert [float(urdf.joint("bare").damping[0]), *urdf.joint("bare").frictionloss] == [0, 0]
+
+    told = export(beside, "sdf", tmp_path / "o.sdf")
+    assert told.notes == ("1 joint armature is left out",)
+    root = ET.parse(tmp_path / "o.sdf").getroot().find("model")
+    dynamics = root.find("joint[@name='hatch']/axis/dynamics")
+    written = [(one.tag, pytest.approx(float(one.text), rel=1e-8)) for one in dynamics]
+    springref = np.radians(30)
+    assert written == [
+        ("damping", 10),
+        ("friction", 0.5),
+        ("spring_reference", springref),
+        ("spring_stiffness", 3),
+    ]
+
+    from pxr import Usd, UsdPhysics
+
+    assert export(beside, "usd", tmp_path / "o.usda").notes == ()
+    stage = Usd.Stage.Open(str(tmp_path / "o.usda"))
+    joint = stage.GetPrimAtPath("/o/joint_hatch")
+    drive = UsdPhysics.DriveAPI.Get(joint, "angular")
+    assert np.degrees(drive.GetDampingAttr().Get()) == pytest.approx(10)
+    assert drive.GetTargetPositionAttr().Get() == pytest.approx(30)
+    assert joint.GetAttribute("mjc:frictionloss").Get() == 0.5
+    assert joint.GetAttribute("mjc:armature").Get() == 0.1
+
+
+def test_powers_that_no_other_format_has_are_told(tmp_path):
+    (tmp_path / "plain.xml").write_text(BESIDE.replace('damping="10"', 'damping="10 2"'))
+    joda.attach(tmp_path / "plain.xml", ONLY_LID, tmp_path / "scene.xml")
+    notes = export(tmp_path / "scene.xml", "sdf", tmp_path / "o.sdf").notes
+    assert "1 damping polynomial is left out" in notes
 
 
 def sdf_frame(root, name):

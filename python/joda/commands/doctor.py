@@ -34,7 +34,7 @@ EXTRAS = {
     "ray": ("ray",),
 }
 """What each extra lets one import."""
-LIBRARIES = "numpy", "scipy", "pydantic", "matplotlib", "PIL", "rich", "typer"
+LIBRARIES = "numpy", "scipy", "pydantic", "matplotlib", "PIL", "rich", "threadpoolctl", "typer"
 RENDERERS = {
     "egl": ("pictures: EGL", "EGL", "libegl1 libgl1-mesa-dri"),
     "osmesa": ("pictures: OSMesa", "OSMesa", "libosmesa6"),

@@ -8,8 +8,9 @@ from joda.errors import JodaError
 from joda.exporting.markup import meshes_of
 from joda.exporting.native import native
 from joda.exporting.nearest import Format, Nearest, nearest
+from joda.exporting.plain import lacking, plain
 from joda.exporting.sdf import sdf
-from joda.exporting.tree import Link, links_of, stl
+from joda.exporting.tree import Link, left_out, links_of, obj
 from joda.exporting.urdf import urdf
 from joda.exporting.usd import usd
 from joda.files import check_target, file_name, write_together
@@ -41,7 +42,7 @@ def export(scene: str | Path, to: Format, output: str | Path, *, force: bool = F
         to: "native": MJCF without the plugin, with MuJoCo's polynomial spring and damping; "urdf":
             damping and friction; "sdf": a linear spring, damping and friction; "usd": a drive as
             linear spring and damping, and friction as PhysX and MuJoCo read it.
-        output: the file; meshes lie beside it as STL, but for USD, which holds them, and MJCF.
+        output: the file; meshes lie beside it as OBJ, but for USD, which holds them, and MJCF.
         force: overwrite files.
 
     Returns:
@@ -70,16 +71,23 @@ def export(scene: str | Path, to: Format, output: str | Path, *, force: bool = F
         return Exported((output,), told, tuple(_lost(told)))
 
     links, left = links_of(model)
-    notes = [*left, *_lacking(links, to), *_lost(told)]
-    by_name = {links[model.jnt_bodyid[joint]].joint: one for joint, one in own.items()}
+    movable = [link.kind in ("hinge", "slide") for link in links]
+    scene_own = [
+        plain(model, joint, links[body].joint)
+        for joint, body in enumerate(model.jnt_bodyid)
+        if movable[body] and joint not in own
+    ]
+    notes = [*left, *_lacking(links, to), *lacking(scene_own, to), *_lost(told)]
+    by_name = {one.joint: one for one in scene_own}
+    by_name |= {links[model.jnt_bodyid[joint]].joint: one for joint, one in own.items()}
     name = file_name(output.stem)
     if to == "usd":
         write_together({output: usd(model, name, links, by_name, notes)})
         return Exported((output,), told, tuple(notes))
-    meshes = {k: f"{name}.mesh_{k}.stl" for k in sorted(meshes_of(links))}
+    meshes = {k: f"{name}.mesh_{k}.obj" for k in sorted(meshes_of(links))}
     write = urdf if to == "urdf" else sdf
     contents: dict[Path, bytes | str] = {
-        output.with_name(file): stl(model, mesh) for mesh, file in meshes.items()
+        output.with_name(file): obj(model, mesh) for mesh, file in meshes.items()
     }
     for path in contents:
         check_target(path, force)
@@ -93,12 +101,13 @@ def _lost(told: Sequence[Nearest]) -> list[str]:
 
 
 def _lacking(links: Sequence[Link], to: Format) -> list[str]:
-    """Shapes that the format has no word for."""
-    if to != "urdf":
-        return []
-    kinds = [shape.kind for link in links for shape in link.shapes]
-    return [
-        f"URDF has no {kind}; {kinds.count(kind)} of them are left out"
-        for kind in ("plane", "ellipsoid")
-        if kind in kinds
-    ]
+    """Shapes and inertias that the format has no word for."""
+    out = []
+    armatures = sum(link.armature > 0 for link in links)
+    if armatures and to != "usd":
+        out.append(left_out(armatures, "joint armature"))
+    if to == "urdf":
+        kinds = [shape.kind for link in links for shape in link.shapes]
+        counted = [(kinds.count(kind), kind) for kind in ("plane", "ellipsoid")]
+        out += [f"URDF has no {kind}: {left_out(n, kind)}" for n, kind in counted if n]
+    return out

@@ -1,11 +1,12 @@
 """SDFormat: a linear spring, damping and friction of a joint."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 from joda.exporting.markup import angles, child, rendered, text
 from joda.exporting.nearest import Nearest
-from joda.exporting.tree import Array, Link, Shape
+from joda.exporting.tree import LEAST_MASS, LEAST_MOMENT, Array, Link, Shape, unique
 
 VERSION = "1.9"
 KINDS = {"fixed": "fixed", "slide": "prismatic"}
@@ -19,6 +20,7 @@ def sdf(
     notes: Sequence[str],
 ) -> str:
     """The file's text; arguments as of `urdf`."""
+    links = _apart(links)
     root = ET.Element("sdf", version=VERSION)
     model = child(root, "model", name=name)
     child(model, "static", "false")
@@ -32,6 +34,14 @@ def sdf(
     return rendered(root, notes)
 
 
+def _apart(links: Sequence[Link]) -> list[Link]:
+    """The links with names that neither a joint nor SDF's world has: all in a model are apart."""
+    joints = [link.joint for link in links]
+    plain = ["ground" if link.parent < 0 else link.name for link in links]
+    names = unique([f"{name}_link" if name in joints else name for name in plain], joints)
+    return [replace(link, name=name) for link, name in zip(links, names, strict=True)]
+
+
 def _above(link: Link, links: Sequence[Link]) -> str:
     """Name of the link's parent; the world's where that has nothing in it."""
     parent = links[link.parent] if link.parent >= 0 else None
@@ -39,18 +49,16 @@ def _above(link: Link, links: Sequence[Link]) -> str:
 
 
 def _link(model: ET.Element, link: Link, links: Sequence[Link], meshes: Mapping[int, str]) -> None:
-    called = _called(link)
-    element = child(model, "link", name=called)
+    element = child(model, "link", name=link.name)
     above = _above(link, links)
-    relative = {} if above == "world" else {"relative_to": _named(above)}
+    relative = {} if above == "world" else {"relative_to": above}
     _pose(element, link.position, link.turn, **relative)
-    if link.mass > 0:
-        inertial = child(element, "inertial")
-        _pose(inertial, link.centre, link.principal)
-        child(inertial, "mass", text(link.mass))
-        inertia = child(inertial, "inertia")
-        for tag, moment in zip(("ixx", "iyy", "izz"), link.moments, strict=True):
-            child(inertia, tag, text(moment))
+    inertial = child(element, "inertial")  # without it a link weighs 1 kg
+    _pose(inertial, link.centre, link.principal)
+    child(inertial, "mass", text(max(link.mass, LEAST_MASS)))
+    inertia = child(inertial, "inertia")
+    for tag, moment in zip(("ixx", "iyy", "izz"), link.moments.tolist(), strict=True):
+        child(inertia, tag, text(max(moment, LEAST_MOMENT)))
     for number, shape in enumerate(link.shapes):
         for use in (*["visual"] * shape.seen, *["collision"] * shape.collides):
             part = child(element, use, name=f"{use}_{number}")
@@ -80,9 +88,8 @@ def _geometry(parent: ET.Element, shape: Shape, meshes: Mapping[int, str]) -> No
 def _joint(model: ET.Element, link: Link, links: Sequence[Link], constants: Nearest | None) -> None:
     kind = KINDS.get(link.kind) or ("revolute" if link.limits else "continuous")
     element = child(model, "joint", name=link.joint, type=kind)
-    above = _above(link, links)
-    child(element, "parent", "world" if above == "world" else _named(above))
-    child(element, "child", _called(link))
+    child(element, "parent", _above(link, links))
+    child(element, "child", link.name)
     if link.kind not in ("hinge", "slide"):
         return
     axis = child(element, "axis")
@@ -97,15 +104,6 @@ def _joint(model: ET.Element, link: Link, links: Sequence[Link], constants: Near
         child(dynamics, "friction", text(constants.friction))
         child(dynamics, "spring_reference", text(constants.reference))
         child(dynamics, "spring_stiffness", text(constants.stiffness[0]))
-
-
-def _called(link: Link) -> str:
-    return _named(link.name)
-
-
-def _named(name: str) -> str:
-    """A link's name: "world" means another thing to SDF."""
-    return "ground" if name == "world" else name
 
 
 def _pose(parent: ET.Element, position: Array, turn: Array, **attributes: str) -> None:

@@ -1,6 +1,6 @@
 """A scene as links and joints, the frames of which are where other formats want them."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -12,6 +12,8 @@ from joda.files import file_name
 
 Array = NDArray[np.float64]
 
+LEAST_MASS, LEAST_MOMENT = 1e-9, 1e-12
+"""Of a link in SDF and USD (kg, kg·m²), where what has no mass of its own is given one."""
 SHOWN = 3
 """Geoms of lower groups are seen, as in MuJoCo's viewer."""
 KINDS = {
@@ -92,21 +94,27 @@ def links_of(model: mujoco.MjModel) -> tuple[list[Link], list[str]]:
     anchors = [_anchor(model, body) for body in range(model.nbody)]
     out = [_link(model, k, names[k], joints[k], anchors, left) for k in range(model.nbody)]
     for what, number in (
-        ("equality constraints", _equalities(model)),
-        ("actuators", model.nu),
-        ("tendons", model.ntendon),
+        ("equality constraint", _equalities(model)),
+        ("actuator", model.nu),
+        ("tendon", model.ntendon),
     ):
         if number:
-            left.append(f"{number} {what} are left out")
+            left.append(left_out(number, what))
     return out, left
 
 
-def unique(names: Sequence[str]) -> list[str]:
-    """The names with nothing in them but what files and elements take, no two the same."""
+def left_out(number: int, what: str) -> str:
+    """The sentence that so many of it are not in the file."""
+    return f"{number} {what}{'s are' if number > 1 else ' is'} left out"
+
+
+def unique(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:
+    """The names with nothing in them but what files and elements take, no two the same, none of
+    those that are taken."""
     out: list[str] = []
     for name in map(file_name, names):
         one, k = name, 2
-        while one in out:
+        while one in out or one in taken:
             one, k = f"{name}_{k}", k + 1
         out.append(one)
     return out
@@ -232,9 +240,9 @@ def triangles(model: mujoco.MjModel, mesh: int) -> tuple[Array, NDArray[np.int64
     return np.array(model.mesh_vert[vertices], float), np.array(model.mesh_face[faces], np.int64)
 
 
-def stl(model: mujoco.MjModel, mesh: int) -> bytes:
-    """A mesh as a binary STL file."""
+def obj(model: mujoco.MjModel, mesh: int) -> str:
+    """A mesh as a Wavefront OBJ file, which all of Gazebo, Drake, PyBullet and MuJoCo take."""
     corners, faces = triangles(model, mesh)
-    record = np.zeros(len(faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("", "<u2")])
-    record["corners"] = corners[faces]
-    return b"\0" * 80 + np.uint32(len(faces)).tobytes() + record.tobytes()
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in corners.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+    return "\n".join(lines) + "\n"

@@ -13,7 +13,17 @@ import numpy as np
 
 from joda.errors import JodaError
 from joda.exporting.nearest import Nearest
-from joda.exporting.tree import Array, Link, Shape, product, rotated, triangles, unique
+from joda.exporting.tree import (
+    LEAST_MASS,
+    LEAST_MOMENT,
+    Array,
+    Link,
+    Shape,
+    product,
+    rotated,
+    triangles,
+    unique,
+)
 
 
 def usd(
@@ -93,11 +103,11 @@ def _link(
     _place(prim, *frame)
     if link.parent >= 0:  # else it is the world
         UsdPhysics.RigidBodyAPI.Apply(prim)
-    if link.mass > 0:
-        mass = UsdPhysics.MassAPI.Apply(prim)
-        mass.CreateMassAttr(link.mass)
+        mass = UsdPhysics.MassAPI.Apply(prim)  # without it the mass is that of the shapes
+        mass.CreateMassAttr(max(link.mass, LEAST_MASS))
         mass.CreateCenterOfMassAttr(Gf.Vec3f(*link.centre.tolist()))
-        mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*link.moments.tolist()))
+        moments = np.maximum(link.moments, LEAST_MOMENT)
+        mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
         mass.CreatePrincipalAxesAttr(Gf.Quatf(*link.principal.tolist()))
     for number, shape in enumerate(link.shapes):
         _shape(stage, model, shape, path.AppendChild(f"geom_{number}"))
