@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.commands.bench import SWING, seconds
+from joda.commands.bench import seconds
 from joda.component import Component
 from joda.files import check_target
 from joda.pictures.style import COLOURS, INK, house_style, write_png
@@ -96,8 +96,7 @@ def bench_plot(
 
 def _fastest(models: Sequence[mujoco.MjModel]) -> NDArray[np.float64]:
     """Seconds per step of each, of the fastest round: what else the machine does only adds."""
-    steps = max(20, SWING // models[0].nv)  # so short that a busy machine seldom breaks in
-    times = [[seconds(model, steps=steps) for model in models] for _ in range(ROUNDS)]
+    times = [[seconds(model) for model in models] for _ in range(ROUNDS)]
     fastest: NDArray[np.float64] = np.min(times, axis=0)
     return fastest
 
