@@ -34,7 +34,7 @@ from joda.pictures.page import page, paragraph, picture, table
 from joda.plain import LONGEST, one_line, plain
 from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.history import History
-from joda.propose.session import Session
+from joda.propose.session import NONE, Session
 from joda.propose.wishes import read_wishes
 from joda.scenes.scene import read_profiles
 
@@ -557,7 +557,7 @@ def test_the_key_is_told_nobody(name, server, tmp_path, caplog):
     caplog.set_level(logging.DEBUG)
     server.script[:] = [LEAKS[name]]
     model = Path(__file__).parents[1] / "models" / "refrigerator.xml"
-    session = Session.start(tmp_path / "out", model, "door", pictures=0)
+    session = Session.start(tmp_path / "out", model, "door", pictures=NONE)
     proposer, told = Anthropic("claude-test", server.url), ""
     try:
         session.ask(proposer)

@@ -28,7 +28,7 @@ from joda.propose import openai as proposer
 from joda.propose.asking import ProposalFailed, ProposalInterrupted
 from joda.propose.openai import OpenAI
 from joda.propose.prompt import MAX_TOKENS
-from joda.propose.session import Session
+from joda.propose.session import NONE, Session
 
 MODELS = Path(__file__).parents[1] / "models"
 
@@ -306,7 +306,7 @@ def test_the_key_is_told_nobody(name, server, tmp_path, caplog, monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     caplog.set_level(logging.DEBUG)
     server.script[:] = [LEAKS[name]]
-    session = Session.start(tmp_path / "out", MODELS / "refrigerator.xml", "door", pictures=0)
+    session = Session.start(tmp_path / "out", MODELS / "refrigerator.xml", "door", pictures=NONE)
     asking, told = OpenAI("qwen-test", server.address), ""
     try:
         session.ask(asking)

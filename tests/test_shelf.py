@@ -9,7 +9,7 @@ from joda import generate_all, render
 from joda.pictures import offscreen
 from joda.pictures.offscreen import NoRenderer
 from joda.propose.offline import Offline
-from joda.propose.session import Session
+from joda.propose.session import NONE, Session
 from joda.scenes import model as loading
 from joda.scenes.model import load, load_model
 from joda.scenes.shelf import KEPT, loading_once, shelf_name
@@ -86,7 +86,7 @@ def test_a_session_leaves_the_model_as_it_was(tmp_path):
     path = pair(tmp_path / "models")
     with loading_once(path):
         for joint in ("left", "right"):
-            Session.start(tmp_path / joint, path, joint, pictures=0).ask(Offline())
+            Session.start(tmp_path / joint, path, joint, pictures=NONE).ask(Offline())
         kept = content(load_model(path))
     assert np.array_equal(kept, content(load_model(path)))
 

@@ -26,7 +26,7 @@ from joda.propose import Task
 from joda.propose.offline import Offline
 from joda.propose.recognise import gravity_role
 from joda.propose.replies import parse, parse_ablation
-from joda.propose.session import Session
+from joda.propose.session import NONE, Session
 from joda.propose.wishes import Wanted, unmet
 from joda.template import read_templates
 
@@ -116,7 +116,7 @@ def loop(name: str, key: str) -> Loop:
     joint, wanted = OBJECTS[name]
     with TemporaryDirectory() as folder:
         model = MODELS / f"{name}.xml"
-        session = Session.start(Path(folder), model, joint, "", key=key, pictures=0)
+        session = Session.start(Path(folder), model, joint, "", key=key, pictures=NONE)
         propose(session, Offline(key), MOST)
     found, turns = session.context, session.turns
     first, last = turns[0], turns[-1]

@@ -13,7 +13,7 @@ from joda.commands.generate import ROUNDS, run
 from joda.files import write_text
 from joda.profile import Profile
 from joda.propose.offline import Offline
-from joda.propose.session import Session
+from joda.propose.session import NONE, Session
 from joda.scenes.attaching import attach
 from joda.scenes.context import Context
 from joda.scenes.model import load_model
@@ -60,7 +60,7 @@ def try_case(case: Case, key: str, folder: Path) -> Tried:
         JodaError: the folder cannot be written.
     """
     model = bundled(case.model)
-    session = Session.start(folder, model, case.joint, case.describe, key=key, pictures=0)
+    session = Session.start(folder, model, case.joint, case.describe, key=key, pictures=NONE)
     run(session, Offline(key), ROUNDS)
     found, trial = session.context, case.trial
     proposed = [turn.profile for turn in session.turns]

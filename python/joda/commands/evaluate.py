@@ -15,7 +15,7 @@ from joda.propose import Proposer, Usage, total
 from joda.propose.asking import Effort, ProposalFailed
 from joda.propose.expected import ENDING, Expectations, Expected, model_of
 from joda.propose.offline import Offline
-from joda.propose.session import PICTURES, Session
+from joda.propose.session import NONE, PICTURES, Session
 from joda.scenes.model import describe_joint, find_joint, load_model
 
 RESULT = "evaluation.json"
@@ -190,7 +190,7 @@ def _judge(
                 said,
                 templates,
                 key,
-                pictures=0 if isinstance(proposer, Offline) else PICTURES,
+                pictures=NONE if isinstance(proposer, Offline) else PICTURES,
             )
         run(session, proposer, rounds, force=True)
     except JodaError as error:

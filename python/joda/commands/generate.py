@@ -14,7 +14,7 @@ from joda.proposal import Proposal
 from joda.propose import Proposer
 from joda.propose.asking import Effort
 from joda.propose.history import History
-from joda.propose.session import PICTURES, Progress, Session, relative, silent
+from joda.propose.session import PICTURES, Pictures, Progress, Session, relative, silent
 from joda.scenes.model import find_joint, joint_name, joint_type, load_model
 from joda.scenes.shelf import loading_once
 from joda.template import read_templates
@@ -125,7 +125,7 @@ def begin(
     key: str,
     resume: bool,
     progress: Progress = silent,
-    pictures: int = PICTURES,
+    pictures: Pictures = PICTURES,
 ) -> Session:
     """The session that a folder holds, if it is to be resumed, or a new one; raises JodaError."""
     if not resume or not (folder / "history.json").is_file():

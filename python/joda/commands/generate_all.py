@@ -13,7 +13,7 @@ from joda.files import file_name, make_folder, read_text, write_text
 from joda.propose import Ask, BatchProposer, Proposer
 from joda.propose.asking import Effort
 from joda.propose.offline import Offline
-from joda.propose.session import PICTURES, Session
+from joda.propose.session import PICTURES, Pictures, Session
 from joda.propose.sheet import Entry, sheet
 from joda.scenes.model import load_model
 from joda.scenes.shelf import loading_once
@@ -24,8 +24,8 @@ Results = dict[str, Generated | JodaError]
 SHEET = "sheet.html"
 """The contact sheet."""
 
-BOTH_ENDS = 2
-"""Pictures of a joint that nobody looks at but the sheet."""
+BOTH_ENDS = Pictures(2, (480, 360))
+"""Pictures of a joint that nobody looks at but the sheet, which shows them half as large."""
 
 MODELS = (".xml", ".urdf")
 """How names of models end."""

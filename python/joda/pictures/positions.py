@@ -19,7 +19,7 @@ from joda.errors import JodaError
 from joda.files import check_target, file_name, make_folder, write_bytes
 from joda.pictures.canvas import Canvas
 from joda.pictures.caption import captioned
-from joda.pictures.offscreen import Image, answer, ask
+from joda.pictures.offscreen import HEIGHT, WIDTH, Image, answer, ask
 from joda.pictures.stage import Stage, View
 from joda.pictures.style import COMPRESSED, clean
 from joda.profile import Joint
@@ -37,7 +37,13 @@ TRIED = 8
 
 
 def render(
-    model: str | Path, joint: str, output: str | Path, *, count: int = 5, force: bool = False
+    model: str | Path,
+    joint: str,
+    output: str | Path,
+    *,
+    count: int = 5,
+    size: tuple[int, int] = (WIDTH, HEIGHT),
+    force: bool = False,
 ) -> list[Path]:
     """Writes pictures of a joint at evenly spaced positions, from the low to the high end.
 
@@ -49,10 +55,11 @@ def render(
         joint: a hinge or slide with a range, as `joda.scenes.model.find_joint` takes it.
         output: folder; created if missing.
         count: how many pictures, at least 2.
+        size: width and height of each, pixels.
         force: overwrite pictures that exist.
 
     Returns:
-        the pictures, 960 x 720 PNG, named by the joint and its normalised position:
+        the pictures, PNG, named by the joint and its normalised position:
         door_0.00.png, door_0.25.png, ...
 
     Raises:
@@ -62,19 +69,19 @@ def render(
     """
     if count < 2:
         raise JodaError(f"count is {count}; give at least 2 pictures, one for each end.")
-    request = [str(model), joint, str(output), count, force, shelf_name()]
+    request = [str(model), joint, str(output), count, size, force, shelf_name()]
     return [Path(target) for target in ask("joda.pictures.positions", request)]
 
 
 def _make(request: Any) -> list[str]:
     """In the child: renders and writes the pictures that `render` is asked for."""
-    path, address, folder, count, force, shelf = request
+    path, address, folder, count, size, force, shelf = request
     model, canvas = _opened(path, shelf)
     index = find_joint(model, address)
     joint = describe_joint(model, index)
     if not moving(model, index):
         raise JodaError(f"{path}: joint '{joint.name}' moves no geom that can be seen.")
-    stage = Stage(copy(model), index, canvas)
+    stage = Stage(copy(model), index, canvas, tuple(size))
     fractions = np.linspace(0, 1, count)
     stem = file_name(joint.name)
     digits = max(2, len(str(count - 2)))
@@ -241,7 +248,7 @@ def _shots(stage: Stage, positions: Array) -> Iterator[Image]:
     view = _choose(stage, _views(kind, axis, out), union, (lo, (lo + hi) / 2, hi))
     # The arrow on the side of the part that is turned to the camera.
     marks = min(options, key=lambda mark: float(mark.path.mean(axis=0) @ view.frame()[2]))
-    stage.settle(view.camera(np.concatenate([union, marks.path])), marks.add)
+    stage.settle(stage.camera(view, np.concatenate([union, marks.path])), marks.add)
     for position in positions:
         stage.pose(position)
         yield stage.shoot()
@@ -255,7 +262,7 @@ def _choose(
 ) -> View:
     """The view that shows most of the part at all positions, rad or m, and most of its motion."""
     views, suits = zip(*candidates, strict=True)
-    cameras = [view.camera(union) for view in views]
+    cameras = [stage.camera(view, union) for view in views]
     clear = []
     for position in positions:
         stage.pose(position)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.pictures.canvas import SMALL, Canvas
-from joda.pictures.offscreen import HEIGHT, WIDTH, Image
+from joda.pictures.offscreen import Image
 from joda.scenes.part import Array, groups, moving, outline
 
 Mask = NDArray[np.bool_]
@@ -47,13 +47,16 @@ class View:
         up = -np.cos(a) * np.sin(e), -np.sin(a) * np.sin(e), np.cos(e)
         return np.array([right, up, (np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e))])
 
-    def camera(self, points: Array) -> mujoco.MjvCamera:
-        """The nearest camera that has all points, shape (n, 3), within MARGIN of the frame."""
+    def camera(self, points: Array, aspect: float) -> mujoco.MjvCamera:
+        """The nearest camera that has all points, shape (n, 3), within MARGIN of the frame.
+
+        The frame is `aspect` times as wide as high.
+        """
         right, up, forward = self.frame()
         depth = points @ forward
         slope = MARGIN * np.tan(np.deg2rad(FOVY / 2))
         centre, start = [], []
-        for across, tangent in ((right, slope * WIDTH / HEIGHT), (up, slope)):
+        for across, tangent in ((right, slope * aspect), (up, slope)):
             high = np.max(points @ across - tangent * depth)
             low = np.max(-points @ across - tangent * depth)
             centre.append((high - low) / 2)
@@ -75,8 +78,18 @@ class Stage:
         part: geoms that the joint moves.
     """
 
-    def __init__(self, model: mujoco.MjModel, joint: int, canvas: Canvas) -> None:
-        """Args: a model to change; a joint's index; a canvas that was made for the same model."""
+    def __init__(
+        self, model: mujoco.MjModel, joint: int, canvas: Canvas, size: tuple[int, int]
+    ) -> None:
+        """Sets it up.
+
+        Args:
+            model: is changed.
+            joint: its index.
+            canvas: that was made for the same model.
+            size: width and height of the pictures, pixels.
+        """
+        self._size, self._aspect = size, size[0] / size[1]
         self.model, self.data = model, mujoco.MjData(model)
         self._canvas = canvas
         self.joint, self.part = joint, moving(model, joint)
@@ -120,6 +133,10 @@ class Stage:
                 for g, local in zip(self.part, self._outlines, strict=True)
             ]
         )
+
+    def camera(self, view: View, points: Array) -> mujoco.MjvCamera:
+        """The nearest camera that looks in a direction and has all points, shape (n, 3)."""
+        return view.camera(points, self._aspect)
 
     def clear(self, camera: mujoco.MjvCamera, targets: Array) -> float:
         """Share of the targets, shape (n, 3), towards which the camera has nothing in its way.
@@ -168,12 +185,12 @@ class Stage:
             self._usual = np.median(self._bare(*SMALL)[mask], axis=0) / 255
         materials = [g.matid for g, inside in self._drawn() if inside and g.matid >= 0]
         self._textured = bool(np.any(self.model.mat_texid[materials] >= 0))
-        self._canvas.resize(WIDTH, HEIGHT)
+        self._canvas.resize(*self._size)
         self._update(camera)
         self._scene.ngeom = 0
         self._add_backdrop()
         mark(self._scene)
-        alone = self._read(WIDTH, HEIGHT)
+        alone = self._read(*self._size)
         self._through = _differs(alone, BACKGROUND, 8)
         self._faint = alone[self._through].astype(float)
 
@@ -193,7 +210,7 @@ class Stage:
         way = self.data.geom_xpos - (camera.lookat - camera.distance * forward)
         depth = way @ forward
         aside = np.linalg.norm(way - np.outer(depth, forward), axis=1)
-        angle = np.arctan(np.tan(np.deg2rad(FOVY / 2)) * np.hypot(1, WIDTH / HEIGHT))
+        angle = np.arctan(np.tan(np.deg2rad(FOVY / 2)) * np.hypot(1, self._aspect))
         away = aside * np.cos(angle) - depth * np.sin(angle) > model.geom_rbound
         away &= model.geom_rbound > 0  # a plane has no bound
         away[self.part] = False
@@ -212,9 +229,9 @@ class Stage:
                 geom.rgba = [*_tint(np.array(HIGHLIGHT), change), max(0.35, geom.rgba[3])]
         self._add_backdrop()
         self._mark(self._scene)
-        picture = self._read(WIDTH, HEIGHT)
+        picture = self._read(*self._size)
         if self._textured:
-            own = self._bare(WIDTH, HEIGHT)
+            own = self._bare(*self._size)
             differs = _differs(own, self._usual, 4)
             tinted = _tint(picture[differs] / 255, own[differs] / 255 - self._usual)
             picture[differs] = np.round(255 * tinted)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -23,6 +23,7 @@ from joda.files import make_folder, read_text, write_bytes, write_text
 from joda.interaction.behaviour import Behaviour, behaviour
 from joda.interaction.surroundings import surroundings
 from joda.pictures.draw import draw
+from joda.pictures.offscreen import HEIGHT, WIDTH
 from joda.pictures.positions import render
 from joda.pictures.style import png
 from joda.plain import plain
@@ -39,8 +40,16 @@ from joda.scenes.attaching import attach
 from joda.scenes.context import Context, context
 from joda.template import read_templates
 
-PICTURES = 5
-"""Of the joint, at so many positions, for whoever looks at them."""
+
+class Pictures(NamedTuple):
+    """Of a joint: at how many positions from end to end, and how large, in pixels."""
+
+    count: int
+    size: tuple[int, int] = (WIDTH, HEIGHT)
+
+
+PICTURES, NONE = Pictures(5), Pictures(0)
+"""For a proposer that looks at them, and for nobody."""
 
 SURE = 0.5
 """How sure it must be what a joint is, before somebody's proposal is doubted for its force."""
@@ -69,7 +78,7 @@ class Session:
         folder: Path,
         history: History,
         progress: Progress = silent,
-        pictures: int = PICTURES,
+        pictures: Pictures = PICTURES,
     ) -> None:
         """Opens a session, and writes what its folder lacks.
 
@@ -77,7 +86,7 @@ class Session:
             folder: where everything is; made if missing.
             history: of a new session, without rounds, or of one to go on with.
             progress: told what is being done.
-            pictures: how many pictures of the joint, where there are none yet.
+            pictures: which pictures of the joint, where there are none yet.
 
         Raises:
             JodaError: the model, the joint or the templates are not to be had; nothing is written.
@@ -125,11 +134,11 @@ class Session:
         templates: Sequence[Path] = (),
         key: str = "",
         progress: Progress = silent,
-        pictures: int = PICTURES,
+        pictures: Pictures = PICTURES,
     ) -> "Session":
         """A new session in a folder that is made if missing; raises JodaError.
 
-        With 0 `pictures` there are none of the joint, which rules do not look at.
+        Without `pictures` there are none of the joint, which rules do not look at.
         """
         try:
             history = History(
@@ -138,7 +147,7 @@ class Session:
                 description=description,
                 templates=tuple(relative(path, folder) for path in templates),
                 key=key,
-                pictures=None if pictures else (),
+                pictures=None if pictures.count else (),
             )
         except ValidationError as error:
             raise JodaError(describe(error)) from None
@@ -391,7 +400,7 @@ class Session:
         self.notes += [note for note in said if note not in self.notes]
         write_text(self.folder / "composed.json", turn.profile.to_json())  # last, see _finished
 
-    def _pictures(self, count: int) -> list[bytes]:
+    def _pictures(self, wanted: Pictures) -> list[bytes]:
         """The joint at several positions, those of before or made now; none where none can be."""
         names = self.history.pictures
         paths = [self.folder / "pictures" / name for name in names or ()]
@@ -399,7 +408,12 @@ class Session:
             self.progress("picturing the joint")
             folder = self.folder / "pictures"
             try:
-                paths = render(self.model, self.history.joint, folder, count=count, force=True)
+                paths = render(
+                    *(self.model, self.history.joint, folder),
+                    count=wanted.count,
+                    size=wanted.size,
+                    force=True,
+                )
             except JodaError as error:
                 paths = []
                 self.notes.append(f"No pictures, the proposer goes by the text: {error}")
