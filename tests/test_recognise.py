@@ -74,14 +74,16 @@ def test_no_word_speaks_of_two_concepts(group):
     assert len(words) == len(set(words)) > 50
 
 
-@pytest.mark.parametrize("name", ["link_0", "joint_3", "solid", "slide_rail", "base", "m"])
+@pytest.mark.parametrize(
+    "name", ["link_0", "joint_3", "solid", "slide_rail", "base", "m", "left_steering_hinge_joint"]
+)
 def test_names_that_say_nothing_are_no_lids_and_no_doors(name):
     assert not concepts([name], "part") & {"lid", "door", "tap", "key"}
 
 
 def test_what_is_to_latch_is_no_latch():
-    assert "lever" in said("a latch", "part")
-    assert "lever" not in said("It latches, and needs a push to latch.", "part")
+    assert "latch" in said("a latch", "part")
+    assert "latch" not in said("It latches, and needs a push to latch.", "part")
 
 
 # --- the answer
@@ -336,6 +338,101 @@ def test_what_a_part_is_on_is_told_by_the_nearest_name(tmp_path):
     found = recognise(context(path, "j"))[1]
     assert "the object is called oven" in [one.feature for one in found.decided]
     assert found.title == "selector knob"
+
+
+SINK = (
+    '<mujoco model="{name}"><compiler angle="radian"/><worldbody><body name="{name}">'
+    '<geom type="box" size=".4 .3 .02"/><body name="handle" pos=".1 .2 .1">'
+    '<joint name="j" axis="0 1 0" range="0 .52"/><geom type="box" size=".1 .02 .02" pos=".09 0 0"/>'
+    "</body></body></worldbody></mujoco>"
+)
+
+
+def test_the_handle_of_a_sink_is_a_taps_and_that_of_a_stand_is_none(tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_text(SINK.format(name="kitchen_sink"))
+    kind, found = recognise(context(path, "j"))
+    assert found.title == "handle of a tap" and found.force.opening == (1, 22.2)
+    assert kind.wishes == ("stays_put",)
+    path.write_text(SINK.format(name="throttle"))
+    assert "tap" not in recognise(context(path, "j"))[1].title
+
+
+DOOR = (
+    '<mujoco><compiler angle="radian"/><worldbody><body name="frame">'
+    '<geom type="box" size=".02 .05 .36" pos="-.5 0 0"/><geom type="box" size=".02 .05 .36" '
+    'pos=".5 0 0"/><body name="door" pos="-.48 0 0"><joint name="j" axis="0 0 1" range="0 1.57"/>'
+    '<geom type="box" size=".3 .03 .25" pos=".3 0 0"/><body name="latch" pos=".5 0 0">'
+    '<joint name="k" axis="0 1 0" range="0 1.8"/><geom type="box" size=".2 .02 .02"/>'
+    '<geom type="cylinder" size=".02 .16" euler="1.57 0 0"/></body></body></body></worldbody>'
+    "</mujoco>"
+)
+
+
+def test_the_latch_of_a_door_is_no_throttle(tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_text(DOOR)
+    assert recognise(context(path, "k"))[1].title != "control lever"
+
+
+def test_a_spout_is_no_door(tmp_path):
+    """What turns on an upright axis at the edge of an object, and is no plate, covers nothing."""
+    path = tmp_path / "a.xml"
+    path.write_text(
+        '<mujoco><compiler angle="radian"/><worldbody><body><geom type="box" size=".5 .35 .3"/>'
+        '<body pos="0 .3 .3"><joint name="j" axis="0 0 1" range="0 3.1"/>'
+        '<geom type="box" size=".03 .03 .2" pos="0 0 .2"/>'
+        '<geom type="box" size=".2 .03 .03" pos=".2 0 .4"/></body></body></worldbody></mujoco>'
+    )
+    assert recognise(context(path, "j"))[1].title == "spout"
+
+
+# --- robots
+ROBOT = (
+    '<mujoco><compiler angle="radian"/><worldbody>{bodies}</worldbody>'
+    "<actuator>{motor}</actuator><equality>{held}</equality></mujoco>"
+)
+
+
+def links(count, name="link"):
+    """So many links in a row, as a body."""
+    out = ""
+    for k in reversed(range(count)):
+        out = (
+            f'<body name="{name}_{k}" pos=".25 0 0"><joint name="{name}{k}" axis="0 1 0" '
+            f'range="-1.5 1.5"/><geom type="box" size=".12 .03 .03" pos=".12 0 0"/>{out}</body>'
+        )
+    return out
+
+
+@pytest.mark.parametrize(
+    ("count", "joint", "motor", "held", "robot"),
+    [
+        (6, "a2", "", "", True),  # six in a row, as a URDF has them
+        (3, "a1", "", "", False),  # a lamp
+        (3, "a2", '<motor joint="a0"/>', "", True),  # what a motor carries
+        (3, "a0", '<motor joint="a2"/>', "", True),  # what carries a motor
+        (3, "a1", '<motor joint="b0"/>', "", False),  # another's motor
+        (3, "a0", '<motor joint="b0"/>', '<connect body1="a_2" body2="b_0" anchor="0 0 0"/>', True),
+        (3, "a1", '<motor joint="b0"/>', '<joint joint1="a1" joint2="b0"/>', True),
+        (3, "a1", "", '<joint joint1="a1" joint2="b0"/>', False),
+        (3, "a1", '<motor joint="b0"/>', '<joint joint1="a1" joint2="b0" active="false"/>', False),
+    ],
+)
+def test_a_robots_joint_is_told_whichever_of_its_joints_the_motors_are_on(
+    tmp_path, count, joint, motor, held, robot
+):
+    path = tmp_path / "a.xml"
+    foot = '<geom type="box" size=".1 .1 .1" pos="0 0 -.2"/>'
+    bodies = "".join(
+        f'<body pos="0 {y} 0">{foot}{links(many, name)}</body>'
+        for y, many, name in ((0, count, "a"), (1, 1, "b"))
+    )
+    path.write_text(ROBOT.format(bodies=bodies, motor=motor, held=held))
+    found = context(path, joint)
+    assert found.shape.machine is robot
+    title = recognise(found)[1].title
+    assert (title in ("robot joint", "joint of an unknown kind")) is robot
 
 
 # --- how fast it shuts, where it holds

@@ -71,7 +71,7 @@ def estimate(
     task = Task(
         context(path, name),
         read_templates([Path(folder) for folder in templates]),
-        [_blank()] * PICTURES.count,
+        [_blank()] * PICTURES.number,
         describe,
     )
     batched = source.is_dir() and isinstance(chosen, BatchProposer)

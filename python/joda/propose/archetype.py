@@ -38,7 +38,7 @@ class Archetype(Frozen):
         needs_object: whether without such a name it is not this kind.
         shape: what features of `joda.scenes.shape.Shape` it is told by.
         closed: whether the end where it is closed must be "known", or "unknown".
-        driven: whether an actuator moves it.
+        driven: whether it is one of a machine's joints.
         common: how common it is before anything is known of it, as a logarithm; 0 as any other.
         unknown: whether this is what remains where no other fits.
         force: the row of `forces.toml` that says what opening one takes.

@@ -28,7 +28,8 @@ OTHER_PART, OTHER_OBJECT = -2.5, -3.0
 SAID_PART, SAID_OBJECT, SAID_OTHER = 8.0, 10.0, -2.5
 """Points of the user's words, and where they name another part."""
 DRIVEN = 2.5
-"""Points of a robot's joint that an actuator moves; minus this, of all others."""
+"""Points of a robot's joint that an actuator moves, or that is one of a machine's; minus this, of
+all others."""
 OF_OBJECT = {
     "covers", "holds", "sticks_out", "object_size", "object_flat", "share", "height", "top",
 }  # fmt: skip
@@ -207,10 +208,14 @@ def _weigh(one: Archetype, context: Context, words: _Words) -> list[Evidence]:
             out.append(Evidence(feature=f"{what} is called {'/'.join(sorted(hit))}", points=yes))
         elif named and mine and no:
             out.append(Evidence(feature=f"{what} is called {'/'.join(sorted(named))}", points=no))
-    if one.driven or context.driven:
-        points = DRIVEN if one.driven == context.driven else -DRIVEN
-        out.append(Evidence(feature="an actuator" if context.driven else "no actuator",
-                            points=points))  # fmt: skip
+    machine = bool(context.shape and context.shape.machine)
+    driven = context.driven or machine
+    if one.driven or driven:
+        told = (
+            "an actuator" if context.driven else "one of a machine's" if machine else "no machine's"
+        )
+        points = DRIVEN if one.driven == driven else -DRIVEN
+        out.append(Evidence(feature=told, points=points))
     found = context.shape.model_dump() if context.shape else {"weight": gravity_role(context)}
     if context.shape and not context.shape.object_size:  # nothing to hold it against
         found = {name: value for name, value in found.items() if name not in OF_OBJECT}

@@ -44,7 +44,7 @@ from joda.template import read_templates
 class Pictures(NamedTuple):
     """Of a joint: at how many positions from end to end, and how large, in pixels."""
 
-    count: int
+    number: int
     size: tuple[int, int] = (WIDTH, HEIGHT)
 
 
@@ -147,7 +147,7 @@ class Session:
                 description=description,
                 templates=tuple(relative(path, folder) for path in templates),
                 key=key,
-                pictures=None if pictures.count else (),
+                pictures=None if pictures.number else (),
             )
         except ValidationError as error:
             raise JodaError(describe(error)) from None
@@ -410,7 +410,7 @@ class Session:
             try:
                 paths = render(
                     *(self.model, self.history.joint, folder),
-                    count=wanted.count,
+                    count=wanted.number,
                     size=wanted.size,
                     force=True,
                 )

@@ -15,6 +15,7 @@ from joda.component import Frozen
 from joda.profile import Joint
 from joda.scenes.cavity import covered, open_above, view
 from joda.scenes.clearance import clearance
+from joda.scenes.machine import of_machine
 from joda.scenes.model import moves_with
 from joda.scenes.outline import Box, box_along, corners, grip, own_geoms, rest_of_object, surface
 from joda.scenes.silhouette import filled
@@ -88,6 +89,7 @@ class Shape(Frozen):
         carried: whether the part is mounted on something that a joint moves itself.
         carries: whether other joints are mounted on the part.
         linked: whether it carries, or is carried by, a part of like size, as the links of an arm.
+        machine: whether it is one of a robot's joints, see `joda.scenes.machine`.
     """
 
     length: float = 0.0
@@ -121,6 +123,7 @@ class Shape(Frozen):
     carried: bool = False
     carries: bool = False
     linked: bool = False
+    machine: bool = False
 
 
 @dataclass(frozen=True)
@@ -179,6 +182,7 @@ def look(model: mujoco.MjModel, joint: int, described: Joint, reference: End | s
             "carries": bool(above),
             "fill": _round(fill),
             "linked": any(_like(model, data, joint, other) for other in (*below, *above)),
+            "machine": of_machine(model, joint),
         }
     )
     grips = None
