@@ -10,11 +10,13 @@ from gauging import SPAN, gauged
 from joda import add, hidden_effect
 from joda.commands.add import sentences
 from joda.commands.hidden_effect import _judged_law
-from joda.diagnosis.learning.account import account
+from joda.diagnosis.learning.account import Account, account
+from joda.diagnosis.learning.account import sentences as account_sentences
 from joda.diagnosis.learning.choosing import Learning, learn
 from joda.diagnosis.learning.formula import _period, _sets, _solved
 from joda.diagnosis.learning.law import Terms
 from joda.diagnosis.learning.library import of_speed
+from joda.diagnosis.learning.nearest import Nearest
 from joda.diagnosis.learning.smooth import modes_of, nearness
 from joda.diagnosis.mending import error
 from joda.diagnosis.split import parted
@@ -180,6 +182,16 @@ def test_the_root_of_a_speed_is_told_from_all_other_terms():
 def test_the_period_of_a_wave_is_found():
     q, n = np.linspace(-0.3, 0.9, 90), np.random.default_rng().uniform(12, 60)
     assert _period(q, 2 * np.sin(n * q + 1) + 0.5, 0.03) == pytest.approx((n,), rel=1e-3)
+
+
+@pytest.mark.parametrize("times", [0.98, 3.4])
+def test_the_nearest_known_effect_is_told_with_what_it_misses(times):
+    none = dict.fromkeys(("position", "speed", "gain", "time", "formula", "next_experiment"))
+    nearest = Nearest("constant_damping_hinge", times)
+    told = Account(**none, along=False, memory="none", nearest=nearest, unit="rad", force_unit="")
+    last = account_sentences(told)[-1]
+    assert last.startswith("Nearest of what has a name: viscous damping; with it")
+    assert last.endswith(f"missed by {times:.2g} times what it is missed by with the law.")
 
 
 def test_the_demo_judges_what_was_learned():

@@ -13,6 +13,7 @@ from joda.diagnosis.guessing import beside
 from joda.diagnosis.hypotheses import Units, hypotheses
 from joda.diagnosis.hypotheses.base import KNOWN_SHAPE
 from joda.diagnosis.hypotheses.effects import KNOTS
+from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.judge import BEND
 from joda.diagnosis.ranking import NARROWED, WELLS, WORST, _told_within, narrowed, rank
 from joda.diagnosis.verdict import diagnosed
@@ -245,3 +246,11 @@ def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened():
     assert pressed.x[0] <= 2 * usual[0] and pressed.vanished
     assert usual[0] < wide.x[0] < widest[0] and not wide.vanished
     assert wide.fit.loss < hard.fit.loss - 100
+
+
+@pytest.mark.parametrize("place", ["whole", "low", "high", "most", "inside"])
+def test_an_interval_is_within_the_range_wherever_a_trial_begins(place):
+    for x in np.random.default_rng().uniform(-1, 2, (200, 2)):
+        a, b = ends(place, x)
+        assert 0 <= a <= b - NARROWEST + 1e-12
+        assert b <= 1

@@ -22,15 +22,16 @@ END = (0.0, 1.0, 0.004)
 
 
 def ends(place: str, x: Array) -> tuple[float, float]:
-    """The interval, of which the last numbers are the ends."""
+    """The interval within the range, of which the last numbers are the ends; a rough trial's may be
+    outside."""
     if place == "whole":
         return 0.0, 1.0
     if place == "low":
-        return 0.0, max(float(x[-1]), NARROWEST)
+        return 0.0, min(max(float(x[-1]), NARROWEST), 1.0)
     if place == "high":
-        return min(float(x[-1]), 1.0 - NARROWEST), 1.0
+        return max(min(float(x[-1]), 1.0 - NARROWEST), 0.0), 1.0
     a, b = sorted((float(x[-2]), float(x[-1])))
-    a = min(max(a, 0.0), 1.0 - NARROWEST)  # a rough trial may begin outside the range
+    a = min(max(a, 0.0), 1.0 - NARROWEST)
     return a, min(max(b, a + NARROWEST), 1.0)
 
 

@@ -130,8 +130,8 @@ def sentences(told: Account) -> list[str]:
         out.append("No formula of few terms is as good and stable.")
     if told.nearest:
         out.append(
-            f"Nearest of what has a name: {named(told.nearest.effect)}, "
-            f"{told.nearest.times:.2g} times worse on what was held out."
+            f"Nearest of what has a name: {named(told.nearest.effect)}; with it what was held out "
+            f"is missed by {told.nearest.times:.2g} times what it is missed by with the law."
         )
     if told.next_experiment:
         out.append(f"Next experiment: {told.next_experiment}")

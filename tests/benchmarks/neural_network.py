@@ -1,0 +1,187 @@
+"""A joint's model with a plain neural network's force, fitted through simulations in JAX.
+
+Two layers of tanh over position and velocity, beside the model's own forces. It is fitted to the
+windows that a learned law is, with the strengths of the model's friction and damping, by Adam with
+weight decay (Loshchilov and Hutter, Decoupled weight decay regularization, ICLR 2019).
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from joda.diagnosis.baseline import BASE_DOUBT, units_of, usable
+from joda.diagnosis.judge import BEND
+from joda.diagnosis.learning.fitting import Learner
+from joda.diagnosis.reshaping import Likelihood
+from joda.measured.replay import Replayer
+
+WIDTH = 32
+"""Units of a layer."""
+ROUNDS = ((600, 1e-2), (100, 3e-3))
+"""Iterations and first learning rate: in short windows, and in longer ones at the scene's step."""
+EVERY = 50
+"""Iterations after which the runs held out are looked at."""
+
+
+class Network:
+    """A joint's model with a network's force, simulated in JAX."""
+
+    def __init__(self, measured) -> None:
+        """Args: the joint, whose friction and damping are constant, and runs to fit."""
+        self.windows = Learner(measured).windows[:2]
+        units, single = units_of(self.windows[0], measured), measured.single
+        channels = measured.profile.channels
+        assert not channels.conservative.components and not measured.profile.effects
+        self.own = [
+            sum(part.y[0] for part in channel.components)
+            for channel in (channels.friction, channels.damping)
+        ]
+        self.lo, self.hi = measured.profile.joint.range
+        self.fastest = np.abs(self.windows[0].start[:, 1]).max()
+        self.force, self.inertia = units.force, single.inertia
+        self.weight, self.hinge = single.weight, single.hinge
+        self.paths = jax.jit(self._paths)
+        self.descents = [self._descent(windows) for windows in self.windows]
+
+    def begun(self, key) -> dict:
+        """A network without force, and the model as it is."""
+        sizes = (2, WIDTH, WIDTH, 1)
+        keys = jax.random.split(key, 3)
+        layers = [
+            (jax.random.normal(key, (a, b)) * (b > 1) / np.sqrt(a), jnp.zeros(b))
+            for key, a, b in zip(keys, sizes[:-1], sizes[1:], strict=True)
+        ]
+        return {"layers": layers, "own": jnp.ones(2)}
+
+    def residual(self, numbers, q, v):
+        """The network's force, N·m or N."""
+        s = (q - self.lo) / (self.hi - self.lo)
+        x = jnp.stack([2 * s - 1, v / self.fastest], axis=-1)
+        *hidden, (W, b) = numbers["layers"]
+        for inner, bias in hidden:
+            x = jnp.tanh(x @ inner + bias)
+        return self.force * (x @ W + b)[..., 0]
+
+    def _paths(self, numbers, start, force, h):
+        """Positions from starts (k, 2) under forces (k, n), shape (k, n + 1), and velocities."""
+        dry, drag = (
+            own * jnp.maximum(factor, 0)
+            for own, factor in zip(self.own, numbers["own"], strict=True)
+        )
+        a, b = self.weight
+        slowed = self.inertia * (1 + h * drag / self.inertia)
+
+        def step(state, push):
+            q, v = state
+            pull = a * jnp.cos(q) + b * jnp.sin(q) if self.hinge else a
+            v = (self.inertia * v + h * (push + pull + self.residual(numbers, q, v))) / slowed
+            v = jnp.sign(v) * jnp.maximum(jnp.abs(v) - h * dry / slowed, 0)
+            at = jnp.clip(q + h * v, self.lo, self.hi)
+            v = jnp.where(at == q + h * v, v, 0)
+            return (at, v), (at, v)
+
+        _, path = jax.lax.scan(step, (start[:, 0], start[:, 1]), force.T)
+        return tuple(
+            jnp.concatenate([start[:, k : k + 1], each.T], axis=1) for k, each in enumerate(path)
+        )
+
+    def fitted(self, numbers, decay: float, held: Likelihood) -> tuple[float, dict]:
+        """The numbers with which what was held out has the least loss, and that."""
+        best = held.judge.started(Moved(self, numbers)).loss, numbers
+        pairs = zip(self.windows, self.descents, ROUNDS, strict=True)
+        for windows, go, (count, rate) in pairs:
+            state = (numbers, jnp.zeros((len(windows.at), 2)))
+            state = (state, *(jax.tree.map(jnp.zeros_like, state) for _ in range(2)))
+            for first in range(0, count, EVERY):
+                steps = np.arange(first, min(first + EVERY, count))
+                slower = rate * (1 + np.cos(np.pi * steps / count)) / 2
+                state = go(state, decay, steps + 1.0, slower)
+                numbers = state[0][0]
+                loss = held.judge.started(Moved(self, numbers)).loss
+                best = min(best, (loss, numbers), key=lambda one: one[0])
+        return best
+
+    def _descent(self, windows):
+        """Iterations of Adam over a network's numbers and the windows' starts in their doubts."""
+        counts = usable(windows)
+        ends = np.append(windows.at[1:], len(windows.force))
+        force = _filled(windows.force, windows.at, ends)
+        rows, there = np.maximum(windows.rows, 0), windows.rows >= 0
+        at = np.where(there, windows.step[rows] - windows.at[:, None], 0)
+        share, position = windows.share[rows], windows.position[rows]
+        room = BEND * np.maximum(windows.count, 1)
+
+        def loss(both):
+            numbers, z = both
+            path, _ = self._paths(numbers, windows.start + windows.doubt * z, force, windows.h)
+            first, last = (jnp.take_along_axis(path, at + k, axis=1) for k in (0, 1))
+            r = windows.sharpness * (first + share * (last - first) - position)
+            r = r - jnp.einsum("mnr,mkr,mk->mn", windows.shared, windows.shared, r)
+            squares = (r**2).sum(1) + (z**2).sum(1)
+            known = (((numbers["own"] - 1) / BASE_DOUBT) ** 2).sum()
+            return jnp.where(counts, room * jnp.log1p(squares / room), 0).sum() + known
+
+        def once(state, count, rate, decay):
+            both, mean, square = state
+            slope = jax.grad(loss)(both)
+            mean = jax.tree.map(lambda m, g: 0.9 * m + 0.1 * g, mean, slope)
+            square = jax.tree.map(lambda s, g: 0.999 * s + 0.001 * g * g, square, slope)
+
+            def moved(x, m, s):
+                way = m / (1 - 0.9**count) / (jnp.sqrt(s / (1 - 0.999**count)) + 1e-12)
+                return x - rate * way
+
+            numbers, z = jax.tree.map(moved, both, mean, square)
+            shrunk = [(W * (1 - rate * decay), b) for W, b in numbers["layers"]]
+            return ({**numbers, "layers": shrunk}, z), mean, square
+
+        @jax.jit
+        def go(state, decay, *every):
+            return jax.lax.scan(lambda one, now: (once(one, *now, decay), None), state, every)[0]
+
+        return go
+
+
+def _filled(force, at, ends):
+    """The forces of each window, filled up with zeros; shape (m, most steps)."""
+    out = np.zeros((len(at), int((ends - at).max())))
+    for row, a, b in zip(out, at, ends, strict=True):
+        row[: b - a] = force[a:b]
+    return out
+
+
+class Moved:
+    """A network's joint as a `joda.diagnosis.windows.Mover`."""
+
+    def __init__(self, network: Network, numbers: dict) -> None:
+        self.network, self.numbers = network, numbers
+
+    def replay(self, force, at, start, fresh, h, command=None):
+        """See Mover."""
+        ends = np.append(at[1:], len(force))
+        path = np.asarray(self.network.paths(self.numbers, start, _filled(force, at, ends), h)[0])
+        pieces = [
+            (row[: b - a], row[1 : b - a + 1]) for row, a, b in zip(path, at, ends, strict=True)
+        ]
+        before, after = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        return before, after
+
+
+class Replays(Replayer):
+    """Replays runs with a network's force, and all else as with a profile."""
+
+    def __init__(self, measured, moved: Moved) -> None:
+        super().__init__(measured.context, measured.profile, measured.single, measured.timestep)
+        self.moved = moved
+
+    def _roll(self, initial, forces, command):
+        """See Replayer; after time, a state has position and velocity."""
+        steps = forces.shape[1]
+        filled = np.zeros((len(forces), 1 << (steps - 1).bit_length()))
+        filled[:, :steps] = forces
+        paths, velocities = self.moved.network.paths(
+            self.moved.numbers, initial[:, 1:3], filled, self.h
+        )
+        last = initial.copy()
+        last[:, 1], last[:, 2] = paths[:, steps], velocities[:, steps]
+        return np.asarray(paths[:, : steps + 1]), last
