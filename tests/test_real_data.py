@@ -13,6 +13,7 @@ import pytest
 from assets import SHARED
 from scipy import signal
 
+from joda.diagnosis.learning.choosing import learn
 from joda.diagnosis.mending import mend
 from joda.diagnosis.rivals import DRIVING, RESISTING
 from joda.diagnosis.split import parted
@@ -185,6 +186,14 @@ def test_the_pendulum_has_no_quadratic_drag(pendulum):
     assert probability(pendulum, "quadratic_damping") <= 0.1
 
 
+@pytest.mark.long("the pendulum")
+def test_the_pendulums_resistance_is_learned_without_a_name(pendulum):
+    mended, found = learn(*parted(pendulum.measured))
+    assert found.law.terms.speed
+    assert mended.after.window < 0.5 * mended.before.window
+    assert mended.after.whole < 0.5 * mended.before.whole
+
+
 # --- the doors
 DOOR_DRAWN = random.Random(os.environ["JODA_SWEEPS"]).choice(sorted(DOORS))
 """One of them in every session."""
@@ -237,3 +246,14 @@ def test_the_mended_lab_door_is_held_where_the_real_one_is(door):
     felt = [np.mean(curve.force[np.abs(curve.position - q) < 0.05]) for q in places]
     np.testing.assert_allclose(force, felt, atol=0.3)
     assert force[0] > 5 * np.abs(force[1:]).max()  # 1.31, then 0.15 and 0.17 N·m, as published
+
+
+@pytest.mark.long("the lab door")
+@pytest.mark.parametrize("door", ["lab"], indirect=True)
+def test_the_lab_doors_catch_is_learned_without_a_name(door):
+    mended, found = learn(*parted(door.measured))
+    assert found.law.terms.position
+    assert mended.after.window < 0.7 * mended.before.window  # N·m
+    places = np.array([0.05, 0.3, 1.0])
+    force = static_force(mended.profile, door.measured.context, places, 1)
+    assert force[0] > 5 * np.abs(force[1:]).max()
