@@ -13,8 +13,9 @@ from joda.commands.hidden_effect import _judged_law
 from joda.diagnosis.learning.account import Account, account
 from joda.diagnosis.learning.account import sentences as account_sentences
 from joda.diagnosis.learning.choosing import Learning, learn
+from joda.diagnosis.learning.ensemble import Number, of_memory
 from joda.diagnosis.learning.formula import _period, _sets, _solved
-from joda.diagnosis.learning.law import Terms
+from joda.diagnosis.learning.law import Law, Terms
 from joda.diagnosis.learning.library import of_speed
 from joda.diagnosis.learning.nearest import Nearest
 from joda.diagnosis.learning.smooth import modes_of, nearness
@@ -182,6 +183,20 @@ def test_the_root_of_a_speed_is_told_from_all_other_terms():
 def test_the_period_of_a_wave_is_found():
     q, n = np.linspace(-0.3, 0.9, 90), np.random.default_rng().uniform(12, 60)
     assert _period(q, 2 * np.sin(n * q + 1) + 0.5, 0.03) == pytest.approx((n,), rel=1e-3)
+
+
+def test_a_memory_that_runs_tell_nothing_of_lasts_no_longer_than_a_law_may():
+    law = Law(Terms(memory="position", time=0.5), (0.0, 1.0), 1.0, 1.0, 1.0)
+    draws = np.random.default_rng().normal(0, 10, (32, 2))
+    time = of_memory(law, np.zeros(2), draws)[1]
+    longest = 0.5 * np.exp(law.unknowns.high[-1])
+    assert time.value == 0.5
+    assert 0.5 < time.error < longest
+
+
+def test_errors_are_told_by_one_digit():
+    assert str(Number(0.8547, 61.3)) == "0.855 ± 60"
+    assert str(Number(13.97, 0.0412)) == "14 ± 0.04"
 
 
 @pytest.mark.parametrize("times", [0.98, 3.4])

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 REMEMBERS = {
     "position": (
-        "a spring whose far end follows: stiffness {gain.value:.3g} ± {gain.error:.1g} {force}/"
-        "{unit}, {time.value:.3g} ± {time.error:.1g} s until 63 % of its pull are gone"
+        "a spring whose far end follows: stiffness {gain} {force}/{unit}, "
+        "{time} s until 63 % of its pull are gone"
     ),
     "speed": (
         "a memory of speed: the resistance over the speed changes by {percent:+.0f} % for each "
-        "{fastest:.2g} {unit}/s of the mean speed over {time.value:.3g} ± {time.error:.1g} s"
+        "{fastest:.2g} {unit}/s of the mean speed over {time} s"
     ),
 }
 
@@ -107,14 +107,14 @@ def sentences(told: Account) -> list[str]:
         size, error, _ = told.position.largest
         a, b = told.position.at[0], told.position.at[-1]
         parts.append(
-            f"a force over position, up to {size:.3g} ± {error:.1g} {told.force_unit}, from "
+            f"a force over position, up to {Number(size, error)} {told.force_unit}, from "
             f"s = {a:.2f} to {b:.2f}"
         )
     if told.speed:
         size, error, at = told.speed.largest
         way = ", different along the way" if told.along else ""
         parts.append(
-            f"a resistance up to {size:.3g} ± {error:.1g} {told.force_unit} at "
+            f"a resistance up to {Number(size, error)} {told.force_unit} at "
             f"{at:.2g} {told.unit}/s{way}"
         )
     if remembered := _remembered(told):

@@ -50,6 +50,15 @@ class Number:
     value: float
     error: float
 
+    def __str__(self) -> str:
+        """For a person."""
+        return f"{self.value:.3g} ± {one_digit(self.error)}"
+
+
+def one_digit(error: float) -> str:
+    """An error for a person."""
+    return f"{float(f'{error:.1g}'):g}"
+
 
 def drawn(learner: Learner, learned: Learned, seed: int = 0) -> Array:
     """Numbers of the law as other windows would have told them, shape (DRAWS, k).

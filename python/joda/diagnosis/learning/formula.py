@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.learning.ensemble import drawn
+from joda.diagnosis.learning.ensemble import drawn, one_digit
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import Law
 from joda.diagnosis.learning.library import DRY, Term, of_position, of_speed
@@ -66,7 +66,7 @@ class Formula:
         """For a person."""
         signs = ("\N{MINUS SIGN}" if one.factor < 0 else "+" for one in self.terms)
         said = " ".join(
-            f"{sign} {abs(one.factor):.3g} ({one.error:.1g}) {one.unit} {one.term}"
+            f"{sign} {abs(one.factor):.3g} ({one_digit(one.error)}) {one.unit} {one.term}"
             for sign, one in zip(signs, self.terms, strict=True)
         )
         return f"F = {said.removeprefix('+ ')}"

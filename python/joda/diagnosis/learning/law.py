@@ -170,7 +170,8 @@ class Law:
         """Of the memory, s."""
         if self.terms.memory == "none":
             return self.terms.time
-        return float(self.terms.time * np.exp(self.remembered(x)[1]))
+        slower = np.clip(self.remembered(x)[1], -SLOWER, SLOWER)
+        return float(self.terms.time * np.exp(slower))
 
     def remembered(self, x: Array) -> Array:
         """The memory's numbers."""
