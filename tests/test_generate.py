@@ -54,7 +54,7 @@ def without_rendering(monkeypatch):
     """Pictures without rendering; returns the list of those asked for."""
     asked = []
 
-    def render(model, joint, output, *, count, force):
+    def render(model, joint, output, *, count, size, force):
         asked.append(joint)
         Path(output).mkdir(exist_ok=True)
         paths = [Path(output) / f"picture_{k}.png" for k in range(count)]

@@ -173,6 +173,11 @@ def test_a_part_that_only_collides_is_shown(tmp_path):
     check(render(one(tmp_path, group=3), "lid", tmp_path, count=2))
 
 
+def test_pictures_are_as_large_as_is_asked_for(tmp_path):
+    for path in render(one(tmp_path), "lid", tmp_path, count=2, size=(480, 360)):
+        assert matplotlib.image.imread(path).shape[:2] == (360, 480)
+
+
 def test_any_number_of_pictures(tmp_path):
     paths = render(one(tmp_path), "lid", tmp_path, count=3)
     assert [path.name for path in paths] == ["lid_0.00.png", "lid_0.50.png", "lid_1.00.png"]
