@@ -33,7 +33,7 @@ DECAYS = (1e-3, 0.3)
 FASTER = 1.2
 """How much faster a run is that leaves what was visited, in the highest speed that was."""
 KINDS = ("law", "network")
-OF = ("whole runs: law / network", "windows: law / network")
+OF = ("whole runs: learned, network", "windows: learned, network")
 
 
 def network_of(train, held) -> tuple[Moved | None, Moved]:
@@ -105,7 +105,7 @@ def examined(seed: int, effect: str) -> dict:
 
 def told(rows: list[dict]) -> list[str]:
     """A table of what is left of the model's errors, and what holds for all."""
-    heads = ("law", "truth", *OF, "faster by", "truth", *OF)
+    heads = ("law", "truth", *OF, "times as fast", "truth", *OF)
     out = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for row in rows:
         cells = [row["effect"], share(row["all"], row["truth"]), *parts(row["all"])]
@@ -139,7 +139,7 @@ def share(found: dict, error: float) -> str:
 def parts(found: dict) -> list[str]:
     """What is left, of whole runs and of windows, by the law and by the network."""
     return [
-        " / ".join(
+        ", ".join(
             f"{left(found, kind, of):.2g}" if found["taken"][kind] else "none" for kind in KINDS
         )
         for of in ("whole", "window")
