@@ -9,7 +9,6 @@ it is taken only if it passes what a learned law must.
 
 import argparse
 import json
-import tempfile
 import time
 from dataclasses import replace
 from itertools import product
@@ -17,6 +16,7 @@ from pathlib import Path
 
 import jax
 import numpy as np
+from hidden_cases import read
 from neural_network import Moved, Network, Replays
 
 from joda.diagnosis.baseline import windows_for
@@ -25,8 +25,7 @@ from joda.diagnosis.learning.choosing import learn
 from joda.diagnosis.mending import clearly, error, fallen, replayed
 from joda.diagnosis.reshaping import Likelihood
 from joda.diagnosis.split import parted
-from joda.hidden import FAMILIES, draw, write
-from joda.measured.reading import read_measured
+from joda.hidden import FAMILIES, draw
 
 DECAYS = (1e-3, 0.3)
 """Weight decays that are tried."""
@@ -84,13 +83,7 @@ def fastest(measured) -> np.ndarray:
 def examined(seed: int, effect: str) -> dict:
     """One case: errors where all runs are learned from, and of runs faster than those."""
     case = draw(seed, effect)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        write(case, folder)
-        known, unseen = (
-            read_measured(folder / "model.xml", case.joint, [folder / run.name for run in runs])
-            for runs in (case.train, case.held_out)
-        )
+    known, unseen = read(case)
     row = {"seed": seed, "effect": effect, "noise": case.noise}
     row |= {"truth": case.achievable.together, "all": compared(known, unseen)}
     slow = known.changed(runs=np.argsort(fastest(known))[: len(known.runs) // 2].tolist())

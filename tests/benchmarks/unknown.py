@@ -6,17 +6,16 @@ python tests/benchmarks unknown [--cases 10] [--seed fresh] [--family laboratory
 
 import argparse
 import json
-import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
+from hidden_cases import read
 
 from joda.diagnosis.learning.choosing import learn
 from joda.diagnosis.mending import error
 from joda.diagnosis.split import parted
-from joda.hidden import FAMILIES, draw, write
-from joda.measured.reading import read_measured
+from joda.hidden import FAMILIES, draw
 
 NEAR = 2.0
 """Error of whole unseen runs, in the true joint's own, that counts as near."""
@@ -25,20 +24,14 @@ NEAR = 2.0
 def examined(seed: int, effect: str, family: str) -> dict:
     """One case: what it hides, and its errors in windows and on whole runs."""
     case = draw(seed, effect, family=family)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        write(case, folder)
-        known, unseen = (
-            read_measured(folder / "model.xml", case.joint, [folder / run.name for run in runs])
-            for runs in (case.train, case.held_out)
-        )
-        begun = time.process_time()
-        mended, found = learn(*parted(known))
-        took = time.process_time() - begun
-        errors = {
-            when: vars(error(unseen, profile))
-            for when, profile in (("before", known.profile), ("after", mended.profile))
-        }
+    known, unseen = read(case)
+    begun = time.process_time()
+    mended, found = learn(*parted(known))
+    took = time.process_time() - begun
+    errors = {
+        when: vars(error(unseen, profile))
+        for when, profile in (("before", known.profile), ("after", mended.profile))
+    }
     return {
         **{"seed": seed, "effect": effect, "family": family, "noise": case.noise},
         **{"terms": found and vars(found.law.terms), "reason": mended.reason},
