@@ -13,7 +13,8 @@ from joda.commands.hidden_effect import _judged_law
 from joda.diagnosis.learning.account import Account, account
 from joda.diagnosis.learning.account import sentences as account_sentences
 from joda.diagnosis.learning.choosing import Learning, learn
-from joda.diagnosis.learning.ensemble import Number, of_memory
+from joda.diagnosis.learning.ensemble import Number, drawn, of_memory
+from joda.diagnosis.learning.fitting import Learner
 from joda.diagnosis.learning.formula import _period, _sets, _solved
 from joda.diagnosis.learning.law import Law, Terms
 from joda.diagnosis.learning.library import of_speed
@@ -103,6 +104,10 @@ def test_a_spring_whose_end_follows_is_learned(tmp_path):
     found = learned(measured, Terms(memory="position", time=0.12 * np.ptp(measured.runs[0].time)))
     assert found.law.gain(numbers(found)) == pytest.approx(law.stiffness, rel=0.15)
     assert found.law.time(numbers(found)) == pytest.approx(law.time, rel=0.3)
+    draws, h = drawn(Learner(measured), found), found.judge.windows.h
+    told = of_memory(found.law, numbers(found), draws, h)
+    for number, right in zip(told, (law.stiffness, law.time), strict=True):
+        assert abs(number.value - right) < 4 * number.error
     assert error(unseen, found.profile).window < 0.3 * error(unseen).window
 
 
@@ -188,7 +193,7 @@ def test_the_period_of_a_wave_is_found():
 def test_a_memory_that_runs_tell_nothing_of_lasts_no_longer_than_a_law_may():
     law = Law(Terms(memory="position", time=0.5), (0.0, 1.0), 1.0, 1.0, 1.0)
     draws = np.random.default_rng().normal(0, 10, (32, 2))
-    time = of_memory(law, np.zeros(2), draws)[1]
+    time = of_memory(law, np.zeros(2), draws, 0.0)[1]
     longest = 0.5 * np.exp(law.unknowns.high[-1])
     assert time.value == 0.5
     assert 0.5 < time.error < longest

@@ -84,7 +84,8 @@ def account(
     learner, law = Learner(train), learned.law
     x, draws = learner.numbers(learned), drawn(learner, learned)
     remembers = law.terms.memory != "none"
-    gain, time = of_memory(law, x, draws) if remembers else (None, None)
+    h = learned.judge.windows.h
+    gain, time = of_memory(law, x, draws, h) if remembers else (None, None)
     return Account(
         position=over_position(law, x, draws),
         speed=over_speed(law, x, draws),

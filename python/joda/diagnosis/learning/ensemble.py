@@ -6,7 +6,7 @@ Cassirer, NeurIPS 2018), so that where no data are the draws differ by all that 
 model is linear about the fit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 DRAWS = 32
 """Laws of an ensemble."""
+COARSE = 2.0
+"""Part of a memory's numbers that steps make wrong, in steps per time of the memory."""
 
 
 @dataclass(frozen=True)
@@ -102,12 +104,18 @@ def over_speed(law: Law, x: Array, draws: Array) -> Band | None:
     return _band(law.speeds, law.resistance(x), [law.resistance(one) for one in draws])
 
 
-def of_memory(law: Law, x: Array, draws: Array) -> tuple[Number, Number]:
-    """The memory's gain in its effect's unit, and its time, s."""
-    gain, time = (
-        Number(of(x), float(np.std([of(one) for one in draws]))) for of in (law.gain, law.time)
-    )
-    return gain, time
+def of_memory(law: Law, x: Array, draws: Array, h: float) -> tuple[Number, Number]:
+    """The memory's gain in its effect's unit, and its time, s.
+
+    Their errors count that a simulation in steps of `h` (s) remembers in steps too: a spring whose
+    far end follows was found `COARSE` h / time too stiff.
+    """
+
+    def number(of: Callable[[Array], float]) -> Number:
+        stepped = COARSE * h / law.time(x) * of(x)
+        return Number(of(x), float(np.hypot(np.std([of(one) for one in draws]), stepped)))
+
+    return number(law.gain), number(law.time)
 
 
 def _band(at: Array, force: Array, others: Sequence[Array]) -> Band:
