@@ -130,6 +130,7 @@ def test_the_true_joint_misses_a_quiet_run_by_the_noise():
     assert case.achievable is case.achievable
 
 
+@pytest.mark.sweep(1)
 @pytest.mark.parametrize(("family", "seed"), [("household", 1), ("switches", 1), ("machinery", 2)])
 def test_in_mujoco_the_true_numbers_move_as_in_the_simulator(family, seed):
     """Masses, return springs and stops of the base model against the simulator's."""

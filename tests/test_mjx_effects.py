@@ -335,6 +335,7 @@ PUSH = np.repeat(np.array([-4.0, 4.0, 4.0, -4.0]), 60)[:, None] * list(FORCES.va
 STEADY = np.full((60, 2), 0.6) * list(FORCES.values())
 
 
+@pytest.mark.long
 @pytest.mark.sweep(1, "derivatives of mjx")
 @pytest.mark.parametrize(
     ("case", "number", "forces", "place", "skip"),

@@ -166,6 +166,7 @@ def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
     assert verdict(0.0, 0.01) == "missing_effect"  # both leave only noise: either may be
 
 
+@pytest.mark.long
 def test_ends_that_are_bouncier_than_the_model_s_are_unexplained_if_that_is_excluded():
     """Only knocks tell of them, and those tell of nothing else."""
     train = read(draw(195372811, "end_stop_restitution"))[0]  # one whose knocks are hard enough
