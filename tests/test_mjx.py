@@ -133,7 +133,7 @@ def run_mjx(model, profiles, forces, start=(0.3, 0.5), rows=True):
 SPANS = np.array([hi - lo for lo, hi in RANGES.values()])
 
 
-@pytest.mark.sweep(1)
+@pytest.mark.sweep(1, "motions in mjx")
 @pytest.mark.parametrize(
     ("integrator", "contacts"), [("Euler", True), ("implicitfast", False)], ids="{}".format
 )
@@ -231,6 +231,7 @@ def knob_profile(name: str, rng: np.random.Generator) -> Profile:
     return Profile(joint=joint, channels=Channels.model_validate(channels))
 
 
+@pytest.mark.sweep(1, "motions in mjx")
 def test_stiff_springs_on_four_knobs_are_the_plugins():
     """Springs far beyond explicit stability, sums and maxima mixed, other rows around them."""
     model = knobs()

@@ -191,9 +191,15 @@ class Page:
         chain.perform()
 
     def fill(self, selector, text):
-        self.click(selector)
-        self.keys(Keys.CONTROL, "a")
-        ActionChains(self.browser).send_keys(text).perform()
+        """Types into a field until that is what it holds: a dialog that opens may take the focus."""
+
+        def holds():
+            self.click(selector)
+            self.keys(Keys.CONTROL, "a")
+            ActionChains(self.browser).send_keys(text).perform()
+            return self.read(selector, "value") == [text]
+
+        self.until(holds)
 
     def upload(self, path):
         def sent():
@@ -294,14 +300,16 @@ def test_nothing_is_replaced_unasked_nor_written_elsewhere(page, project):
 def test_runs_are_loaded_and_bad_ones_are_told(page, project):
     page.click(".add-runs")
     for path in (f"../{project.elsewhere.name}/secret.csv", "nothing.csv"):
-        page.fill("input[aria-label='File in the project folder']", path + Keys.ENTER)
+        page.fill("input[aria-label='File in the project folder']", path)
+        page.keys(Keys.ENTER)
         page.said(path, "outside the project" if ".." in path else "cannot be read")
     page.upload(project.elsewhere / "bad.csv")
     page.said("bad.csv, line 3: position is 'two'")
     assert not page.all(".chip.run")
     page.upload(project.runs[0])
     page.until(lambda: len(page.all(".chip.run")) == 1)
-    page.fill("input[aria-label='File in the project folder']", project.runs[1].name + Keys.ENTER)
+    page.fill("input[aria-label='File in the project folder']", project.runs[1].name)
+    page.keys(Keys.ENTER)
     page.until(lambda: len(page.all(".chip.run")) == 2)
     page.keys(Keys.ESCAPE)
     page.until(lambda: page.drawn("replay"))
