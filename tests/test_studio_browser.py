@@ -191,7 +191,7 @@ class Page:
         chain.perform()
 
     def fill(self, selector, text):
-        """Types into a field until that is what it holds: a dialog that opens may take the focus."""
+        """Types until that is what the field holds: a dialog that opens may take the focus."""
 
         def holds():
             self.click(selector)
