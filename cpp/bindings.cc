@@ -15,7 +15,7 @@
 #include "attributes.h"
 #include "end_stop.h"
 #include "field.h"
-#include "solo.h"
+#include "joint_simulator.h"
 
 namespace py = pybind11;
 
@@ -41,24 +41,28 @@ py::array_t<double> Coefficients(const joda::PiecewiseCubic& channel) {
   return out;
 }
 
-joda::Solo MakeSolo(double lo, double hi, const Texts& texts, double inertia, double row_inertia,
-                    const std::array<double, 2>& weight, bool hinge,
-                    const std::array<double, 2>& solref, const std::array<double, 5>& solimp,
-                    const std::array<double, 2>& friction_row, const std::array<double, 6>& servo) {
+joda::JointSimulator MakeJointSimulator(double lo, double hi, const Texts& texts, double inertia,
+                                        double row_inertia, const std::array<double, 2>& weight,
+                                        bool hinge, const std::array<double, 2>& solref,
+                                        const std::array<double, 5>& solimp,
+                                        const std::array<double, 2>& friction_row,
+                                        const std::array<double, 6>& servo) {
   const joda::Body body = {{lo, hi}, inertia, row_inertia, weight,
                            hinge,    solref,  solimp,      friction_row};
   const auto [gain, stiffness, damping, low, high, delay] = servo;
-  return joda::Solo(body, {gain, stiffness, damping, {low, high}, delay}, Pointers(texts).data());
+  return joda::JointSimulator(body, {gain, stiffness, damping, {low, high}, delay},
+                              Pointers(texts).data());
 }
 
-std::vector<joda::Solo::Start> ReadStarts(const Dense<std::int64_t>& at, const Dense<double>& start,
-                                          const Dense<bool>& fresh, py::ssize_t n) {
+std::vector<joda::JointSimulator::Start> ReadStarts(const Dense<std::int64_t>& at,
+                                                    const Dense<double>& start,
+                                                    const Dense<bool>& fresh, py::ssize_t n) {
   const py::ssize_t count = at.size();
   if (at.ndim() != 1 || start.ndim() != 2 || fresh.ndim() != 1 || start.shape(0) != count ||
       start.shape(1) != 2 || fresh.size() != count) {
     throw py::value_error("at, start and fresh must have the shapes (m,), (m, 2) and (m,)");
   }
-  std::vector<joda::Solo::Start> out;
+  std::vector<joda::JointSimulator::Start> out;
   out.reserve(count);
   for (py::ssize_t i = 0; i < count; ++i) {
     out.push_back({at.at(i), start.at(i, 0), start.at(i, 1), fresh.at(i)});
@@ -71,7 +75,8 @@ std::vector<joda::Solo::Start> ReadStarts(const Dense<std::int64_t>& at, const D
   return out;
 }
 
-std::pair<Dense<double>, Dense<double>> Replay(const joda::Solo& solo, const Dense<double>& force,
+std::pair<Dense<double>, Dense<double>> Replay(const joda::JointSimulator& simulator,
+                                               const Dense<double>& force,
                                                const Dense<std::int64_t>& at,
                                                const Dense<double>& start, const Dense<bool>& fresh,
                                                double h,
@@ -90,7 +95,7 @@ std::pair<Dense<double>, Dense<double>> Replay(const joda::Solo& solo, const Den
   double* second = after.mutable_data();
   {
     py::gil_scoped_release release;
-    solo.Replay(h, applied, wanted, force.size(), starts, first, second);
+    simulator.Replay(h, applied, wanted, force.size(), starts, first, second);
   }
   return {before, after};
 }
@@ -125,7 +130,7 @@ Raises:
             return std::make_pair(value, slope);
           },
           py::arg("s"), "Value and slope d/ds at normalised positions s, arrays of the shape of s.")
-      .def("max_descent", py::overload_cast<>(&joda::PiecewiseCubic::MaxDescent, py::const_),
+      .def("max_stiffness", py::overload_cast<>(&joda::PiecewiseCubic::MaxStiffness, py::const_),
            "Largest stiffness max(-dF/ds, 0) anywhere on the channel.")
       .def_property_readonly(
           "knots",
@@ -140,8 +145,8 @@ Raises:
   module.def("stop_damping", &joda::StopDamping, py::arg("restitution"),
              "Damping, times the timestep, of an end stop with this restitution, 0 <= it < 1.");
 
-  py::class_<joda::Solo>(module, "Solo",
-                         R"(A joint by itself, stepped as MuJoCo does with the plugin.
+  py::class_<joda::JointSimulator>(module, "JointSimulator",
+                                   R"(A joint by itself, stepped as MuJoCo does with the plugin.
 
 Units are those of a hinge; for a slide read N, m and kg.
 
@@ -160,9 +165,10 @@ Args:
 
 Raises:
   ValueError: a text cannot be read, or a number is impossible; one sentence says why.)")
-      .def(py::init(&MakeSolo), py::arg("lo"), py::arg("hi"), py::arg("texts"), py::arg("inertia"),
-           py::arg("row_inertia"), py::arg("weight"), py::arg("hinge"), py::arg("solref"),
-           py::arg("solimp"), py::arg("friction_row") = std::array<double, 2>{0, 0},
+      .def(py::init(&MakeJointSimulator), py::arg("lo"), py::arg("hi"), py::arg("texts"),
+           py::arg("inertia"), py::arg("row_inertia"), py::arg("weight"), py::arg("hinge"),
+           py::arg("solref"), py::arg("solimp"),
+           py::arg("friction_row") = std::array<double, 2>{0, 0},
            py::arg("servo") = std::array<double, 6>{1, 0, 0, -HUGE_VAL, HUGE_VAL, 0})
       .def("replay", &Replay, py::arg("force"), py::arg("at"), py::arg("start"), py::arg("fresh"),
            py::arg("h"), py::arg("command") = py::none(),

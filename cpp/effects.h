@@ -123,7 +123,7 @@ inline FrictionBounds BoundFriction(const Effects& e, double friction, double s,
 
 // How far the bristle gives plastically (0 to 1) where it carries the part r of its largest force
 // against the motion (Dupont et al. 2002).
-inline double PlasticPart(double breakaway, double r) {
+inline double DupontAlpha(double breakaway, double r) {
   constexpr double kPi = 3.141592653589793;
   if (breakaway == 0 || r >= 1) return 1;
   if (r <= breakaway) return 0;
@@ -131,21 +131,22 @@ inline double PlasticPart(double breakaway, double r) {
 }
 
 // The least part of the bristle that is left: while it slips.
-inline constexpr double kLeastBristle = 1e-6;
+inline constexpr double kMinBristleStiffness = 1e-6;
 
 // Part of the bristle's stiffness and damping that is left where it holds with the force `held`
 // within +-bound: 1 at rest, 2 for Dahl's model at a reversal, (almost) 0 while it slips.
-inline double BristleLeft(const Presliding& presliding, double held, double bound, double v) {
+inline double BristleStiffnessScale(const Presliding& presliding, double held, double bound,
+                                    double v) {
   const double against = std::abs(v) < kStill ? 0 : -held * internal::Sign(v);
   const double r = bound > 0 ? std::clamp(against / bound, -1.0, 1.0) : 0;
-  return std::max(kLeastBristle, 1 - PlasticPart(presliding.breakaway, r) * r);
+  return std::max(kMinBristleStiffness, 1 - DupontAlpha(presliding.breakaway, r) * r);
 }
 
 // The same for a step of the solver's row, which must also stop a part that turns back within the
 // step. While it slips the row's bound gives the law's force, so that all of the stiffness can be
 // there; else what is too stiff for the step to resolve (h^2 stiffness / inertia > 20) keeps 5 %.
-inline double BristleLeftInRow(double left, double h, double stiffness, double inertia) {
-  if (left <= kLeastBristle) return 1;
+inline double BristleStiffnessScaleInRow(double left, double h, double stiffness, double inertia) {
+  if (left <= kMinBristleStiffness) return 1;
   return std::max(left, 0.05 - inertia / (h * h * stiffness));
 }
 

@@ -165,7 +165,7 @@ class PiecewiseCubic {
     pieces_.back().right = std::numeric_limits<double>::infinity();
     for (size_t k = 0; k < Count(); ++k) {
       pieces_[k].right = pieces_[k + 1].left;
-      max_descent_ = std::max(max_descent_, Descent(pieces_[k]));
+      max_stiffness_ = std::max(max_stiffness_, Descent(pieces_[k]));
     }
     first_ = pieces_.front().left;
     last_ = pieces_.back().left;
@@ -194,10 +194,10 @@ class PiecewiseCubic {
   }
 
   // Steepest descent max(-dF/ds, 0) met anywhere on the channel: its largest stiffness.
-  double MaxDescent() const { return max_descent_; }
+  double MaxStiffness() const { return max_stiffness_; }
 
   // The same over the pieces that touch [lo, hi].
-  double MaxDescent(double lo, double hi) const {
+  double MaxStiffness(double lo, double hi) const {
     const size_t n = Count();
     double out = 0;
     if (hi < first_ || lo > last_) return out;
@@ -312,7 +312,7 @@ class PiecewiseCubic {
   }
 
   double first_ = 1, last_ = 0;  // where the pieces begin and end; none: nothing is between
-  double max_descent_ = 0;
+  double max_stiffness_ = 0;
   std::vector<Piece> pieces_;  // increasing; the last is only the end of the one before
   std::array<int, kBuckets + 1> buckets_{};
 };

@@ -40,12 +40,12 @@ inline double ImplicitStiffness(const Profile& p, bool field, double h, double s
   if (StaysBeyond(s, s + h * (v + h / inertia * force) * p.per_range)) {
     return std::max(0.0, gravity - soft);
   }
-  const double steepest = field ? p.conservative.MaxDescent() * p.per_range : 0;
+  const double steepest = field ? p.conservative.MaxStiffness() * p.per_range : 0;
   double stiffness = std::abs(force) * p.per_range * (1 / kStride);
   if (steepest + gravity > soft) {
     const double free = h * (std::abs(v) + h / inertia * std::abs(force));
     const double reach = free * p.per_range;
-    const double near = p.conservative.MaxDescent(s - reach, s + reach) * p.per_range;
+    const double near = p.conservative.MaxStiffness(s - reach, s + reach) * p.per_range;
     stiffness = std::max(stiffness, gravity + std::min(near, steepest));
   }
   return std::max(0.0, stiffness - soft);
@@ -62,9 +62,9 @@ inline FrictionRow StiffenFrictionRow(const Effects* effects, double h, double h
   const double stiff = kStiffRow * inertia;
   if (!effects || !(effects->presliding.stiffness > 0)) return {stiff, 0};
   const Presliding& bristle = effects->presliding;
-  const double left = BristleLeft(bristle, held, bound, v);
+  const double left = BristleStiffnessScale(bristle, held, bound, v);
   const double stiffness = part * bristle.stiffness;
-  const double in_row = BristleLeftInRow(left, h, stiffness, inertia);
+  const double in_row = BristleStiffnessScaleInRow(left, h, stiffness, inertia);
   return {std::clamp(h * h * stiffness * in_row, kIdleRow * inertia, stiff),
           part * bristle.damping * left};
 }

@@ -9,9 +9,9 @@ from gauging import FRICTION, LAWS, SPAN, gauged
 from joda import add, diagnose, improve
 from joda.commands.add import sentences as told_added
 from joda.commands.improve import sentences as told
-from joda.diagnosis.mending import error
+from joda.diagnosis.adding import error
 from joda.diagnosis.split import parted
-from joda.measured.gauge import static_force
+from joda.measured.quasi_static import static_force
 from joda.measured.reading import read_measured
 
 NOISE = 0.02

@@ -9,8 +9,8 @@ from refine_table import MODELS, NOISE, STEP, cabinet_profile, errors, planted, 
 
 from joda import context
 from joda.effects import EndStopRestitution
-from joda.joints import single
-from joda.joints.parameters import KINDS, Parameters
+from joda.estimation.profile_parameters import KINDS, Parameters
+from joda.joints import joint_model
 from joda.refining.between import Between
 from joda.refining.engine import JointEngine
 from joda.refining.shooting import Shooting
@@ -19,7 +19,7 @@ from joda.refining.shooting import Shooting
 def between(case, kinds=("values", "intervals"), profile=None, **changed) -> Between:
     """A planted case; `changed` is what of the joint is wrong."""
     model = quiet_rig(case.found, case.true)
-    joint = replace(single.single(case.found, case.true, model, 0), **changed)
+    joint = replace(joint_model.joint_model(case.found, case.true, model, 0), **changed)
     return between_of(joint, Parameters(profile or case.start, kinds), case.runs)
 
 
@@ -72,12 +72,12 @@ def test_jumps_are_moved_to_where_they_are():
 def test_windows_between_the_jumps_cross_none():
     case = planted("constant_positive_conservative_hinge", 1)
     joint = between(case)
-    judge = joint._clear(truth(case, joint.parameters))
-    assert 0.2 < judge.counts.mean() < 0.9
+    estimator = joint._clear(truth(case, joint.parameters))
+    assert 0.2 < estimator.counts.mean() < 0.9
     span = float(np.ptp(case.found.joint.range))
     (component,) = case.true.channels.conservative.components
-    for row in judge.windows.rows[judge.counts]:
-        s = judge.windows.position[row[row >= 0]] / span
+    for row in estimator.segments.rows[estimator.counts]:
+        s = estimator.segments.position[row[row >= 0]] / span
         for end in component.interval:
             assert s.min() > end or s.max() < end
 
@@ -117,7 +117,7 @@ def test_every_kind_of_number_does_what_it_does_in_mujoco():
     found = context(MODELS + "/cabinet.xml", "door")
     profile = cabinet_profile(found, 2.5, 0.4)
     parameters = Parameters(profile, KINDS)
-    own = single.single(found, profile, quiet_rig(found, profile), 0)
+    own = joint_model.joint_model(found, profile, quiet_rig(found, profile), 0)
     shooting = between_of(own, parameters).shooting
     theta = parameters.start + 0.05 * np.random.default_rng(0).uniform(size=len(parameters.start))
     force = 8 * np.sin(6 * STEP * np.arange(600))
@@ -125,7 +125,7 @@ def test_every_kind_of_number_does_what_it_does_in_mujoco():
     path = shooting.mover(theta).replay(force, np.zeros(1, int), start, np.array([True]), STEP)[1]
     body = shooting.engine.body(parameters, theta)
     model = quiet_rig(
-        single.weighing(found.model_copy(update={"equivalent_inertia": body.inertia}), body),
+        joint_model.weighing(found.model_copy(update={"equivalent_inertia": body.inertia}), body),
         parameters.written(theta, exact=True),
     )
     model.opt.timestep, model.jnt_solref[0] = STEP, body.solref
@@ -147,13 +147,13 @@ def test_the_ends_bounce_as_those_of_the_model(end):
     profile = profile.with_effect(EndStopRestitution(restitution=0.6, end=end))
     model = quiet_rig(found, profile)
     model.opt.timestep = STEP
-    own = single.single(found, profile, model, 0)
+    own = joint_model.joint_model(found, profile, model, 0)
     solref, solimp = own.limits(profile, STEP)
     parameters = Parameters(profile, KINDS)
     shooting = between_of(replace(own, solref=solref, solimp=solimp), parameters).shooting
     force = np.repeat([-40.0, 40.0, 40.0, -40.0], 150)
     begin = np.zeros(1, int), np.array([[0.3, 0.5]]), np.array([True])
     path = shooting.mover(parameters.start).replay(force, *begin, STEP)[1]
-    wanted = own.solo(profile, STEP).replay(force, *begin, STEP)[1]
+    wanted = own.simulator(profile, STEP).replay(force, *begin, STEP)[1]
     np.testing.assert_array_equal(path, wanted)
     assert path.min() < found.joint.range[0] and path.max() > found.joint.range[1]

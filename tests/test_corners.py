@@ -9,7 +9,7 @@ from joints import component, flat, load, run, scene
 from scipy.optimize import brentq
 from test_plugin import refused
 
-from joda._core import Solo
+from joda._core import JointSimulator
 
 WIDE = (-1e3, 1e3)
 MASS, H = 0.8, 0.002
@@ -253,7 +253,7 @@ def test_the_joint_by_itself_has_the_same_motion_beyond_its_range():
         joint=f'frictionloss="1e-12" limited="true" {limit}',
     )
     texts = [component((0, 1), (0, 1), ends), "sum", "", "sum", flat(0.02), "sum", ""]
-    alone = Solo(
+    alone = JointSimulator(
         0, width, texts, inertia=mass, row_inertia=mass, weight=(0, 0), hinge=False,
         solref=model.jnt_solref[0], solimp=model.jnt_solimp[0],
     )  # fmt: skip

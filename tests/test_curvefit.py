@@ -11,7 +11,7 @@ from scenes import attached, write
 from joda import JodaError, context, read_profiles, refine
 from joda.component import Component
 from joda.field import evaluate
-from joda.measured.gauge import static_force
+from joda.measured.quasi_static import static_force
 from joda.profile import Channel, Channels, Joint, Profile, Resistance
 
 NOISE = 0.01

@@ -16,7 +16,7 @@ from test_cli import fails
 from joda import JodaError, add, compare, diagnose, hidden_effect, improve
 from joda.commands.add import sentences as of_added
 from joda.commands.diagnose import sentences
-from joda.diagnosis import improving
+from joda.diagnosis import improvement
 from joda.diagnosis.outcome import read_runs
 from joda.diagnosis.phrases import NAMES
 from joda.hidden import draw
@@ -180,7 +180,7 @@ def test_a_wrong_effect_never_raises_the_error(hidden):
 
 @pytest.mark.long
 def test_the_stairs_never_rise(hidden, monkeypatch):
-    monkeypatch.setattr(improving, "MOST", 1)
+    monkeypatch.setattr(improvement, "MOST", 1)
     page = hidden.folder / "story.html"
     output = hidden.folder / "improved.xml"
     result = improve(hidden.folder / "model.xml", "joint", hidden.runs, output, report=page)

@@ -5,7 +5,7 @@ import pytest
 from assets import SHARED
 
 import joda
-from joda.diagnosis.asking import asked
+from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.corrections import numbers
 from joda.diagnosis.outcome import read_runs
 from joda.measured.runs import read_run
@@ -50,7 +50,7 @@ def test_the_drives_friction_and_gain_are_found_from_its_volts(runs, tmp_path):
     (tmp_path / "emps.xml").write_text(MODEL.format(gear=GAIN * factor))
     found = {
         one.parameter: one
-        for one in numbers(asked(read_runs(tmp_path / "emps.xml", "screw", runs)))
+        for one in numbers(fit_baseline(read_runs(tmp_path / "emps.xml", "screw", runs)))
     }
     assert found["actuator_gain"].value == pytest.approx(1 / factor, rel=0.1)
     assert found["frictionloss"].value == pytest.approx(FRICTION, rel=0.15)

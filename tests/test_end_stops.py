@@ -11,10 +11,10 @@ from scenes import write
 from test_split_steps import ROUNDING, STEPS, path_of, whole
 
 from joda import attach
-from joda._core import Solo, stop_damping
+from joda._core import JointSimulator, stop_damping
 from joda.component import Component
 from joda.effects import EndStopRestitution
-from joda.joints.single import Single
+from joda.joints.joint_model import JointModel
 from joda.profile import Channel, Channels, Joint, JointLimitHint, Profile
 from joda.scenes.limits import IMPEDANCE, limit_parameters
 from joda.scenes.model import load_model
@@ -178,10 +178,10 @@ def test_a_profile_that_is_swapped_in_brings_it():
 # --- the joint by itself
 
 
-def solo(effects, **changes) -> Solo:
+def simulator(effects, **changes) -> JointSimulator:
     body = dict(inertia=MASS, row_inertia=0, weight=(0, 0), hinge=False)
     ends = dict(solref=(0.02, 1.0), solimp=(0.9, 0.95, 0.001, 0.5, 2.0))
-    return Solo(0, 1, ["", "sum"] * 3 + [effects], **body | ends | changes)
+    return JointSimulator(0, 1, ["", "sum"] * 3 + [effects], **body | ends | changes)
 
 
 @pytest.mark.parametrize("effects", [PAIR, *ONE.values()])
@@ -189,19 +189,19 @@ def test_the_joint_by_itself_knocks_as_in_the_engine(effects):
     forces = np.repeat([4.0, -9.0, 7.0, -2.0], 300)
     visited = knocking(effects, forces)[:, 0]
     assert visited.max() > 1 and visited.min() < 0
-    _, after = solo(effects).replay(forces, [0], [(0.5, 0)], [True], 0.002)
+    _, after = simulator(effects).replay(forces, [0], [(0.5, 0)], [True], 0.002)
     np.testing.assert_allclose(after, visited, rtol=0, atol=1e-6)
 
 
 def test_only_a_restitution_of_both_ends_is_in_the_solver_parameters():
-    single = Single(1.0, 0.0, (0, 0), False, (0.05, 0.7), (0.8, 0.9, 0.01, 0.5, 2.0))
+    joint_model = JointModel(1.0, 0.0, (0, 0), False, (0.05, 0.7), (0.8, 0.9, 0.01, 0.5, 2.0))
     joint = Joint(name="j", type="slide", range=(0, 1), unit="m")
 
     def limits(end):
         effect = EndStopRestitution(restitution=0.5, end=end)
-        return single.limits(Profile(joint=joint, effects=(effect,)), 0.002)
+        return joint_model.limits(Profile(joint=joint, effects=(effect,)), 0.002)
 
-    assert limits("low") == limits("high") == (single.solref, single.solimp)
+    assert limits("low") == limits("high") == (joint_model.solref, joint_model.solimp)
     solref, solimp = limits("both")
     assert solref[1] == pytest.approx(-stop_damping(0.5) / 0.002, rel=1e-5)
     assert solimp == (IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0)

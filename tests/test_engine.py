@@ -314,14 +314,14 @@ def test_attached_twice_with_prefixes(kind):
     model = parent.compile()
     assert (model.nplugin, model.neq, model.npluginstate) == (2, 2, 2)
     reloaded = mujoco.MjModel.from_xml_string(parent.to_xml())
-    alone, single = load(**EVERYTHING, kind=kind, inertia=0.05, option="")
-    single.qvel[0] = -1.5
-    run(alone, single, 0.5)
+    alone, joint_model = load(**EVERYTHING, kind=kind, inertia=0.05, option="")
+    joint_model.qvel[0] = -1.5
+    run(alone, joint_model, 0.5)
     for m in (model, reloaded):
         data = mujoco.MjData(m)
         data.qpos[:], data.qvel[:] = 0.5, -1.5
         run(m, data, 0.5)
-        assert data.qpos == pytest.approx(np.repeat(single.qpos[0], 2), abs=1e-9)
+        assert data.qpos == pytest.approx(np.repeat(joint_model.qpos[0], 2), abs=1e-9)
 
 
 def test_binary_models_keep_the_profile(tmp_path):

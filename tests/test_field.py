@@ -133,9 +133,9 @@ def test_max_descent_is_the_steepest_descent_of_a_dense_sampling(channel):
     pieces = [(left, right) for left, right in pairwise(merged.knots) if right - left > 1e-6]
     slopes = [merged(left + (right - left) * inside)[1] for left, right in pieces]
     slopes = np.concatenate((*slopes, [0]))
-    assert -slopes.min() <= merged.max_descent() * (1 + 1e-9)
+    assert -slopes.min() <= merged.max_stiffness() * (1 + 1e-9)
     if channel.combine == "sum" or len(pieces) == len(merged.knots) - 1:
-        assert -slopes.min() >= merged.max_descent() - 1e-4 * np.abs(slopes).max()
+        assert -slopes.min() >= merged.max_stiffness() - 1e-4 * np.abs(slopes).max()
 
 
 @settings(deadline=None)

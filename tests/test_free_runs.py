@@ -8,9 +8,9 @@ import pytest
 from lids import FRICTION, INERTIA, SIGMA, thrown
 
 from joda import compare
-from joda.diagnosis.asking import asked
+from joda.diagnosis.baseline import fit_baseline
+from joda.diagnosis.free_runs import free_runs
 from joda.diagnosis.verdict import diagnosed
-from joda.diagnosis.whole import free_runs
 from joda.errors import JodaError
 from joda.measured.comparison import sentences
 from joda.measured.reading import read_measured
@@ -156,7 +156,7 @@ def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
     """Eight or seven percent of friction, in a noise that hides it in windows."""
     quiet = thrown(tmp_path, rng, 3, drag=1e-6, friction=times * FRICTION)
     measured = louder(quiet, tmp_path, rng, 25)
-    found = free_runs(measured, asked(measured))
+    found = free_runs(measured, fit_baseline(measured))
     assert found.denied and found.suffice
     assert found.numbers[0] == pytest.approx(times, abs=max(4 * found.errors[0], 0.01))
     said = diagnosed(measured).diagnosis
@@ -167,7 +167,7 @@ def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
 def test_a_drag_is_no_friction(tmp_path, rng):
     """Over a range of speeds no friction stands in for it."""
     measured = thrown(tmp_path, rng, 3, drag=0.02 * INERTIA / 0.03)
-    found = free_runs(measured, asked(measured))
+    found = free_runs(measured, fit_baseline(measured))
     assert found.denied and found.drifting and not found.suffice
 
 

@@ -12,7 +12,7 @@ from hidden_figures import fine, told
 from hidden_floor import true_error
 from hidden_model import true_profile
 
-from joda.diagnosis.mending import error, mend
+from joda.diagnosis.adding import add_effect, error
 from joda.diagnosis.split import parted
 from joda.hidden import EFFECTS, FAMILIES, draw
 from joda.measured.misfit import rms
@@ -106,9 +106,9 @@ def test_a_curve_gets_as_many_control_points_as_the_data_support():
     print("seed", seed)
     case = draw(seed, "bistable_mechanism")
     train, held_out = read(case)
-    mended = mend(*parted(train), "bistable_mechanism")
-    parts = mended.profile.channels.conservative.components
-    assert mended.after.window < max(0.3 * mended.before.window, 1.5 * case.noise)
-    unseen = error(held_out, mended.profile).window
+    added_effect = add_effect(*parted(train), "bistable_mechanism")
+    parts = added_effect.profile.channels.conservative.components
+    assert added_effect.after.window < max(0.3 * added_effect.before.window, 1.5 * case.noise)
+    unseen = error(held_out, added_effect.profile).window
     assert unseen < max(0.3 * error(held_out).window, 1.5 * case.noise)
     assert max(len(part.x) for part in parts) > 5

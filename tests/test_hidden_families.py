@@ -10,7 +10,7 @@ from hidden_model import true_profile
 
 import joda
 from joda import JodaError
-from joda.diagnosis.mending import error
+from joda.diagnosis.adding import error
 from joda.hidden import EFFECTS, FAMILIES, draw, memory, rubbing, shapes, write
 from joda.hidden.cases import PARTIAL, VISIBLE
 from joda.hidden.drag import Orifice

@@ -34,8 +34,8 @@ from joda.pictures.page import page, paragraph, picture, table
 from joda.plain import LONGEST, one_line, plain
 from joda.propose.anthropic import Anthropic, ProposalFailed
 from joda.propose.history import History
+from joda.propose.requirements import read_requirements
 from joda.propose.session import NONE, Session
-from joda.propose.wishes import read_wishes
 from joda.scenes.scene import read_profiles
 
 CLI = Path(joda.__file__).parent / "cli"
@@ -656,8 +656,10 @@ def test_words_of_a_command_line_are_refused_in_a_sentence(name, good, forked):
 
 def test_no_text_takes_long_to_read(forked, tmp_path):
     """Patterns that look for one word and then another are slow where both are repeated."""
-    assert [one.name for one in read_wishes("it stays where it is left; " + "shut when " * 10**4)]
-    read_wishes(f"it clicks in {'9' * 9000} positions")
+    assert [
+        one.name for one in read_requirements("it stays where it is left; " + "shut when " * 10**4)
+    ]
+    read_requirements(f"it clicks in {'9' * 9000} positions")
     spaces = (
         door().replace("<joint ", f"<joint{' ' * 10**5}", 1).replace('5"/>', f'5"{" " * 10**5}/>')
     )

@@ -42,7 +42,7 @@ def assert_close(actual, expected, relative):
     np.testing.assert_allclose(actual, expected, rtol=0, atol=relative * scale)
 
 
-def single(y, x=None, interval=(0.0, 1.0)) -> Channel:
+def joint_model(y, x=None, interval=(0.0, 1.0)) -> Channel:
     x = np.linspace(0, 1, len(y)).tolist() if x is None else x
     return Channel(components=(Component(interval=interval, x=tuple(x), y=tuple(y)),))
 
@@ -82,7 +82,7 @@ def test_random_components_agree_with_scipy():
         y = np.round(rng.normal(0, 1, len(x)), rng.choice((0, 5, 15)))
         u = np.concatenate((x, rng.uniform(0, 1, 12)))
         s = (a + width * u).clip(a, a + width)
-        channel = single(y.tolist(), x.tolist(), (a, a + width))
+        channel = joint_model(y.tolist(), x.tolist(), (a, a + width))
         value, slope = at(jaxfield.from_channel(channel, **SIZE), s)
         curve = PchipInterpolator(x, y)
         u = (s - a) / (a + width - a)
@@ -93,7 +93,7 @@ def test_random_components_agree_with_scipy():
 def test_a_channel_without_components_is_zero():
     value, slope = jaxfield.evaluate(jaxfield.from_channel(Channel()), np.linspace(-1, 2, 7))
     np.testing.assert_array_equal((value, slope), np.zeros((2, 7)))
-    assert jaxfield.max_descent(jaxfield.from_channel(Channel()), 0, 1) == 0
+    assert jaxfield.max_stiffness(jaxfield.from_channel(Channel()), 0, 1) == 0
 
 
 @pytest.mark.parametrize("golden", GOLDENS, ids=lambda case: case.name)
@@ -106,7 +106,7 @@ def test_channels_survive_the_journey(golden):
 # --- the steepest descent
 
 
-descent = jax.jit(jaxfield.max_descent)
+descent = jax.jit(jaxfield.max_stiffness)
 
 
 @pytest.mark.parametrize("combine", ["sum", "max"])
@@ -123,7 +123,7 @@ def test_max_descent_is_the_plugins(combine):
         channel = Channel(combine=combine, components=tuple(parts))
         merged = _core.Channel(channel.text(), combine)
         ours = jaxfield.from_channel(channel, components=3, knots=5)
-        assert float(descent(ours, -0.1, 1.1)) == pytest.approx(merged.max_descent(), rel=1e-9)
+        assert float(descent(ours, -0.1, 1.1)) == pytest.approx(merged.max_stiffness(), rel=1e-9)
         knots = np.asarray(merged.knots)
         c = np.asarray(merged.coefficients).reshape(4, -1)
         t = np.linspace(0, 1, 2001)[:, None] * np.diff(knots)
@@ -230,14 +230,16 @@ def test_gradients_by_everything_are_central_differences(combine):
 )
 def test_no_gradient_vanishes_by_accident(y, s):
     """A flat curve answers to its control values, also where it is zero, at a knot or at an end."""
-    by, *_ = gradient(jaxfield.from_channel(single(y), components=3, knots=5), s)
+    by, *_ = gradient(jaxfield.from_channel(joint_model(y), components=3, knots=5), s)
     assert float(by.y[0].sum()) == pytest.approx(1, abs=1e-12)  # all raised by 1: the value too
     nearest = round(4 * s)
     assert float(by.y[0, nearest]) > 0.5
 
 
 def test_ends_of_intervals_move_the_curve_at_their_own_place():
-    channel = jaxfield.from_channel(single((1, 3, 2), interval=(0.2, 0.7)), components=3, knots=5)
+    channel = jaxfield.from_channel(
+        joint_model((1, 3, 2), interval=(0.2, 0.7)), components=3, knots=5
+    )
     by, by_s, _, slope = gradient(channel, 0.2)
     assert float(by_s) == pytest.approx(float(slope))
     assert float(by.a[0]) == pytest.approx(-float(slope))
@@ -246,7 +248,7 @@ def test_ends_of_intervals_move_the_curve_at_their_own_place():
 
 
 def test_strength_has_a_derivative_at_zero():
-    whole = jaxfield.from_channel(single((1, 3, 2)), components=3, knots=5)
+    whole = jaxfield.from_channel(joint_model((1, 3, 2)), components=3, knots=5)
     by, *_ = gradient(whole.replace(strength=jnp.zeros(())), 0.3)
     assert float(by.strength) == pytest.approx(float(gradient(whole, 0.3)[2]), rel=1e-12)
 

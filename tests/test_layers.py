@@ -23,6 +23,7 @@ LAYERS = [
     {"exporting", "compiling", "joints"},
     {"mjx", "pictures", "warp"},
     {"measured"},
+    {"estimation"},
     {"hidden", "importing", "interaction", "diagnosis"},
     {"refining", "propose"},
     {"commands"},

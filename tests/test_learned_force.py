@@ -15,9 +15,9 @@ from test_effects_physics import MASS, build, run
 
 from joda import JodaError, Profile
 from joda.effects import LearnedForce
+from joda.estimation.profile_parameters import Parameters
 from joda.exporting.nearest import nearest
 from joda.field.table import resistance
-from joda.joints.parameters import Parameters
 from joda.joints.resistance import damping
 from joda.pictures.draw import draw
 from joda.pictures.style import EFFECTS as COLOUR

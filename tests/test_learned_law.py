@@ -10,6 +10,7 @@ from gauging import SPAN, gauged
 from joda import add, hidden_effect
 from joda.commands.add import sentences
 from joda.commands.hidden_effect import _judged_law
+from joda.diagnosis.adding import error
 from joda.diagnosis.learning.account import Account, account
 from joda.diagnosis.learning.account import sentences as account_sentences
 from joda.diagnosis.learning.choosing import Learning, learn
@@ -20,7 +21,6 @@ from joda.diagnosis.learning.law import Law, Terms
 from joda.diagnosis.learning.library import of_speed
 from joda.diagnosis.learning.nearest import Nearest
 from joda.diagnosis.learning.smooth import modes_of, nearness
-from joda.diagnosis.mending import error
 from joda.diagnosis.split import parted
 from joda.hidden import draw, write
 from joda.measured.reading import read_measured

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize, rosen
 
-from joda.joints.least_squares import Inequalities, bounded_step, levenberg_marquardt
+from joda.estimation.least_squares import Inequalities, bounded_step, levenberg_marquardt
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -22,7 +22,7 @@ import joda
 jax.config.update("jax_enable_x64", True)
 import joda.mjx  # noqa: E402
 from joda.field.jaxeffects import NAMES  # noqa: E402
-from joda.joints.single import single  # noqa: E402
+from joda.joints.joint_model import joint_model  # noqa: E402
 from joda.profile import Channels  # noqa: E402
 from joda.scenes.scene import profiles_of  # noqa: E402
 
@@ -171,10 +171,10 @@ def check_alone(scene, forces, found):
     for k, name in enumerate(JOINTS):
         place, profile = scene.fields[name].place, scene.profiles[name]
         bare = scene.found[name]
-        own = single(bare, profile, scene.model, place.joint)
-        solo = replace(own, inertia=bare.equivalent_inertia).solo(profile, H)
+        own = joint_model(bare, profile, scene.model, place.joint)
+        simulator = replace(own, inertia=bare.equivalent_inertia).simulator(profile, H)
         start = np.array([[LOW[k] + 0.4 * SPANS[k], 0.0]])
-        path = solo.replay(forces[:, k], np.zeros(1, int), start, np.array([True]), H)[1]
+        path = simulator.replay(forces[:, k], np.zeros(1, int), start, np.array([True]), H)[1]
         assert np.abs(path - found[:, k]).max() < 2e-8 * SPANS[k]
 
 

@@ -17,7 +17,7 @@ from joda.propose import Task, Turn
 from joda.propose.checks import Seen
 from joda.propose.offline import Offline
 from joda.propose.recognise import recognise
-from joda.propose.wishes import WISHES, Wanted, read_wishes, unmet
+from joda.propose.requirements import REQUIREMENTS, Requirement, read_requirements, unmet
 from joda.scenes.context import Context
 from joda.scenes.model import joint_name, joint_type, load_model
 from joda.template import read_templates
@@ -57,7 +57,7 @@ def turn(found: Context, proposal: Proposal, key: str = "", complaint: str = "")
     """What the proposer is shown of a proposal."""
     profile = compile(proposal, found, key=key)
     behaved = behaviour(found, profile)
-    lacking = unmet(read_wishes(proposal.whole_motion_descrptn), behaved, found)
+    lacking = unmet(read_requirements(proposal.whole_motion_descrptn), behaved, found)
     facts = behaved.describe(found)
     return Turn(proposal, profile, behaved, bytes, facts, list(lacking.values()), complaint)
 
@@ -90,9 +90,12 @@ def joints(path: Path) -> list[str]:
     return [joint_name(model, j) for j in every if joint_type(model, j) in ("hinge", "slide")]
 
 
-def does(found: Context, behaved: Behaviour, *wishes: str, number: int = 0) -> None:
+def does(found: Context, behaved: Behaviour, *requirements: str, number: int = 0) -> None:
     """Asserts that the joint was simulated to do these."""
-    assert unmet([Wanted(wish, number) for wish in wishes], behaved, found) == {}
+    assert (
+        unmet([Requirement(requirement, number) for requirement in requirements], behaved, found)
+        == {}
+    )
 
 
 def good(done: Loop) -> None:
@@ -107,7 +110,7 @@ def good(done: Loop) -> None:
 def test_every_own_model_ends_with_its_wishes_met_whatever_is_drawn(name, key):
     done = own(name, key=key)
     good(done)
-    assert read_wishes(done.last.proposal.whole_motion_descrptn)
+    assert read_requirements(done.last.proposal.whole_motion_descrptn)
 
 
 @pytest.mark.sweep(2)
@@ -249,10 +252,10 @@ def test_what_latches_is_not_taken_for_a_latch(tmp_path):
         ("knob", "It turns smoothly and has no clicks.", ""),
     ],
 )  # fmt: skip
-def test_what_the_user_says_of_a_joint_comes_true(name, description, wishes):
+def test_what_the_user_says_of_a_joint_comes_true(name, description, requirements):
     done = own(name, description)
     good(done)
-    does(done.context, done.last.behaviour, *wishes.split())
+    does(done.context, done.last.behaviour, *requirements.split())
 
 
 @pytest.mark.sweep(6)
@@ -277,7 +280,7 @@ def test_what_the_user_denies_is_not_proposed():
     names = [effect.effect_name for effect in without.last.proposal.effect_proposals]
     assert not any("detent" in name or "spring" in name for name in names)
     closing = Seen(own("refrigerator").last.behaviour, own("refrigerator").context)
-    assert WISHES["left_open"].check(closing) != ""
+    assert REQUIREMENTS["left_open"].check(closing) != ""
 
 
 def test_a_wish_leaves_what_it_does_not_touch():

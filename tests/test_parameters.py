@@ -5,10 +5,10 @@ import pytest
 
 from joda import templates
 from joda.component import Component
-from joda.diagnosis.reshaping import resolved
+from joda.diagnosis.shape_refinement import resolved
+from joda.estimation.least_squares import bounded_step
+from joda.estimation.profile_parameters import KINDS, Parameters
 from joda.field import evaluate
-from joda.joints.least_squares import bounded_step
-from joda.joints.parameters import KINDS, Parameters
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
 
 NAMES = sorted(templates())
@@ -41,8 +41,8 @@ def test_whatever_is_allowed_keeps_signs_and_rises_and_falls(name):
     rng = np.random.default_rng(0)
     for _ in range(20):
         G, h = p.constraints.G, p.constraints.h
-        wish = rng.normal(0, 0.5, len(p.start))
-        theta = p.start + bounded_step(np.eye(len(wish)), wish, G, h - G @ p.start)
+        requirement = rng.normal(0, 0.5, len(p.start))
+        theta = p.start + bounded_step(np.eye(len(requirement)), requirement, G, h - G @ p.start)
         after = p.written(theta)
         for channel in CHANNELS:
             pairs = (getattr(q.channels, channel).components for q in (profile, after))
@@ -75,15 +75,15 @@ def test_points_where_no_run_was_change_by_what_was_seen_of_what_they_bend():
     rub = Component(label="rub", interval=(0.2, 1.0), x=(0, 0.25, 0.5, 1), y=(1.0, 2.0, 2.0, 1.0))
     joint = Joint(name="j", type="hinge", range=(0, 2), unit="rad")
     profile = Profile(joint=joint, channels=Channels(friction=Resistance(components=(rub,))))
-    doubt = Parameters(profile, ("values",), away=((0.0, 0.3), (0.7, 1.0))).doubt
-    np.testing.assert_allclose(doubt, [0.25, 0.5, 0.5, 0.125])  # at s = 0.2, 0.4, 0.6 and 1
+    prior_std = Parameters(profile, ("values",), away=((0.0, 0.3), (0.7, 1.0))).prior_std
+    np.testing.assert_allclose(prior_std, [0.25, 0.5, 0.5, 0.125])  # at s = 0.2, 0.4, 0.6 and 1
     about = Parameters(profile, ("values",), away=((0.3, 1.0),)).about(profile)
-    np.testing.assert_allclose(about.doubt, [0.5, 0.125, 0.05, 0.05])
+    np.testing.assert_allclose(about.prior_std, [0.5, 0.125, 0.05, 0.05])
     flat = rub.model_copy(update={"interval": (0.0, 1.0), "x": (0.0, 1.0), "y": (1.0, 1.0)})
     channels = Channels(friction=Resistance(components=(flat,)))
     profile = profile.model_copy(update={"channels": channels})
-    doubt = Parameters(profile, ("values",), away=((0.0, 0.2), (0.7, 1.0))).doubt
-    np.testing.assert_allclose(doubt, [0.25, 0.25])  # both ends away, half of it seen
+    prior_std = Parameters(profile, ("values",), away=((0.0, 0.2), (0.7, 1.0))).prior_std
+    np.testing.assert_allclose(prior_std, [0.25, 0.25])  # both ends away, half of it seen
 
 
 def test_strengths_multiply_channels():

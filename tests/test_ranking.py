@@ -7,18 +7,19 @@ import pytest
 from hidden_cases import clear_case, read
 
 from joda.commands.templates import templates
-from joda.diagnosis import asking, ranking
-from joda.diagnosis.asking import asked
-from joda.diagnosis.guessing import beside
+from joda.diagnosis import baseline as fits
+from joda.diagnosis import search
+from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.hypotheses import Units, hypotheses
 from joda.diagnosis.hypotheses.base import KNOWN_SHAPE
 from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
-from joda.diagnosis.judge import BEND
-from joda.diagnosis.ranking import NARROWED, WELLS, WORST, _told_within, narrowed, rank
+from joda.diagnosis.hypothesis_fits import beside
+from joda.diagnosis.search import NARROWED, WELLS, WORST, _shown_without_impacts, narrowed, rank
+from joda.diagnosis.selection import weigh
 from joda.diagnosis.verdict import diagnosed
-from joda.diagnosis.weighing import weigh
 from joda.effects import EndStopRestitution, QuadraticDamping
+from joda.estimation.estimator import CAUCHY_SCALE
 from joda.field import evaluate
 from joda.hidden import EFFECTS, draw
 from joda.profile import Channel, Joint, Profile
@@ -41,83 +42,85 @@ def measured():
 
 
 @pytest.fixture(scope="module")
-def begun(measured):
+def baseline(measured):
     """The model fitted to them."""
-    return asked(measured)
+    return fit_baseline(measured)
 
 
 @pytest.fixture(scope="module")
-def told():
+def progress():
     """What is done, of how much."""
     return []
 
 
 @pytest.fixture(scope="module")
-def ranked(begun, told):
-    return rank(begun, without(begun), lambda done, total, what: told.append((done, total)))
-
-
-def without(begun):
-    """What is not tried."""
-    return {h.effect for h in begun.hypotheses} - {EFFECT, *OTHERS}
-
-
-def test_what_is_left_rough_changes_nothing_of_the_best(begun, ranked, monkeypatch):
-    finished = []
-    monkeypatch.setattr(ranking, "ENOUGH", 0.0)
-    monkeypatch.setattr(
-        asking, "finished", lambda *args, make=asking.finished: finished.append(0) or make(*args)
+def ranked(baseline, progress):
+    return rank(
+        baseline, without(baseline), lambda done, total, what: progress.append((done, total))
     )
-    whole = rank(begun, without(begun))
-    assert len(finished) >= 1 + len(OTHERS)
-    assert whole.guesses[0].hypothesis.effect == ranked.guesses[0].hypothesis.effect == EFFECT
-    assert whole.guesses[0].fit.loss == pytest.approx(ranked.guesses[0].fit.loss, abs=1.0)
+
+
+def without(baseline):
+    """What is not tried."""
+    return {h.effect for h in baseline.hypotheses} - {EFFECT, *OTHERS}
+
+
+def test_what_is_left_rough_changes_nothing_of_the_best(baseline, ranked, monkeypatch):
+    refined = []
+    monkeypatch.setattr(search, "ENOUGH", 0.0)
+    monkeypatch.setattr(
+        fits, "refined", lambda *args, make=fits.refined: refined.append(0) or make(*args)
+    )
+    whole = rank(baseline, without(baseline))
+    assert len(refined) >= 1 + len(OTHERS)
+    assert whole.candidates[0].hypothesis.effect == ranked.candidates[0].hypothesis.effect == EFFECT
+    assert whole.candidates[0].fit.loss == pytest.approx(ranked.candidates[0].fit.loss, abs=1.0)
     assert whole.level == pytest.approx(ranked.level, rel=0.01)
 
 
-def test_progress_counts_and_never_exceeds_the_total(ranked, told):
-    assert [done for done, _ in told] == list(range(1, len(told) + 1))
-    assert all(done <= total for done, total in told)
-    assert told[-1][0] > 0.8 * told[-1][1]
+def test_progress_counts_and_never_exceeds_the_total(ranked, progress):
+    assert [done for done, _ in progress] == list(range(1, len(progress) + 1))
+    assert all(done <= total for done, total in progress)
+    assert progress[-1][0] > 0.8 * progress[-1][1]
 
 
-def test_the_best_are_fitted_to_longer_windows_from_where_they_were(measured, begun, ranked):
+def test_the_best_are_fitted_to_longer_windows_from_where_they_were(measured, baseline, ranked):
     """There the others leave a larger part of what the true one does."""
-    longer = asked(measured, 3 * begun.judge.windows.length, begun.fit.x)
+    longer = fit_baseline(measured, 3 * baseline.estimator.segments.length, baseline.fit.x)
     closer = narrowed(longer, ranked)
-    names = [one.hypothesis.effect for one in ranked.guesses]
-    assert {one.hypothesis.effect for one in closer.guesses} <= set(names[:NARROWED])
-    assert closer.guesses[0].hypothesis.effect == EFFECT
-    assert closer.guesses[0].x == pytest.approx(ranked.guesses[0].x, rel=0.1)
-    assert len(longer.judge.windows.at) < len(begun.judge.windows.at)
+    names = [one.hypothesis.effect for one in ranked.candidates]
+    assert {one.hypothesis.effect for one in closer.candidates} <= set(names[:NARROWED])
+    assert closer.candidates[0].hypothesis.effect == EFFECT
+    assert closer.candidates[0].x == pytest.approx(ranked.candidates[0].x, rel=0.1)
+    assert len(longer.estimator.segments.at) < len(baseline.estimator.segments.at)
 
 
-def test_ends_are_asked_last_where_windows_without_knocks_tell_of_an_effect(begun, ranked):
-    noise = float(begun.judge.samples)
+def test_ends_are_asked_last_where_windows_without_knocks_tell_of_an_effect(baseline, ranked):
+    noise = float(baseline.estimator.samples)
 
     def tells(without, with_it):
-        model = replace(begun, fit=replace(begun.fit, loss=without))
-        best = [replace(one, fit=replace(one.fit, loss=with_it)) for one in ranked.guesses]
-        return _told_within(model, best)
+        model = replace(baseline, fit=replace(baseline.fit, loss=without))
+        best = [replace(one, fit=replace(one.fit, loss=with_it)) for one in ranked.candidates]
+        return _shown_without_impacts(model, best)
 
     assert tells(5 * noise, noise)
     assert not tells(5 * noise, 4 * noise)  # more than noise is left
     assert not tells(noise, noise)
-    assert not _told_within(begun, [])
+    assert not _shown_without_impacts(baseline, [])
 
 
-def test_no_excluded_effect_is_ranked(begun):
+def test_no_excluded_effect_is_ranked(baseline):
     kept = "added_inertia"
-    exclude = {h.effect for h in begun.hypotheses} - {kept}
-    assert {one.hypothesis.effect for one in rank(begun, exclude).guesses} <= {kept}
-    assert rank(begun, {*exclude, kept}).guesses == ()
+    exclude = {h.effect for h in baseline.hypotheses} - {kept}
+    assert {one.hypothesis.effect for one in rank(baseline, exclude).candidates} <= {kept}
+    assert rank(baseline, {*exclude, kept}).candidates == ()
 
 
-def test_a_model_that_was_fitted_badly_is_fitted_anew(begun):
+def test_a_model_that_was_fitted_badly_is_fitted_anew(baseline):
     """From where the best effect was found; else all that is tried would seem to be missing."""
-    stuck = replace(begun, fit=replace(begun.fit, loss=3 * begun.fit.loss))
-    found = rank(stuck, {h.effect for h in begun.hypotheses} - {EFFECT}).asked.fit
-    assert found.loss < 1.5 * begun.fit.loss
+    stuck = replace(baseline, fit=replace(baseline.fit, loss=3 * baseline.fit.loss))
+    found = rank(stuck, {h.effect for h in baseline.hypotheses} - {EFFECT}).baseline.fit
+    assert found.loss < 1.5 * baseline.fit.loss
 
 
 @pytest.mark.long
@@ -125,18 +128,20 @@ def test_a_load_behind_a_play_is_told_from_a_handle_before_it():
     """Of a joint of the independent simulator: flanks that give way, and shares that differ."""
     case = draw(2, "backlash", family="household")
     (hidden,) = case.truth.hidden
-    begun = asked(read(case)[0])
-    first, second = (begun.tell(h) for h in begun.hypotheses if h.effect == "backlash")
+    baseline = fit_baseline(read(case)[0])
+    first, second = (
+        baseline.fit_hypothesis(h) for h in baseline.hypotheses if h.effect == "backlash"
+    )
     assert second.score < 0.6 * first.score
-    (effect,) = second.written(begun.base).effects
+    (effect,) = second.written(baseline.base).effects
     assert (effect.side, effect.play) == ("motor", pytest.approx(hidden.width, rel=0.15))
     assert effect.load == pytest.approx(hidden.inertia, rel=0.15)
     assert effect.share == pytest.approx(hidden.friction / case.truth.friction, abs=0.15)
 
 
-def test_a_well_is_tried_where_the_other_was_found(begun):
-    first, second = (next(h for h in begun.hypotheses if h.effect == name) for name in WELLS)
-    found = begun.tell(first)
+def test_a_well_is_tried_where_the_other_was_found(baseline):
+    first, second = (next(h for h in baseline.hypotheses if h.effect == name) for name in WELLS)
+    found = baseline.fit_hypothesis(first)
     found = replace(found, fit=replace(found.fit, x=np.append(found.fit.x[:-2], (0.6, 0.9))))
     tried = beside(second, found)
     assert tried.effect == second.effect
@@ -153,21 +158,26 @@ def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
 
 def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
     """If neither leaves only noise, though one whose shape is roughly known might leave so much."""
-    judge = ranked.asked.judge
-    squares = 30.0 * judge.windows.count  # far off, whatever effect was drawn
-    far = replace(ranked.asked.fit, squares=squares, loss=judge.loss(squares))
-    clear = replace(ranked, asked=replace(ranked.asked, fit=far), level=1.0, told=judge.samples)
+    estimator = ranked.baseline.estimator
+    squares = 30.0 * estimator.segments.count  # far off, whatever effect was drawn
+    far = replace(ranked.baseline.fit, squares=squares, loss=estimator.loss(squares))
+    clear = replace(
+        ranked, baseline=replace(ranked.baseline, fit=far), level=1.0, n_effective=estimator.samples
+    )
     own = weigh(clear).excess[0]
 
     def verdict(*parts):
         """Where the first effects leave these parts of the excess."""
-        guesses = [
-            replace(guess, score=(part * own + BEND * np.log1p(1 / BEND)) * clear.told)
-            for guess, part in zip(clear.guesses, parts, strict=False)
+        candidates = [
+            replace(
+                candidate,
+                score=(part * own + CAUCHY_SCALE * np.log1p(1 / CAUCHY_SCALE)) * clear.n_effective,
+            )
+            for candidate, part in zip(clear.candidates, parts, strict=False)
         ]
-        rough = replace(guesses[0].hypothesis, remains=KNOWN_SHAPE)
-        guesses[0] = replace(guesses[0], hypothesis=rough)
-        return weigh(replace(clear, guesses=tuple(guesses))).verdict
+        coarse = replace(candidates[0].hypothesis, misfit_tolerance=KNOWN_SHAPE)
+        candidates[0] = replace(candidates[0], hypothesis=coarse)
+        return weigh(replace(clear, candidates=tuple(candidates))).verdict
 
     assert verdict(0.15, 0.6) == "missing_effect"
     assert verdict(0.15, 0.18) == "unexplained"
@@ -177,8 +187,8 @@ def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
 @pytest.mark.long
 @pytest.mark.long
 def test_ends_that_are_bouncier_than_the_model_s_are_unexplained_if_that_is_excluded():
-    """Only knocks tell of them, and those tell of nothing else."""
-    train = read(draw(195372811, "end_stop_restitution"))[0]  # one whose knocks are hard enough
+    """Only impacts tell of them, and those tell of nothing else."""
+    train = read(draw(195372811, "end_stop_restitution"))[0]  # one whose impacts are hard enough
     others = set(EFFECTS) - {"end_stop_restitution", "quadratic_damping"}
     assert diagnosed(train, others).diagnosis.effects[0].effect == "end_stop_restitution"
     without = diagnosed(train, {*others, "end_stop_restitution"}).diagnosis
@@ -208,29 +218,29 @@ def is_curve(hypothesis, effect):
 
 
 @pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])
-def test_a_constant_on_less_than_0_8_of_the_range_differs_along_the_way(begun, effect):
+def test_a_constant_on_less_than_0_8_of_the_range_differs_along_the_way(baseline, effect):
     """As the contract has it; what covers more is the constant effect."""
-    zone = next(h for h in begun.hypotheses if h.effect == effect and len(h.unknowns.low) == 4)
+    zone = next(h for h in baseline.hypotheses if h.effect == effect and len(h.unknowns.low) == 4)
     for (a, b), itself in (((0.3, 0.6), True), ((0.0, 0.78), True), ((0.1, 0.95), False)):
         assert zone.itself(np.array([1.0, 0.002, a, b])) == itself
 
 
 @pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])
-def test_a_curve_that_hardly_differs_along_the_way_is_none(begun, effect):
+def test_a_curve_that_hardly_differs_along_the_way_is_none(baseline, effect):
     """Another effect, a constant one, is all that it is; excluding that makes no curve of it."""
-    found = begun.tell(next(h for h in begun.hypotheses if is_curve(h, effect)))
-    n = len(begun.base.places)
+    found = baseline.fit_hypothesis(next(h for h in baseline.hypotheses if is_curve(h, effect)))
+    n = len(baseline.base.places)
     for y, vanished in ((np.full(9, 0.3), True), (np.linspace(0, 0.6, 9), False)):
         fit = replace(found.fit, x=np.append(found.fit.x[:n], y))
         assert replace(found, fit=fit).vanished == vanished
 
 
 @pytest.mark.parametrize("effect", ["position_dependent_friction", "position_dependent_damping"])
-def test_a_curve_is_level_where_no_run_has_been(begun, effect):
+def test_a_curve_is_level_where_no_run_has_been(baseline, effect):
     units = replace(UNITS, visited=(0.2, 0.7))
-    every = hypotheses(units, templates(), begun.base.profile)
+    every = hypotheses(units, templates(), baseline.base.profile)
     curve = next(h for h in every if is_curve(h, effect))
-    written = curve.write(begun.base.profile, np.arange(1.0, len(curve.unknowns.low) + 1))
+    written = curve.write(baseline.base.profile, np.arange(1.0, len(curve.unknowns.low) + 1))
     channel = getattr(written.channels, "friction" if "friction" in effect else "damping")
     part = channel.components[-1]
     s = np.array([0, 0.1, 0.2, 0.7, 0.8, 1])
@@ -242,16 +252,18 @@ def test_a_curve_is_level_where_no_run_has_been(begun, effect):
 
 def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened():
     """Drag as an effect of which usually only a tenth of the true size is looked for."""
-    begun = asked(read(draw(84751434, EFFECT))[0].changed(runs=[0, 4]))
-    every = [h for h in begun.hypotheses if h.effect == EFFECT]
-    size = begun.tell(every[0]).x[0]
+    baseline = fit_baseline(read(draw(84751434, EFFECT))[0].changed(runs=[0, 4]))
+    every = [h for h in baseline.hypotheses if h.effect == EFFECT]
+    size = baseline.fit_hypothesis(every[0]).x[0]
     usual, widest = (np.array([0.1, 10.0]) * size)[:, None]
 
-    def told(high, widest):
+    def bounded(high, widest):
         bounds = replace(every[0].unknowns, high=high, widest=np.stack([[np.nan], widest]))
-        return begun.tell(replace(every[0], unknowns=bounds, trials=np.array([[0.05 * size]])))
+        return baseline.fit_hypothesis(
+            replace(every[0], unknowns=bounds, trials=np.array([[0.05 * size]]))
+        )
 
-    hard, pressed, wide = (told(usual, up) for up in ([np.nan], 2 * usual, widest))
+    hard, pressed, wide = (bounded(usual, up) for up in ([np.nan], 2 * usual, widest))
     assert hard.x[0] == pytest.approx(usual[0]) and not hard.vanished
     assert pressed.x[0] <= 2 * usual[0] and pressed.vanished
     assert usual[0] < wide.x[0] < widest[0] and not wide.vanished

@@ -13,13 +13,13 @@ import pytest
 from assets import SHARED
 from scipy import signal
 
+from joda.diagnosis.adding import add_effect
 from joda.diagnosis.learning.choosing import learn
-from joda.diagnosis.mending import mend
 from joda.diagnosis.rivals import DRIVING, RESISTING
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
 from joda.joints.resistance import damping, friction_bounds
-from joda.measured.gauge import static_force
+from joda.measured.quasi_static import static_force
 from joda.measured.reading import read_measured
 
 DATA = SHARED / "data"
@@ -116,14 +116,14 @@ def test_the_mended_drive_predicts_the_force(drive):
     cut = 3 * len(run.time) // 4
     pieces = run.part(slice(0, cut)), run.part(slice(cut, None))
     train, held = (drive.measured.with_runs([piece], [0]) for piece in pieces)
-    mended = mend(train, held, drive.first.effect, drive.first.direction)
-    assert mended.effect == drive.first.effect
-    assert mended.after.window < 0.3 * mended.before.window
+    added_effect = add_effect(train, held, drive.first.effect, drive.first.direction)
+    assert added_effect.effect == drive.first.effect
+    assert added_effect.after.window < 0.3 * added_effect.before.window
     run = held.runs[0]
     model, bare, offset = (
         force_error(run, profile, constant)
         for profile, constant in (
-            (mended.profile, 0.0),
+            (added_effect.profile, 0.0),
             (drive.measured.profile, 0.0),
             (drive.measured.profile, OFFSET),
         )
@@ -188,10 +188,10 @@ def test_the_pendulum_has_no_quadratic_drag(pendulum):
 
 @pytest.mark.long("the pendulum")
 def test_the_pendulums_resistance_is_learned_without_a_name(pendulum):
-    mended, found = learn(*parted(pendulum.measured))
+    added_effect, found = learn(*parted(pendulum.measured))
     assert found.law.terms.speed
-    assert mended.after.window < 0.5 * mended.before.window
-    assert mended.after.whole < 0.5 * mended.before.whole
+    assert added_effect.after.window < 0.5 * added_effect.before.window
+    assert added_effect.after.whole < 0.5 * added_effect.before.whole
 
 
 # --- the doors
@@ -237,11 +237,11 @@ def test_the_doors_are_to_be_pushed_both_ways_slowly(door):
 @pytest.mark.long("the lab door")
 @pytest.mark.parametrize("door", ["lab"], indirect=True)
 def test_the_mended_lab_door_is_held_where_the_real_one_is(door):
-    mended = mend(*parted(door.measured), door.first.effect)
-    assert mended.effect == door.first.effect
-    assert mended.after.window < 0.7 * mended.before.window  # N·m
+    added_effect = add_effect(*parted(door.measured), door.first.effect)
+    assert added_effect.effect == door.first.effect
+    assert added_effect.after.window < 0.7 * added_effect.before.window  # N·m
     places = np.array([0.05, 0.3, 1.0])
-    force = static_force(mended.profile, door.measured.context, places, 1)
+    force = static_force(added_effect.profile, door.measured.context, places, 1)
     curve = door.measured.curves[0].curve
     felt = [np.mean(curve.force[np.abs(curve.position - q) < 0.05]) for q in places]
     np.testing.assert_allclose(force, felt, atol=0.3)
@@ -251,9 +251,9 @@ def test_the_mended_lab_door_is_held_where_the_real_one_is(door):
 @pytest.mark.long("the lab door")
 @pytest.mark.parametrize("door", ["lab"], indirect=True)
 def test_the_lab_doors_catch_is_learned_without_a_name(door):
-    mended, found = learn(*parted(door.measured))
+    added_effect, found = learn(*parted(door.measured))
     assert found.law.terms.position
-    assert mended.after.window < 0.7 * mended.before.window  # N·m
+    assert added_effect.after.window < 0.7 * added_effect.before.window  # N·m
     places = np.array([0.05, 0.3, 1.0])
-    force = static_force(mended.profile, door.measured.context, places, 1)
+    force = static_force(added_effect.profile, door.measured.context, places, 1)
     assert force[0] > 5 * np.abs(force[1:]).max()

@@ -21,7 +21,7 @@ from joda.propose.naming import _vocabulary, concepts, said
 from joda.propose.offline import Offline
 from joda.propose.plausible import Force, forces
 from joda.propose.recognise import recognise
-from joda.propose.wishes import Wanted, read_wishes, state
+from joda.propose.requirements import Requirement, read_requirements, state
 from joda.scenes.model import find_joint
 from joda.scenes.motion import settle
 from joda.template import read_templates
@@ -116,8 +116,8 @@ def nameless(model, joint):
         ("switch", "rocker", "two_sides"),
     ],
 )
-def test_own_models_are_told_by_their_shape_alone(model, joint, wish):
-    assert wish in recognise(nameless(model, joint))[0].wishes
+def test_own_models_are_told_by_their_shape_alone(model, joint, requirement):
+    assert requirement in recognise(nameless(model, joint))[0].requirements
 
 
 @pytest.mark.parametrize(
@@ -131,17 +131,20 @@ def test_own_models_are_told_by_their_shape_alone(model, joint, wish):
         ("drawer", "coffeemachine.xml", "goal_slidey", "closes_anywhere"),
     ],
 )
-def test_other_peoples_are_told_by_their_shape_alone(source, file, joint, wish):
+def test_other_peoples_are_told_by_their_shape_alone(source, file, joint, requirement):
     path = asset(source)
     found = context(path.with_name(file) if file else path, joint)
     bare = found.model_copy(update={"names": (), "around": ()})
-    assert wish in recognise(bare)[0].wishes and wish in recognise(found)[0].wishes
+    assert (
+        requirement in recognise(bare)[0].requirements
+        and requirement in recognise(found)[0].requirements
+    )
 
 
 def test_a_lever_on_a_stand_of_its_own_stays_where_it_is_put():
     path = asset("drawer").with_name("lever.xml")
     kind, found = recognise(context(path, "LeverAxis"))
-    assert found.title == "control lever" and "stays_put" in kind.wishes
+    assert found.title == "control lever" and "stays_put" in kind.requirements
 
 
 HALF = {
@@ -158,9 +161,9 @@ def test_objects_that_nobody_has_seen_are_told_by_their_shape_alone():
     rows = list(made(seed, named=False, rounds=1))
     right = 0
     for row in rows:
-        wishes = set(recognise(row.found)[0].wishes)
+        requirements = set(recognise(row.found)[0].requirements)
         expected = HALF.get(row.expected.get("half", ""), {"two_sides"})
-        right += bool(wishes & expected)
+        right += bool(requirements & expected)
     assert right >= 0.75 * len(rows), f"seed {seed}: {right} of {len(rows)}"
 
 
@@ -245,7 +248,7 @@ def test_every_archetype_has_its_force_and_effects_that_there_are():
     names = read_templates()
     for one in read_archetypes():
         assert one.evidence and (one.force or one.unknown or one.driven)
-        for part in one.parts:
+        for part in one.effects:
             filled = part.effect.format(
                 closed="low_end", open="high_end", opening="positive", closing="negative"
             )
@@ -276,9 +279,13 @@ def test_the_page_has_the_table_of_forces():
     ],
 )
 def test_a_force_at_the_handle_can_be_said(said, least, most):
-    wish = next(wish for wish in read_wishes(said) if wish.name == "takes")
-    assert (wish.number, wish.most) == pytest.approx((least, most))
-    assert read_wishes(state([Wanted("takes", least, most)])) == [Wanted("takes", least, most)]
+    requirement = next(
+        requirement for requirement in read_requirements(said) if requirement.name == "takes"
+    )
+    assert (requirement.number, requirement.most) == pytest.approx((least, most))
+    assert read_requirements(state([Requirement("takes", least, most)])) == [
+        Requirement("takes", least, most)
+    ]
 
 
 def test_a_wish_for_a_force_comes_true(tmp_path):
@@ -353,7 +360,7 @@ def test_the_handle_of_a_sink_is_a_taps_and_that_of_a_stand_is_none(tmp_path):
     path.write_text(SINK.format(name="kitchen_sink"))
     kind, found = recognise(context(path, "j"))
     assert found.title == "handle of a tap" and found.force.opening == (1, 22.2)
-    assert kind.wishes == ("stays_put",)
+    assert kind.requirements == ("stays_put",)
     path.write_text(SINK.format(name="throttle"))
     assert "tap" not in recognise(context(path, "j"))[1].title
 
@@ -439,15 +446,21 @@ def test_a_robots_joint_is_told_whichever_of_its_joints_the_motors_are_on(
 @pytest.mark.parametrize(
     ("said", "wish"),
     [
-        ("It shuts with at most 0.4 m/s at the handle.", Wanted("arrives", most=0.4)),
-        ("It closes by itself and arrives with less than 1.5 m/s.", Wanted("arrives", most=1.5)),
-        ("It holds between 20 and 110 degrees.", Wanted("holds_between", 20, 110)),
-        ("The lid stays where it is from 15 to 62.5 degrees.", Wanted("holds_between", 15, 62.5)),
+        ("It shuts with at most 0.4 m/s at the handle.", Requirement("arrives", most=0.4)),
+        (
+            "It closes by itself and arrives with less than 1.5 m/s.",
+            Requirement("arrives", most=1.5),
+        ),
+        ("It holds between 20 and 110 degrees.", Requirement("holds_between", 20, 110)),
+        (
+            "The lid stays where it is from 15 to 62.5 degrees.",
+            Requirement("holds_between", 15, 62.5),
+        ),
     ],
 )
-def test_a_speed_and_angles_can_be_said(said, wish):
-    assert wish in read_wishes(said)
-    assert read_wishes(state([wish])) == [wish]
+def test_a_speed_and_angles_can_be_said(said, requirement):
+    assert requirement in read_requirements(said)
+    assert read_requirements(state([requirement])) == [requirement]
 
 
 BOX = """<mujoco model="{called}"><compiler angle="radian"/><worldbody>

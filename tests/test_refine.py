@@ -18,7 +18,7 @@ from joda import JodaError, Profile, attach, compare, context, refine
 from joda.commands.refine import Refined
 from joda.component import Component
 from joda.effects import GravityOffset
-from joda.measured.gauge import static_force
+from joda.measured.quasi_static import static_force
 from joda.measured.runs import Run, write_run
 from joda.profile import Channels, Joint, Resistance
 from joda.refining.refinement import extrapolated

@@ -7,9 +7,9 @@ from refine_table import STEP, planted, pushed, quiet_rig
 
 from joda import JodaError, attach, read_profiles, refine
 from joda.component import Component
+from joda.estimation.profile_parameters import Parameters
 from joda.field import evaluate
-from joda.joints.parameters import Parameters
-from joda.joints.single import single
+from joda.joints.joint_model import joint_model
 from joda.measured.runs import Run
 from joda.measured.scene_log import SceneRun, read_scene_run
 from joda.mjx.shooting import Scene
@@ -105,7 +105,7 @@ def both():
         hand = pushed(right, width, force, rng, pace, 2.5)
         noisy = hand.position + rng.normal(0, noise, len(hand.time))
         runs.append(Run("run.csv", hand.time, noisy, None, hand.force, True))
-    own = single(case.found, start, model, 0)
+    own = joint_model(case.found, start, model, 0)
     by_itself = JointEngine(own, span, runs, noise, STEP)
     nothing = np.zeros((len(runs[0].time), 0))
     together = [
@@ -132,11 +132,11 @@ def test_both_engines_move_alike_and_have_the_same_slopes(both):
     theta = parameters.start + 0.02 * rng.normal(size=len(parameters.start))
     found = []
     for one in (alone, scene):
-        judge = one.judge(0.4)
-        start = judge.windows.start
-        found.append(judge.linear(one.mover, one.unknowns(), theta, start))
+        estimator = one.estimator(0.4)
+        start = estimator.segments.start
+        found.append(estimator.linear(one.mover, one.unknowns(), theta, start))
     mine, theirs = found
-    for name in ("r", "J", "S"):  # differences are off where a window sticks or snaps within them
+    for name in ("r", "J", "S"):  # differences are off where a segment sticks or snaps within them
         a, b = (getattr(one, name) for one in (mine, theirs))
         assert np.median(np.abs(a - b)) < 1e-2 * np.sqrt(np.median(a**2)), name
 
@@ -148,7 +148,7 @@ def test_both_engines_find_the_same_numbers(both):
     for one in shootings:
         theta = one.parameters.start
         for length in (0.1, 0.4, 0.4):
-            theta = one.fit_windows(one.judge(length), theta, one.parameters.doubt, 20)
+            theta = one.fit_windows(one.estimator(length), theta, one.parameters.prior_std, 20)
         found.append(theta)
     np.testing.assert_allclose(found[1], found[0], atol=1e-3)
     truth = [1 / factors[slot.channel] for slot in shootings[0].parameters.slots[:-1]]
@@ -217,7 +217,7 @@ def test_a_door_that_another_body_pushes_is_refined_in_its_scene(tmp_path):
     )  # fmt: skip
     (told,) = [note for note in done.notes if "whole scene" in note]
     assert "touches" in told
-    assert done.windows[1] < 1.5 * done.noise < 0.5 * done.windows[0]
+    assert done.segments[1] < 1.5 * done.noise < 0.5 * done.segments[0]
     found = read_profiles(tmp_path / "better.xml")["elbow"]
     s = np.linspace(0.4, 0.6, 21)
     a, b = (evaluate(p.channels.conservative, s)[0] for p in (found, TRUE))

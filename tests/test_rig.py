@@ -95,7 +95,7 @@ def test_the_rig_has_the_scenes_inertia_and_gravity_over_the_range(tmp_path, see
     model, alone = load_model(path), rig(found, profile(found, 1.0))
     data, j = mujoco.MjData(model), find_joint(model, "j")
     here, there = mujoco.MjData(alone), int(model.jnt_dofadr[j])
-    mass, single = np.empty((model.nv, model.nv)), np.empty((1, 1))
+    mass, joint_model = np.empty((model.nv, model.nv)), np.empty((1, 1))
     assert alone.jnt_range[0] == pytest.approx(model.jnt_range[j], rel=1e-15)
     inertia, gravity = [], []
     positions = np.linspace(*model.jnt_range[j], 17)
@@ -104,8 +104,8 @@ def test_the_rig_has_the_scenes_inertia_and_gravity_over_the_range(tmp_path, see
         mujoco.mj_forward(model, data)
         mujoco.mj_forward(alone, here)
         mujoco.mj_fullM(model, data, mass)
-        mujoco.mj_fullM(alone, here, single)
-        inertia.append((mass[there, there], single[0, 0]))
+        mujoco.mj_fullM(alone, here, joint_model)
+        inertia.append((mass[there, there], joint_model[0, 0]))
         gravity.append((-data.qfrc_bias[there], -here.qfrc_bias[0]))
     expected, got = np.array(inertia).T
     assert got == pytest.approx(expected, rel=1e-9)

@@ -87,14 +87,14 @@ def test_a_joint_in_c_moves_as_the_engine_with_the_plugin(tmp_path, servo):
     arm = Arm()
     measured = read_measured(arm.model(tmp_path / "m.xml"), "elbow", [arm.log(tmp_path / "r", 0)])
     h, n, profile = 0.002, 1500, measured.profile
-    single = measured.single.with_plugin
+    joint_model = measured.joint_model.with_plugin
     rng = np.random.default_rng()
     command = np.repeat(rng.normal(0, 30, n // 50), 50)
-    own = type(single)(**{**vars(single), "servo": servo})
-    _, path = own.solo(profile, h).replay(np.zeros(n), [0], [[0.3, 0.0]], [True], h, command)
+    own = type(joint_model)(**{**vars(joint_model), "servo": servo})
+    _, path = own.simulator(profile, h).replay(np.zeros(n), [0], [[0.3, 0.0]], [True], h, command)
     model = rig(measured.context, profile, servo=servo)
     model.opt.timestep = h
-    model.jnt_solref[0], model.jnt_solimp[0] = single.limits(profile, h)
+    model.jnt_solref[0], model.jnt_solimp[0] = joint_model.limits(profile, h)
     data, late = mujoco.MjData(model), servo.delay / h
     data.qpos[0] = 0.3
     for k in range(n):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from joda.component import Component
-from joda.diagnosis.share import divided, overlap, places
+from joda.diagnosis.overlap import divided, overlap, places
 from joda.effects import AsymmetricFriction, StribeckFriction
 from joda.profile import CHANNELS, Joint, Profile
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from lids import RATE, SIGMA, thrown
 
-from joda.diagnosis.asking import asked
-from joda.diagnosis.baseline import windows_for
+from joda.diagnosis.adding import add_effect, error
+from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.holdout import Holdout
-from joda.diagnosis.mending import error, mend
-from joda.diagnosis.split import held_blocks, held_out, held_windows, in_blocks, parted
+from joda.diagnosis.split import held_blocks, held_out, held_segments, in_blocks, parted
+from joda.estimation.base_model import segments_for
 from joda.measured.reading import read_measured
 from joda.measured.runs import Run, write_run
 
@@ -69,63 +69,63 @@ def test_a_joint_that_never_moves_is_held_out_all_the_same(tmp_path, rng):
 def test_an_effect_of_a_joint_that_comes_to_rest_is_added(tmp_path, rng, count):
     drag = rng.uniform(0.01, 0.03)
     measured = thrown(tmp_path, rng, count, drag)
-    mended = mend(*parted(measured), "quadratic_damping")
-    assert mended.effect == "quadratic_damping", mended.reason
+    added_effect = add_effect(*parted(measured), "quadratic_damping")
+    assert added_effect.effect == "quadratic_damping", added_effect.reason
     other = tmp_path / "other"
     other.mkdir()
     unseen = thrown(other, rng, 4, drag)
-    assert error(unseen, mended.profile).window < 2 * SIGMA < 0.5 * error(unseen).window
+    assert error(unseen, added_effect.profile).window < 2 * SIGMA < 0.5 * error(unseen).window
 
 
 def test_where_nothing_is_missed_nothing_can_be_told(tmp_path, rng):
     measured = thrown(tmp_path, rng, 2, drag=1e-7)
-    mended = mend(*parted(measured), "quadratic_damping")
-    assert mended.effect is None
-    assert "by no more than the noise even without it" in mended.reason
+    added_effect = add_effect(*parted(measured), "quadratic_damping")
+    assert added_effect.effect is None
+    assert "by no more than the noise even without it" in added_effect.reason
 
 
 @pytest.mark.parametrize("count", [1, 3, 12])
 def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, count):
     measured = thrown(tmp_path, rng, count, drag=0.02 if count < 4 else 0.1)
-    begun = asked(measured)
-    held = Holdout(begun, measured)
-    windows, counts = begun.judge.windows, begun.judge.counts
+    baseline = fit_baseline(measured)
+    held = Holdout(baseline, measured)
+    segments, counts = baseline.estimator.segments, baseline.estimator.counts
     out = held.folds[0]
     assert out.any() and (counts & ~out).any()
-    travel = [np.ptp(windows.position[row[row >= 0]]) for row in windows.rows[out]]
+    travel = [np.ptp(segments.position[row[row >= 0]]) for row in segments.rows[out]]
     if count < 4:
         assert max(travel) > 50 * SIGMA  # others may reach beyond their block
     else:
-        assert set(windows.run[out]) == {3, 7, 11} and len(held.folds) == 1
+        assert set(segments.run[out]) == {3, 7, 11} and len(held.folds) == 1
 
 
 def test_where_windows_held_out_tell_nothing_all_are_in_turn(tmp_path, rng):
     """An effect that acts where only the runs that are fitted went is not denied by the others."""
     measured = thrown(tmp_path, rng, 12, drag=0.1)
-    told = Holdout(asked(measured), measured)
+    told = Holdout(fit_baseline(measured), measured)
     louder = 2 * told.before / measured.floor
     calm = replace(measured, sigma=tuple(louder * sigma for sigma in measured.sigma))
-    begun = asked(measured)
-    held = Holdout(begun, calm)
+    baseline = fit_baseline(measured)
+    held = Holdout(baseline, calm)
     assert len(told.folds) == 1 and len(held.folds) == 4
     assert not np.any(np.sum(held.folds, axis=0) > 1)
-    assert np.array_equal(np.any(held.folds, axis=0), begun.judge.counts)
+    assert np.array_equal(np.any(held.folds, axis=0), baseline.estimator.counts)
 
 
 def test_windows_follow_the_blocks(tmp_path, rng):
-    """The middle of each window that is held out is in a block that is, of nearly its length."""
+    """The middle of each segment that is held out is in a block that is, of nearly its length."""
     measured = thrown(tmp_path, rng, 3, drag=0.02)
     for length in (0.1, 0.3):
-        windows = windows_for(measured, length)
-        held = held_windows(measured, windows)
+        segments = segments_for(measured, length)
+        held = held_segments(measured, segments)
         spans = [
             (block.run, *measured.runs[block.run].time[block.samples][[0, -1]])
-            for block in held_blocks(measured, windows.length)
+            for block in held_blocks(measured, segments.length)
         ]
-        for k, row in enumerate(windows.rows):
-            own = windows.time[row[row >= 0]]
+        for k, row in enumerate(segments.rows):
+            own = segments.time[row[row >= 0]]
             if not len(own):  # the joint rests on
                 continue
             middle = own[len(own) // 2]
-            inside = any(r == windows.run[k] and a <= middle <= b for r, a, b in spans)
+            inside = any(r == segments.run[k] and a <= middle <= b for r, a, b in spans)
             assert inside == held[k]

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 from joda import JodaError, Profile, attach, compare, read_profiles, simulate, studio
 from joda.commands.studio import charts, edits
-from joda.commands.studio.desk import Desk
 from joda.commands.studio.folder import Folder
 from joda.commands.studio.guard import Guard, free_port
 from joda.commands.studio.live import Live
 from joda.commands.studio.motions import Outdated, replayed, simulated
+from joda.commands.studio.session import StudioSession
 from joda.commands.studio.solids import shape
 from joda.commands.studio.timeline import Timeline
 from joda.commands.studio.work import Stopped, Work
@@ -54,16 +54,16 @@ def unexplained(comparison):
 
 
 @pytest.fixture
-def desk(tmp_path):
+def session(tmp_path):
     (tmp_path / "lid.xml").write_text(LID)
-    with closing(Desk(tmp_path / "lid.xml")) as opened:
+    with closing(StudioSession(tmp_path / "lid.xml")) as opened:
         yield opened
 
 
 @pytest.fixture
-def profile(desk):
+def profile(session):
     curve = Component(label="latch", interval=(0.2, 0.8), x=(0, 0.5, 1), y=(0, -2, 0))
-    return desk.opened.with_component("conservative", curve)
+    return session.opened.with_component("conservative", curve)
 
 
 def latch(profile):
@@ -169,8 +169,8 @@ def test_points_come_and_go(profile):
     assert none.channels.conservative.components == ()
 
 
-def test_a_curve_begins_as_a_hill(desk):
-    made = edits.begun(desk.opened, "conservative", 0.4, 2.0)
+def test_a_curve_begins_as_a_hill(session):
+    made = edits.begun(session.opened, "conservative", 0.4, 2.0)
     value = evaluate(made.channels.conservative, np.array([0.1, 0.4, 0.7]))[0]
     assert value == pytest.approx([0, 2, 0])
 
@@ -209,52 +209,52 @@ def test_whatever_is_done_the_profile_stays_valid(steps):
 # --- the desk
 
 
-def test_the_profile_is_whole_and_a_drag_is_one_step(desk):
-    assert [c.label for c in desk.opened.channels.damping.components] == ["native damping"]
+def test_the_profile_is_whole_and_a_drag_is_one_step(session):
+    assert [c.label for c in session.opened.channels.damping.components] == ["native damping"]
     handle = edits.Handle("damping", 0, 0)
     for y in (0.1, 0.2, 0.3):
-        desk.drag(handle, 0, y, done=False)
-        assert desk.profile.channels.damping.components[0].y == (y, 0.05)
-        assert not desk.unsaved
-    desk.drag(handle, 0, 0.3, done=True)
-    assert desk.unsaved
-    desk.undo()
-    assert desk.profile == desk.opened
-    assert not desk.unsaved
+        session.drag(handle, 0, y, done=False)
+        assert session.profile.channels.damping.components[0].y == (y, 0.05)
+        assert not session.unsaved
+    session.drag(handle, 0, 0.3, done=True)
+    assert session.unsaved
+    session.undo()
+    assert session.profile == session.opened
+    assert not session.unsaved
 
 
-def test_what_is_saved_is_what_attach_writes(desk, profile, tmp_path):
-    before = desk.scene.read_bytes()
+def test_what_is_saved_is_what_attach_writes(session, profile, tmp_path):
+    before = session.scene.read_bytes()
     edited = profile.with_effect(AddedInertia(inertia=0.01))
-    desk.edit(edited)
-    notes = desk.save("new.xml")
+    session.edit(edited)
+    notes = session.save("new.xml")
     assert Profile.read(tmp_path / "new.composed.json") == edited
-    assert notes == attach(desk.scene, tmp_path / "new.composed.json", tmp_path / "cli.xml")
+    assert notes == attach(session.scene, tmp_path / "new.composed.json", tmp_path / "cli.xml")
     assert (tmp_path / "new.xml").read_bytes() == (tmp_path / "cli.xml").read_bytes()
     assert read_profiles(tmp_path / "new.xml")["lid"].channels == edited.channels
-    assert not desk.unsaved
-    assert desk.scene.read_bytes() == before
+    assert not session.unsaved
+    assert session.scene.read_bytes() == before
 
 
-def test_nothing_is_replaced_unasked(desk, profile, tmp_path):
-    desk.edit(profile)
+def test_nothing_is_replaced_unasked(session, profile, tmp_path):
+    session.edit(profile)
     for name in ("new.xml", "new.composed.json"):
         (tmp_path / name).write_text("precious")
-        assert desk.taken("new.xml")
+        assert session.taken("new.xml")
         with pytest.raises(JodaError, match="exists already"):
-            desk.save("new.xml")
+            session.save("new.xml")
         assert (tmp_path / name).read_text() == "precious"
         (tmp_path / name).unlink()
     (tmp_path / "new.xml").write_text("old")
-    desk.save("new.xml", force=True)
+    session.save("new.xml", force=True)
     assert (tmp_path / "new.xml").read_text() != "old"
     with pytest.raises(JodaError, match="the scene at work"):
-        desk.save("lid.xml", force=True)
+        session.save("lid.xml", force=True)
     with pytest.raises(JodaError, match=r"new\.csv: must end in \.xml\."):
-        desk.save("new.csv")
+        session.save("new.csv")
 
 
-def test_the_joint_that_is_meant(desk, profile, tmp_path):
+def test_the_joint_that_is_meant(session, profile, tmp_path):
     two = LID.replace(
         "</worldbody>",
         '<body><joint name="knob" range="0 1"/><geom size=".1"/></body></worldbody>',
@@ -263,31 +263,31 @@ def test_the_joint_that_is_meant(desk, profile, tmp_path):
     with pytest.raises(
         JodaError, match=r"two\.xml: choose a joint with --joint; there are 'lid', 'k"
     ):
-        Desk(tmp_path / "two.xml")
+        StudioSession(tmp_path / "two.xml")
     attach(tmp_path / "two.xml", profile, tmp_path / "one.xml")
-    with closing(Desk(tmp_path / "one.xml")) as meant:
+    with closing(StudioSession(tmp_path / "one.xml")) as meant:
         assert meant.joint == "lid"
-    with closing(Desk(tmp_path / "two.xml", "knob")) as meant:
+    with closing(StudioSession(tmp_path / "two.xml", "knob")) as meant:
         assert meant.joint == "knob"
 
 
-def test_a_bad_upload_is_one_sentence_and_leaves_nothing(desk):
+def test_a_bad_upload_is_one_sentence_and_leaves_nothing(session):
     for content, words in ((b"time,position\n0,0\n", "samples"), (b"\xff\xfe", "not a UTF-8")):
         with pytest.raises(JodaError, match=words) as error:
-            desk.upload("../../bad.csv", content)
+            session.upload("../../bad.csv", content)
         assert str(error.value).startswith("bad.csv")
-        assert desk.runs == ()
+        assert session.runs == ()
     good = "time,position\n" + "".join(f"{k / 100},{0.3 + k / 100}\n" for k in range(50))
-    desk.upload("run.csv", good.encode())
+    session.upload("run.csv", good.encode())
     with pytest.raises(JodaError, match="is there already; give it another name"):
-        desk.upload("run.csv", good.encode())
+        session.upload("run.csv", good.encode())
 
 
 # --- what the model does
 
 
-def test_motions_are_those_of_simulate(desk, profile, tmp_path):
-    path = desk.written(profile)
+def test_motions_are_those_of_simulate(session, profile, tmp_path):
+    path = session.written(profile)
     for asked in ({"release": 0.7}, {"hand": True}):
         shown = simulated(path, "lid", **asked)
         run = simulate(path, "lid", output=tmp_path / "run.csv", force=True, **asked).run
@@ -297,15 +297,18 @@ def test_motions_are_those_of_simulate(desk, profile, tmp_path):
         simulated(path, "lid", lambda: True, hand=True)
 
 
-def test_errors_are_those_of_compare(desk, profile, tmp_path):
+def test_errors_are_those_of_compare(session, profile, tmp_path):
     rng = np.random.default_rng(0)
     for name, start in (("a.csv", 1.2), ("b.csv", 0.7)):
-        run = simulate(desk.scene, "lid", release=start, duration=1, output=tmp_path / name).run
+        run = simulate(session.scene, "lid", release=start, duration=1, output=tmp_path / name).run
         run.position[:] += 1e-3 * rng.normal(size=len(run.position))
         write_run(tmp_path / name, run)
-        desk.add_run(name)
-    for scene in (desk.scene, desk.written(profile)):
-        shown, told = replayed(scene, "lid", desk.runs, True), compare(scene, "lid", desk.runs)
+        session.add_run(name)
+    for scene in (session.scene, session.written(profile)):
+        shown, told = (
+            replayed(scene, "lid", session.runs, True),
+            compare(scene, "lid", session.runs),
+        )
         assert shown.runs == unexplained(told)
         assert (shown.rmse, shown.rmse_window, shown.noise_floor) == (
             told.rmse,
@@ -313,20 +316,20 @@ def test_errors_are_those_of_compare(desk, profile, tmp_path):
             told.noise_floor,
         )
     with pytest.raises(JodaError, match=r"is there already\.$"):
-        desk.add_run("a.csv")
+        session.add_run("a.csv")
 
 
-def test_the_newest_profile_wins(desk, profile):
+def test_the_newest_profile_wins(session, profile):
     told = []
 
     async def dragged():
-        live = Live(desk, told.append)
+        live = Live(session, told.append)
         live.refresh()
         while "rest" not in told:
             await asyncio.sleep(0.02)
         opened = live.found["release"], live.found["hand"]
         for depth in (1.0, 2.0, 30.0):
-            desk.edit(edits.moved(profile, LATCH, 0.5, depth))
+            session.edit(edits.moved(profile, LATCH, 0.5, depth))
             live.refresh()
             await asyncio.sleep(0.01)
         while live.busy:
@@ -335,16 +338,16 @@ def test_the_newest_profile_wins(desk, profile):
 
     live, opened = asyncio.run(dragged())
     assert not live.failed
-    path = desk.written(desk.profile)
+    path = session.written(session.profile)
     for stage, asked in (("release", {"release": 0.75}), ("hand", {"hand": True})):
         shown = live.found[stage]
         assert np.array_equal(shown.position, simulated(path, "lid", **asked).position)
     assert (live.before["release"], live.before["hand"]) == opened
 
 
-def test_a_stopped_simulation_ends_and_leaves_nothing(desk):
+def test_a_stopped_simulation_ends_and_leaves_nothing(session):
     async def stopped():
-        live = Live(desk, lambda what: None)
+        live = Live(session, lambda what: None)
         live.refresh()
         live.stop()
         while live.busy:
@@ -354,11 +357,11 @@ def test_a_stopped_simulation_ends_and_leaves_nothing(desk):
     assert asyncio.run(stopped()) == {}
 
 
-def test_what_cannot_be_simulated_is_told(desk):
+def test_what_cannot_be_simulated_is_told(session):
     told = []
 
     async def told_why():
-        live = Live(desk, told.append)
+        live = Live(session, told.append)
         live.start = 7.0
         live.refresh()
         while live.busy:
@@ -374,8 +377,8 @@ def test_what_cannot_be_simulated_is_told(desk):
 # --- what is seen
 
 
-def test_solids_stand_where_mujoco_has_them(desk):
-    model, number = desk.model, desk.number
+def test_solids_stand_where_mujoco_has_them(session):
+    model, number = session.model, session.number
     seen = shape(model, number)
     assert sorted(solid.moves for solid in seen.solids) == [False, True, True]
     data = mujoco.MjData(model)
@@ -411,13 +414,13 @@ def test_surfaces_are_closed_and_look_outwards(geom, volume):
     assert len(solid.stl()) == 84 + 50 * len(solid.triangles)
 
 
-def test_an_editor_shows_values_in_a_fitting_unit(desk):
-    view = charts.editor(desk.opened, desk.opened, "damping", 0)
+def test_an_editor_shows_values_in_a_fitting_unit(session):
+    view = charts.editor(session.opened, session.opened, "damping", 0)
     assert view["ylabel"] == "mN·m·s/rad"
     assert [handle["y"] for handle in view["handles"]] == pytest.approx([50, 50])
     assert [line["kind"] for line in view["lines"]] == ["sum"]
-    changed = edits.moved(desk.opened, edits.Handle("damping", 0, 1), 1, 0.2)
-    view = charts.editor(changed, desk.opened, "damping", 0)
+    changed = edits.moved(session.opened, edits.Handle("damping", 0, 1), 1, 0.2)
+    view = charts.editor(changed, session.opened, "damping", 0)
     assert [line["kind"] for line in view["lines"]] == ["ghost", "sum"]
     json.dumps(view, allow_nan=False)
 
@@ -527,12 +530,12 @@ def test_the_address_gives_the_browser_a_cookie_once():
 
 
 @pytest.mark.parametrize("name", ["..", "../../evil.csv", "a\0b.csv", "\x1b[2J.csv", "x" * 999])
-def test_a_name_that_is_handed_over_is_no_path(desk, name):
-    before = set(desk.folder.path.rglob("*"))
+def test_a_name_that_is_handed_over_is_no_path(session, name):
+    before = set(session.folder.path.rglob("*"))
     samples = "".join(f"{k / 50},{0.5 + 0.3 * np.sin(k / 9):.5f}\n" for k in range(99))
-    desk.upload(name, f"time,position\n{samples}".encode())
-    (run,) = desk.runs
-    assert run.parent == desk.scratch("runs") and set(desk.folder.path.rglob("*")) == before
+    session.upload(name, f"time,position\n{samples}".encode())
+    (run,) = session.runs
+    assert run.parent == session.scratch("runs") and set(session.folder.path.rglob("*")) == before
     assert plain(run.name) == run.name and len(run.name) < 200
 
 
@@ -546,25 +549,25 @@ def test_a_taken_port_is_told():
     assert free_port(None) > 0
 
 
-def test_what_the_command_raises_in_the_child_is_raised(desk, tmp_path):
-    asked = Work().diagnose(desk.scene, "lid", (tmp_path / "no.csv",), tmp_path / "d", print)
+def test_what_the_command_raises_in_the_child_is_raised(session, tmp_path):
+    asked = Work().diagnose(session.scene, "lid", (tmp_path / "no.csv",), tmp_path / "d", print)
     with pytest.raises(JodaError, match=r"no\.csv: cannot be read"):
         asyncio.run(asked)
 
 
-def test_runs_of_a_driven_joint_are_for_who_says_that_it_was_off(desk, tmp_path):
+def test_runs_of_a_driven_joint_are_for_who_says_that_it_was_off(session, tmp_path):
     motor = '<actuator><motor name="servo" joint="lid"/></actuator></mujoco>'
     scene = tmp_path / "driven.xml"
     scene.write_text(LID.replace("</mujoco>", motor))
-    run = simulate(desk.scene, "lid", release=1.1, duration=2, output=tmp_path / "a.csv").run
+    run = simulate(session.scene, "lid", release=1.1, duration=2, output=tmp_path / "a.csv").run
     noisy = run.position + 1e-3 * np.random.default_rng(1).normal(size=len(run.position))
     write_run(tmp_path / "a.csv", replace(run, position=noisy, forced=False))
     with (
-        closing(Desk(scene)) as opened,
+        closing(StudioSession(scene)) as opened,
         pytest.raises(JodaError, match=r"'servo' acts on joint 'lid'.* with --passive"),
     ):
         opened.add_run("a.csv")
-    with closing(Desk(scene, passive=True)) as opened:
+    with closing(StudioSession(scene, passive=True)) as opened:
         opened.add_run("a.csv")
         shown = replayed(scene, "lid", opened.runs, True, passive=True)
         assert shown.runs == unexplained(compare(scene, "lid", opened.runs, passive=True))
@@ -581,23 +584,23 @@ def test_what_else_goes_wrong_in_the_child_is_for_the_terminal():
         asyncio.run(Work()._ask({"do": "nothing"}, print))
 
 
-def test_one_thing_is_computed_at_a_time(desk, tmp_path):
+def test_one_thing_is_computed_at_a_time(session, tmp_path):
     async def twice():
         work = Work()
-        again = [work.diagnose(desk.scene, "lid", (), tmp_path / "d", print) for _ in range(2)]
+        again = [work.diagnose(session.scene, "lid", (), tmp_path / "d", print) for _ in range(2)]
         return await asyncio.gather(*again, return_exceptions=True)
 
     sentences = map(str, asyncio.run(twice()))
     assert "something is being computed already; wait for it or stop it." in sentences
 
 
-def test_the_child_can_be_stopped(desk, tmp_path):
-    simulate(desk.scene, "lid", release=1.2, output=tmp_path / "a.csv")
+def test_the_child_can_be_stopped(session, tmp_path):
+    simulate(session.scene, "lid", release=1.2, output=tmp_path / "a.csv")
 
     async def stopped():
         work = Work()
         done = work.diagnose(
-            desk.scene, "lid", (tmp_path / "a.csv",), tmp_path / "d", lambda *_: work.stop()
+            session.scene, "lid", (tmp_path / "a.csv",), tmp_path / "d", lambda *_: work.stop()
         )
         with pytest.raises(Stopped):
             await done
@@ -636,7 +639,7 @@ def test_without_nicegui_it_says_what_to_install(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["joda", "joda.cli", "joda.commands.studio.desk", "joda.commands.studio.work"]
+    "name", ["joda", "joda.cli", "joda.commands.studio.session", "joda.commands.studio.work"]
 )
 def test_nothing_else_imports_the_page_library(name):
     code = f"import {name}, sys; sys.exit('nicegui' in sys.modules)"

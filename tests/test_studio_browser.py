@@ -18,7 +18,7 @@ import pytest
 from matplotlib.image import imread
 
 from joda import Profile, add, attach, compare, diagnose, simulate
-from joda.commands.studio.desk import Desk
+from joda.commands.studio.session import StudioSession
 from joda.component import Component
 from joda.measured.runs import Run, write_run
 
@@ -78,8 +78,8 @@ def project(tmp_path_factory):
     model, true = folder / "model.xml", elsewhere / "true.xml"
     model.write_text(LID)
     rubbing = Component(label="hidden", interval=(0, 1), x=(0, 1), y=(0.3, 0.3))
-    with closing(Desk(model)) as desk:
-        attach(model, desk.opened.with_component("friction", rubbing), true)
+    with closing(StudioSession(model)) as session:
+        attach(model, session.opened.with_component("friction", rubbing), true)
     runs = [folder / "far.csv", folder / "near.csv"]
     for path, start in zip(runs, (1.2, 0.8), strict=True):
         falling(true, start, path)

@@ -10,8 +10,8 @@ from hidden_cases import case_of, dice, job_of, read
 from hidden_coverage import pulls
 from test_hidden_bench import RELIABLE, RUNS
 
-from joda.diagnosis.asking import RESTITUTION, asked
-from joda.diagnosis.ranking import rank
+from joda.diagnosis.baseline import RESTITUTION, fit_baseline
+from joda.diagnosis.search import rank
 from joda.diagnosis.uncertainty import AFAR, FARTHEST, REACHING, SHAPE, from_data, uncertainty
 from joda.diagnosis.uncertainty import _fitted as fitted
 from joda.diagnosis.uncertainty import _gaps as gaps
@@ -22,9 +22,9 @@ def found(seed, effect, forced=True):
     """The effect alone fitted to a case, and the case."""
     case = draw(seed, effect, forced)
     train = read(case)[0]
-    begun = asked(train)
-    ranking = rank(begun, [h.effect for h in begun.hypotheses if h.effect != effect])
-    return case, ranking.asked, ranking.guesses[0]
+    baseline = fit_baseline(train)
+    ranking = rank(baseline, [h.effect for h in baseline.hypotheses if h.effect != effect])
+    return case, ranking.baseline, ranking.candidates[0]
 
 
 @pytest.mark.long
@@ -52,61 +52,69 @@ def test_the_true_size_and_place_lie_within_what_is_said():
 @pytest.mark.long
 def test_of_a_known_law_the_size_is_as_uncertain_as_linear_least_squares_says():
     """Of quadratic drag: the inverse of the normal matrix, by hand, is the least of the three."""
-    _, begun, guess = found(6, "quadratic_damping")
-    one = fitted(begun, guess)
-    about = begun.judge.linear(one.make, one.unknowns, one.x, guess.fit.start)
-    H = about.normal()[0] + np.diag(one.unknowns.doubt**-2.0)
+    _, baseline, candidate = found(6, "quadratic_damping")
+    one = fitted(baseline, candidate)
+    about = baseline.estimator.linear(one.make, one.unknowns, one.x, candidate.fit.start)
+    H = about.normal()[0] + np.diag(one.unknowns.prior_std**-2.0)
     each, _ = about.normals()
     np.testing.assert_allclose(each.sum(axis=0), about.normal()[0], rtol=1e-8)
-    scale = guess.hypothesis.magnitude(np.ones(1))
+    scale = candidate.hypothesis.magnitude(np.ones(1))
     by_hand = scale * np.sqrt(np.linalg.inv(H)[-1, -1])
     data = from_data(one)[0]
     assert 0.8 * by_hand < data < 10 * by_hand
-    size = guess.hypothesis.magnitude(guess.x)
-    assert uncertainty(begun, guess, 0.0).magnitude >= SHAPE[guess.hypothesis.remains] * size
+    size = candidate.hypothesis.magnitude(candidate.x)
+    assert (
+        uncertainty(baseline, candidate, 0.0).magnitude
+        >= SHAPE[candidate.hypothesis.misfit_tolerance] * size
+    )
 
 
 def test_what_is_there_has_a_size_however_badly_it_is_known():
     """A latch at the low end that runs with positions only tell little of."""
-    case, begun, guess = found(1720741344, "spring_loaded_snap_detent_to_low_end", forced=False)
-    size = guess.hypothesis.magnitude(guess.x)
-    assert from_data(fitted(begun, guess))[0] >= size  # by itself it may be none
-    said = uncertainty(begun, guess, 0.0).magnitude
+    case, baseline, candidate = found(
+        1720741344, "spring_loaded_snap_detent_to_low_end", forced=False
+    )
+    size = candidate.hypothesis.magnitude(candidate.x)
+    assert from_data(fitted(baseline, candidate))[0] >= size  # by itself it may be none
+    said = uncertainty(baseline, candidate, 0.0).magnitude
     assert size < said < (FARTHEST + 1) * size
     assert abs(size - case.seal["magnitude"]) < 2 * said
 
 
 def test_a_pull_that_is_felt_all_over_may_be_the_far_end_of_any(seed=11):
-    case, begun, guess = found(seed, "magnetic_return_to_high_end", forced=False)
-    a, b = guess.hypothesis.interval(guess.x)
+    case, baseline, candidate = found(seed, "magnetic_return_to_high_end", forced=False)
+    a, b = candidate.hypothesis.interval(candidate.x)
     assert b - a > REACHING
-    said = uncertainty(begun, guess, 0.0).magnitude
-    assert abs(guess.hypothesis.magnitude(guess.x) - case.seal["magnitude"]) < 2 * said
+    said = uncertainty(baseline, candidate, 0.0).magnitude
+    assert abs(candidate.hypothesis.magnitude(candidate.x) - case.seal["magnitude"]) < 2 * said
 
 
 def test_the_end_that_was_not_knocked_at_may_throw_back_too(seed=918226542):
     case = draw(seed, "end_stop_restitution", forced=False)
-    begun = asked(read(case)[0])
-    ranking = rank(begun, [h.effect for h in begun.hypotheses if h.effect != RESTITUTION])
-    guess = ranking.guesses[0]
-    interval = guess.hypothesis.interval(guess.x)
+    baseline = fit_baseline(read(case)[0])
+    ranking = rank(baseline, [h.effect for h in baseline.hypotheses if h.effect != RESTITUTION])
+    candidate = ranking.candidates[0]
+    interval = candidate.hypothesis.interval(candidate.x)
     assert (interval, case.seal["interval"]) == ((0.0, 0.02), [0, 1])
-    low, high = uncertainty(ranking.asked, guess, 0.0).ends
+    low, high = uncertainty(ranking.baseline, candidate, 0.0).ends
     assert low < 0.05
     assert abs(interval[1] - 1) < 2 * high
 
 
 def test_what_is_left_and_what_nobody_visited_make_it_less_sure():
-    case, begun, guess = found(101, "magnetic_return_to_low_end", forced=False)
-    size = guess.hypothesis.magnitude(guess.x)
-    none, half = (uncertainty(begun, guess, left) for left in (0.0, 0.5))
+    case, baseline, candidate = found(101, "magnetic_return_to_low_end", forced=False)
+    size = candidate.hypothesis.magnitude(candidate.x)
+    none, half = (uncertainty(baseline, candidate, left) for left in (0.0, 0.5))
     assert half.magnitude > none.magnitude
-    low, high = guess.hypothesis.interval(guess.x)
+    low, high = candidate.hypothesis.interval(candidate.x)
     most = AFAR if high - low > REACHING else FARTHEST
     assert none.magnitude <= (most + 1) * size
     # no run was below s = 0.16: how strong the magnet is at its end nobody knows
     assert abs(case.seal["magnitude"] - size) < 2 * none.magnitude
-    assert begun.judge.windows.position.min() > case.truth.joint.lo + 0.15 * case.truth.joint.span
+    assert (
+        baseline.estimator.segments.position.min()
+        > case.truth.joint.lo + 0.15 * case.truth.joint.span
+    )
 
 
 def test_an_end_at_the_edge_of_what_was_visited_may_be_anywhere_beyond():

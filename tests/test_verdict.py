@@ -12,12 +12,12 @@ from test_compare import door, runs_of, scene_of
 from joda import JodaError, add, compare, diagnose
 from joda.commands.hidden_effect import _judged
 from joda.diagnosis import verdict
-from joda.diagnosis.asking import asked
+from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.corrections import numbers, off
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import explained
+from joda.diagnosis.selection import Selection
 from joda.diagnosis.summary import summarised
-from joda.diagnosis.weighing import Weighed
 from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
 from joda.measured.reading import read_measured
@@ -43,9 +43,9 @@ SEAL = {"effect": "detent_internal", "interval": [0.31, 0.5], "direction": "both
 SEAL |= {"magnitude": 2.05, "unit": "N·m"}
 
 
-def weighed(*likely, verdict="missing_effect"):
+def selection(*likely, verdict="missing_effect"):
     names = ("detent_internal", "gravity_offset", "quadratic_damping")[: len(likely)]
-    return Weighed(verdict, likely, (10.0, tuple(0.1 for _ in likely)), names)
+    return Selection(verdict, likely, (10.0, tuple(0.1 for _ in likely)), names)
 
 
 @pytest.mark.parametrize(
@@ -59,27 +59,27 @@ def weighed(*likely, verdict="missing_effect"):
 )
 def test_missing_is_said_only_of_what_is_likely_and_helps(probability, after, head):
     one = replace(DETENT, probability=probability, held_out_error_after=after)
-    assert summarised(one, weighed(probability), FLOOR, one_way=False, bouncy=False).startswith(
-        head
-    )
+    assert summarised(
+        one, selection(probability), FLOOR, one_way=False, restitution=False
+    ).startswith(head)
 
 
 def test_what_is_below_the_noise_is_a_guess():
-    said = summarised(DETENT, weighed(0.9), 0.02, one_way=False, bouncy=False)
+    said = summarised(DETENT, selection(0.9), 0.02, one_way=False, restitution=False)
     assert said.startswith("Best guess: a click-stop") and "record faster" in said
 
 
 def test_two_that_cannot_be_told_apart_are_likely_together():
     one = replace(DETENT, probability=0.4, indistinguishable_from=("gravity_offset",))
-    said = summarised(one, weighed(0.4, 0.35, 0.1), FLOOR, one_way=False, bouncy=False)
+    said = summarised(one, selection(0.4, 0.35, 0.1), FLOOR, one_way=False, restitution=False)
     assert said.startswith("Missing is a click-stop (detent) or another pull of gravity")
-    said = summarised(one, weighed(0.3, 0.15, 0.1), FLOOR, one_way=False, bouncy=False)
+    said = summarised(one, selection(0.3, 0.15, 0.1), FLOOR, one_way=False, restitution=False)
     assert said.startswith("Best guess:")
 
 
 def test_what_no_effect_explains_is_a_guess():
-    one = weighed(0.2, verdict="unexplained")
-    said = summarised(DETENT, one, FLOOR, one_way=False, bouncy=False)
+    one = selection(0.2, verdict="unexplained")
+    said = summarised(DETENT, one, FLOOR, one_way=False, restitution=False)
     assert said.startswith("Best guess: a click")
 
 
@@ -118,9 +118,9 @@ def diagnosis(*effects):
     return Diagnosis("door", "missing_effect", "", effects, (), 1e-3, "rad", None, (), contacts=())
 
 
-def comparison(whole, windows):
+def comparison(whole, segments):
     return Comparison(
-        "door", "rad", (), whole, windows, 1e-3, None, (), 0.1, (), None, (), (), contacts=()
+        "door", "rad", (), whole, segments, 1e-3, None, (), 0.1, (), None, (), (), contacts=()
     )
 
 
@@ -189,9 +189,9 @@ def test_a_recorded_force_that_is_off_by_a_factor_is_no_missing_inertia(tmp_path
 
 def test_numbers_are_off_only_by_more_than_their_errors(tmp_path):
     runs = runs_of(door(), tmp_path, 4)
-    right = asked(read_measured(scene_of(door(), tmp_path), "joint", runs))
+    right = fit_baseline(read_measured(scene_of(door(), tmp_path), "joint", runs))
     assert off(numbers(right)) == ""
-    wrong = asked(read_measured(scene_of(door(damping=1.0), tmp_path), "joint", runs))
+    wrong = fit_baseline(read_measured(scene_of(door(damping=1.0), tmp_path), "joint", runs))
     told = off(numbers(wrong))
     factor, error = map(float, re.search(r"([\d.]+) ± ([\d.e-]+\d)", told).groups())
     assert factor == pytest.approx(0.5, abs=0.05) and 0 < error < 0.1

@@ -26,16 +26,22 @@ from joda.propose import Task
 from joda.propose.offline import Offline
 from joda.propose.recognise import gravity_role
 from joda.propose.replies import parse, parse_ablation
+from joda.propose.requirements import Requirement, unmet
 from joda.propose.session import NONE, Session
-from joda.propose.wishes import Wanted, unmet
 from joda.template import read_templates
 
 TESTS = Path(__file__).parents[1]
 MODELS = TESTS.parent / "models"
 
-OBJECTS: dict[str, tuple[str, tuple[Wanted, ...]]] = {
-    name: (joint, tuple(Wanted(wish, 3 if wish == "clicks" else 0) for wish in wishes.split()))
-    for name, joint, wishes in (
+OBJECTS: dict[str, tuple[str, tuple[Requirement, ...]]] = {
+    name: (
+        joint,
+        tuple(
+            Requirement(requirement, 3 if requirement == "clicks" else 0)
+            for requirement in requirements.split()
+        ),
+    )
+    for name, joint, requirements in (
         ("cabinet", "door", "held_shut opens_past"),
         ("dishwasher", "door", "closes_near held_shut stays_half stays_open"),
         ("drawer", "drawer", "closes_near held_shut stays_put"),

@@ -3,7 +3,7 @@
     python tests/benchmarks hidden families --family all --cases 2 --out rows.jsonl    (hours)
     python tests/benchmarks calibrate rows.jsonl                                     (seconds)
 
-Of each family in turn: `joda.diagnosis.weighing.Settings` are fitted to the other families' cases
+Of each family in turn: `joda.diagnosis.selection.Settings` are fitted to the other families' cases
 (coordinate descent on the mean log loss of "nothing", "none of these" and every effect) and judged
 on its own, beside those in use; then they are fitted to all of them. The rows hold the evidence of
 each case, so nothing is simulated or fitted again.
@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 from hidden_figures import SURE, hides
 
-from joda.diagnosis.weighing import (
+from joda.diagnosis.selection import (
     SETTINGS,
     Evidence,
+    Selection,
     Settings,
-    Weighed,
     closer_counts,
     decide,
     second_counts,
@@ -45,7 +45,7 @@ def looks(row: dict) -> list[Evidence]:
     ]
 
 
-def decided(row: dict, settings: Settings) -> Weighed:
+def decided(row: dict, settings: Settings) -> Selection:
     """What these settings say of a case, by the looks that were taken."""
     first, *more = looks(row)
     said = decide(first, settings=settings)
@@ -60,7 +60,7 @@ def decided(row: dict, settings: Settings) -> Weighed:
     return said
 
 
-def right(row: dict, said: Weighed) -> bool:
+def right(row: dict, said: Selection) -> bool:
     """Whether the verdict is right, or the first name."""
     if (what := hides(row)) != "effect":
         return said.verdict == {"nothing": "adequate", "outside": "unexplained"}[what]
@@ -75,11 +75,11 @@ def names(row: dict) -> set[str]:
 def loss(row: dict, settings: Settings) -> float:
     """Minus the logarithm of the probability of what is true."""
     said = decided(row, settings)
-    calm = said.verdict == "adequate"
+    adequate = said.verdict == "adequate"
     what = hides(row)
     if what == "nothing":
-        likely = 1.0 if calm else LEAST
-    elif calm:
+        likely = 1.0 if adequate else LEAST
+    elif adequate:
         likely = LEAST
     elif what == "outside":
         likely = 1.0 - sum(said.probabilities)
@@ -117,7 +117,7 @@ def fitted(rows: Sequence[dict]) -> Settings:
     return best
 
 
-def told(rows: Sequence[dict], settings: Settings) -> str:
+def reported(rows: Sequence[dict], settings: Settings) -> str:
     """Figures of cases, a row of the table."""
     cells = [f"{mean_loss(rows, settings):.3f}"]
     for what in ("effect", "nothing", "outside"):
@@ -144,8 +144,8 @@ def main() -> None:
         own = [row for row in rows if row["family"] == family]
         others = [row for row in rows if row["family"] != family]
         found = fitted(others)
-        print(f"| {family} | in use | {told(own, SETTINGS)} |")
-        print(f"| | the others | {told(own, found)} |   {changed(found)}", flush=True)
+        print(f"| {family} | in use | {reported(own, SETTINGS)} |")
+        print(f"| | the others | {reported(own, found)} |   {changed(found)}", flush=True)
     found = fitted(rows)
-    print(f"| all | in use | {told(rows, SETTINGS)} |")
-    print(f"| | all | {told(rows, found)} |   {changed(found)}")
+    print(f"| all | in use | {reported(rows, SETTINGS)} |")
+    print(f"| | all | {reported(rows, found)} |   {changed(found)}")

@@ -33,7 +33,7 @@ def examined(job: tuple[Path, bool]) -> dict:
 
 
 def _examined(folder: Path, adds: bool) -> dict:
-    from joda.diagnosis.mending import error, mend
+    from joda.diagnosis.adding import add_effect, error
     from joda.diagnosis.outcome import read_runs
     from joda.diagnosis.split import parted
     from joda.diagnosis.verdict import diagnosed
@@ -59,10 +59,10 @@ def _examined(folder: Path, adds: bool) -> dict:
     if adds and said.verdict == "missing_effect":
         first = said.effects[0]
         train, held = parted(measured)
-        mended = mend(train, held, first.effect, first.direction, first.interval)
-        row["added"] = mended.effect or mended.reason
-        if mended.effect:
-            after = error(held_out, mended.profile)
+        added_effect = add_effect(train, held, first.effect, first.direction, first.interval)
+        row["added"] = added_effect.effect or added_effect.reason
+        if added_effect.effect:
+            after = error(held_out, added_effect.profile)
     achievable = answer["achievable_held_out_rmse"]
     row |= {"before": before.whole / achievable, "after": after.whole / achievable}
     return row

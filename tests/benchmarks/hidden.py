@@ -36,8 +36,8 @@ from hidden_field import by_numbers
 from hidden_figures import fine, table, told
 from hidden_floor import floor_of
 
-from joda.diagnosis.improving import improved
-from joda.diagnosis.mending import error, mend
+from joda.diagnosis.adding import add_effect, error
+from joda.diagnosis.improvement import improved
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
 from joda.hidden import FAMILIES, Case
@@ -108,9 +108,9 @@ def added(job: Job, row: dict, case: Case, train: Measured, held_out: Measured) 
         tried["after"] = tuple(row["named"][0][key] for key in ("effect", "direction", "interval"))
     for key, effect in tried.items():
         begun = time.perf_counter()
-        mended = mend(kept, held, *effect)
+        added_effect = add_effect(kept, held, *effect)
         out[f"{key}_seconds"] = time.perf_counter() - begun
-        new = error(held_out, mended.profile).window if mended.effect else before
+        new = error(held_out, added_effect.profile).window if added_effect.effect else before
         out[f"{key}_error"] = new
     return out
 
@@ -120,8 +120,10 @@ def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
     before = after = error(held_out).whole
     if row["verdict"] == "missing_effect":
         first = row["named"][0]
-        mended = mend(*parted(train), first["effect"], first["direction"], first["interval"])
-        after = error(held_out, mended.profile).whole if mended.effect else before
+        added_effect = add_effect(
+            *parted(train), first["effect"], first["direction"], first["interval"]
+        )
+        after = error(held_out, added_effect.profile).whole if added_effect.effect else before
     least = case.achievable.together
     return {"unseen_before": before / least, "unseen": after / least}
 
@@ -134,12 +136,12 @@ def few(case: Case, train: Measured, held_out: Measured) -> dict:
     if not row["named"]:
         return out
     first = tuple(row["named"][0][key] for key in ("effect", "direction", "interval"))
-    mended = mend(*parted(train), *first)
-    if not mended.effect:
-        return out | {"reason": mended.reason}
-    after = error(held_out, mended.profile).window
-    departs = list(mended.departs.sentences)
-    return out | {"after_error": after, "added": [mended.effect], "departs": departs}
+    added_effect = add_effect(*parted(train), *first)
+    if not added_effect.effect:
+        return out | {"reason": added_effect.reason}
+    after = error(held_out, added_effect.profile).window
+    departs = list(added_effect.departs.sentences)
+    return out | {"after_error": after, "added": [added_effect.effect], "departs": departs}
 
 
 def both(case: Case, train: Measured, held_out: Measured) -> dict:

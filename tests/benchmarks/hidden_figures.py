@@ -7,7 +7,7 @@ import numpy as np
 from hidden_cases import CONTAINED, HARD
 from hidden_coverage import coverage, reliability
 
-from joda.diagnosis.share import overlap
+from joda.diagnosis.overlap import overlap
 from joda.hidden.cases import FAMILY
 
 SURE = 0.9

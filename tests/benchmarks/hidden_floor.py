@@ -9,7 +9,7 @@ import numpy as np
 from hidden_model import true_profile
 from scipy.interpolate import CubicSpline
 
-from joda.diagnosis.mending import error
+from joda.diagnosis.adding import error
 from joda.hidden import Case, simulator
 from joda.hidden.handle import Handle
 from joda.hidden.laws import State

@@ -27,7 +27,7 @@ from joda import compile, context
 from joda.interaction.behaviour import Behaviour, behaviour
 from joda.propose import Task, Turn
 from joda.propose.offline import Offline
-from joda.propose.wishes import read_wishes, unmet
+from joda.propose.requirements import read_requirements, unmet
 from joda.scenes.context import Context
 from joda.template import read_templates
 
@@ -157,7 +157,7 @@ def judge(row: Row) -> Result:
             break
         profile = compile(answer.proposal, found)
         behaved = behaviour(found, profile)
-        lacking = unmet(read_wishes(answer.proposal.whole_motion_descrptn), behaved, found)
+        lacking = unmet(read_requirements(answer.proposal.whole_motion_descrptn), behaved, found)
         turns.append(Turn(answer.proposal, profile, behaved, bytes, "", tuple(lacking.values())))
     behaved, summary = turns[-1].behaviour, turns[-1].proposal.joint_summary
     arm = found.lever_arm if row.arm is None else row.arm

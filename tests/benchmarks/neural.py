@@ -19,12 +19,12 @@ import numpy as np
 from hidden_cases import read
 from neural_network import Moved, Network, Replays
 
-from joda.diagnosis.baseline import windows_for
-from joda.diagnosis.better import worse
+from joda.diagnosis.adding import clearly, error, fallen, replayed
 from joda.diagnosis.learning.choosing import learn
-from joda.diagnosis.mending import clearly, error, fallen, replayed
-from joda.diagnosis.reshaping import Likelihood
+from joda.diagnosis.paired_test import worse
+from joda.diagnosis.shape_refinement import Likelihood
 from joda.diagnosis.split import parted
+from joda.estimation.base_model import segments_for
 from joda.hidden import FAMILIES, draw
 
 DECAYS = (1e-3, 0.3)
@@ -57,7 +57,7 @@ def with_network(measured, moved: Moved):
 def compared(known, unseen) -> dict:
     """Errors on unseen runs: of the model, the same in JAX, with a learned law and a network."""
     begun = time.process_time()
-    mended, law = learn(*parted(known))
+    added_effect, law = learn(*parted(known))
     halfway = time.process_time()
     moved, none = network_of(*parted(known))
     took = time.process_time()
@@ -66,7 +66,7 @@ def compared(known, unseen) -> dict:
     return {
         "model": vars(before),
         "model in JAX": vars(error(with_network(unseen, none))),
-        "law": vars(error(unseen, mended.profile)),
+        "law": vars(error(unseen, added_effect.profile)),
         "network": vars(network),
         "taken": {"law": law is not None, "network": moved is not None},
         "seconds": {"law": halfway - begun, "network": took - halfway},
@@ -75,9 +75,9 @@ def compared(known, unseen) -> dict:
 
 def fastest(measured) -> np.ndarray:
     """Of each run."""
-    windows = windows_for(measured)
-    speeds = np.abs(windows.start[:, 1])
-    return np.array([speeds[windows.run == k].max(initial=0) for k in range(len(measured.runs))])
+    segments = segments_for(measured)
+    speeds = np.abs(segments.start[:, 1])
+    return np.array([speeds[segments.run == k].max(initial=0) for k in range(len(measured.runs))])
 
 
 def examined(seed: int, effect: str) -> dict:

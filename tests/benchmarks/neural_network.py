@@ -9,10 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from joda.diagnosis.baseline import BASE_DOUBT, units_of, usable
-from joda.diagnosis.judge import BEND
 from joda.diagnosis.learning.fitting import Learner
-from joda.diagnosis.reshaping import Likelihood
+from joda.diagnosis.shape_refinement import Likelihood
+from joda.diagnosis.units import units_of
+from joda.estimation.base_model import BASE_DOUBT, usable
+from joda.estimation.estimator import CAUCHY_SCALE
 from joda.measured.replay import Replayer
 
 WIDTH = 32
@@ -28,8 +29,8 @@ class Network:
 
     def __init__(self, measured) -> None:
         """Args: the joint, whose friction and damping are constant, and runs to fit."""
-        self.windows = Learner(measured).windows[:2]
-        units, single = units_of(self.windows[0], measured), measured.single
+        self.segments = Learner(measured).segments[:2]
+        units, joint_model = units_of(self.segments[0], measured), measured.joint_model
         channels = measured.profile.channels
         assert not channels.conservative.components and not measured.profile.effects
         self.own = [
@@ -37,11 +38,11 @@ class Network:
             for channel in (channels.friction, channels.damping)
         ]
         self.lo, self.hi = measured.profile.joint.range
-        self.fastest = np.abs(self.windows[0].start[:, 1]).max()
-        self.force, self.inertia = units.force, single.inertia
-        self.weight, self.hinge = single.weight, single.hinge
+        self.fastest = np.abs(self.segments[0].start[:, 1]).max()
+        self.force, self.inertia = units.force, joint_model.inertia
+        self.weight, self.hinge = joint_model.weight, joint_model.hinge
         self.paths = jax.jit(self._paths)
-        self.descents = [self._descent(windows) for windows in self.windows]
+        self.descents = [self._descent(segments) for segments in self.segments]
 
     def begun(self, key) -> dict:
         """A network without force, and the model as it is."""
@@ -87,36 +88,38 @@ class Network:
 
     def fitted(self, numbers, decay: float, held: Likelihood) -> tuple[float, dict]:
         """The numbers with which what was held out has the least loss, and that."""
-        best = held.judge.started(Moved(self, numbers)).loss, numbers
-        pairs = zip(self.windows, self.descents, ROUNDS, strict=True)
-        for windows, go, (count, rate) in pairs:
-            state = (numbers, jnp.zeros((len(windows.at), 2)))
+        best = held.estimator.started(Moved(self, numbers)).loss, numbers
+        pairs = zip(self.segments, self.descents, ROUNDS, strict=True)
+        for segments, go, (count, rate) in pairs:
+            state = (numbers, jnp.zeros((len(segments.at), 2)))
             state = (state, *(jax.tree.map(jnp.zeros_like, state) for _ in range(2)))
             for first in range(0, count, EVERY):
                 steps = np.arange(first, min(first + EVERY, count))
                 slower = rate * (1 + np.cos(np.pi * steps / count)) / 2
                 state = go(state, decay, steps + 1.0, slower)
                 numbers = state[0][0]
-                loss = held.judge.started(Moved(self, numbers)).loss
+                loss = held.estimator.started(Moved(self, numbers)).loss
                 best = min(best, (loss, numbers), key=lambda one: one[0])
         return best
 
-    def _descent(self, windows):
+    def _descent(self, segments):
         """Iterations of Adam over a network's numbers and the windows' starts in their doubts."""
-        counts = usable(windows)
-        ends = np.append(windows.at[1:], len(windows.force))
-        force = _filled(windows.force, windows.at, ends)
-        rows, there = np.maximum(windows.rows, 0), windows.rows >= 0
-        at = np.where(there, windows.step[rows] - windows.at[:, None], 0)
-        share, position = windows.share[rows], windows.position[rows]
-        room = BEND * np.maximum(windows.count, 1)
+        counts = usable(segments)
+        ends = np.append(segments.at[1:], len(segments.force))
+        force = _filled(segments.force, segments.at, ends)
+        rows, there = np.maximum(segments.rows, 0), segments.rows >= 0
+        at = np.where(there, segments.step[rows] - segments.at[:, None], 0)
+        share, position = segments.share[rows], segments.position[rows]
+        room = CAUCHY_SCALE * np.maximum(segments.count, 1)
 
         def loss(both):
             numbers, z = both
-            path, _ = self._paths(numbers, windows.start + windows.doubt * z, force, windows.h)
+            path, _ = self._paths(
+                numbers, segments.start + segments.prior_std * z, force, segments.h
+            )
             first, last = (jnp.take_along_axis(path, at + k, axis=1) for k in (0, 1))
-            r = windows.sharpness * (first + share * (last - first) - position)
-            r = r - jnp.einsum("mnr,mkr,mk->mn", windows.shared, windows.shared, r)
+            r = segments.sharpness * (first + share * (last - first) - position)
+            r = r - jnp.einsum("mnr,mkr,mk->mn", segments.shared, segments.shared, r)
             squares = (r**2).sum(1) + (z**2).sum(1)
             known = (((numbers["own"] - 1) / BASE_DOUBT) ** 2).sum()
             return jnp.where(counts, room * jnp.log1p(squares / room), 0).sum() + known
@@ -151,7 +154,7 @@ def _filled(force, at, ends):
 
 
 class Moved:
-    """A network's joint as a `joda.diagnosis.windows.Mover`."""
+    """A network's joint as a `joda.estimation.segments.Simulator`."""
 
     def __init__(self, network: Network, numbers: dict) -> None:
         self.network, self.numbers = network, numbers
@@ -171,7 +174,9 @@ class Replays(Replayer):
     """Replays runs with a network's force, and all else as with a profile."""
 
     def __init__(self, measured, moved: Moved) -> None:
-        super().__init__(measured.context, measured.profile, measured.single, measured.timestep)
+        super().__init__(
+            measured.context, measured.profile, measured.joint_model, measured.timestep
+        )
         self.moved = moved
 
     def _roll(self, initial, forces, command):

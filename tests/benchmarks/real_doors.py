@@ -17,7 +17,7 @@ import numpy as np
 from assets import SHARED
 
 from joda import compare, generate, refine
-from joda.measured.gauge import static_force
+from joda.measured.quasi_static import static_force
 from joda.measured.reading import read_measured
 from joda.measured.runs import read_run
 

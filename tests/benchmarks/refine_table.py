@@ -17,10 +17,10 @@ import numpy as np
 
 from joda import context, templates
 from joda.component import Component
+from joda.estimation.profile_parameters import Parameters, gravity_scale
 from joda.field import evaluate
-from joda.joints.parameters import Parameters, gravity_scale
+from joda.joints.joint_model import joint_model
 from joda.joints.rig import rig
-from joda.joints.single import single
 from joda.measured.runs import Run
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
 from joda.refining.engine import JointEngine, noise
@@ -98,7 +98,7 @@ def cabinet(seed: int):
 
 def problem_of(found: Context, start: Profile, runs, kinds=("values", "intervals")):
     """The fit of a profile to runs."""
-    joint = single(found, start, quiet_rig(found, start), 0)
+    joint = joint_model(found, start, quiet_rig(found, start), 0)
     parameters = Parameters(start, kinds, gravity=gravity_scale(found, start))
     span = found.joint.range
     engine = JointEngine(joint, span, runs, noise(runs, float(np.ptp(span))), STEP)

@@ -36,7 +36,7 @@ from refine_table import MODELS, NOISE, SECONDS, STEP, cabinet, problem_of, quie
 from scipy.optimize import least_squares
 
 from joda import attach
-from joda.joints.parameters import Parameters
+from joda.estimation.profile_parameters import Parameters
 from joda.measured.runs import Run
 from joda.profile import Profile
 from joda.scenes.context import Context

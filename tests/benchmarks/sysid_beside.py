@@ -12,7 +12,7 @@ of the same weight. (Its own weights, one over the norm of a window's positions,
 where the joint's zero is.) Its friction row is as tight as the one that both are judged with.
 Ours names what is missing and adds it.
 
-Both are judged by one function: `joda.diagnosis.mending.error` in windows of 0.4 s on runs that
+Both are judged by one function: `joda.diagnosis.adding.error` in windows of 0.4 s on runs that
 neither saw; errors are in units of the encoder's noise, and `true` is that of the true joint
 (`hidden_floor`).
 Seconds are the processor's, of mujoco.sysid and of ours. `report` is what the log of mujoco.sysid's
@@ -38,7 +38,7 @@ from hidden_floor import true_error
 from mujoco import sysid
 from mujoco.sysid.report.sections.insights import AutomatedInsights
 
-from joda.diagnosis.mending import error, mend
+from joda.diagnosis.adding import add_effect, error
 from joda.diagnosis.phrases import named
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
@@ -110,7 +110,7 @@ def pieces_of(measured: Measured) -> list[Piece]:
 
 def units(measured: Measured, pieces: list[Piece]) -> dict[str, tuple[float, float]]:
     """Zero and unit of each parameter, in SI: of a size that matters on this joint."""
-    (lo, hi), inertia = measured.profile.joint.range, measured.single.inertia
+    (lo, hi), inertia = measured.profile.joint.range, measured.joint_model.inertia
     force, speed = (
         float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
         for values in ([p.force for p in pieces], [p.start[1] for p in pieces])
@@ -209,8 +209,8 @@ def ours(train: Measured, held_out: Measured, before: float) -> tuple[float, str
         told += ", or " + " or ".join(map(named, first.indistinguishable_from))
     if found.verdict != "missing_effect":
         told = f"{found.verdict}; nearest: {told}"
-    mended = mend(*parted(train), first.effect, first.direction)
-    after = error(held_out, mended.profile).window if mended.effect else before
+    added_effect = add_effect(*parted(train), first.effect, first.direction)
+    after = error(held_out, added_effect.profile).window if added_effect.effect else before
     return after, told
 
 
@@ -229,11 +229,11 @@ def row(case: Case, effect: str | None) -> str:
         begun = time.process_time()
         fitted, report = theirs(case, train, Path(folder))
         between = time.process_time()
-    mended, told = ours(train, held_out, before)
+    added_effect, told = ours(train, held_out, before)
     spent = between - begun, time.process_time() - between
     hidden = named(effect) if effect else "none"
     noise = f"{case.noise:.1e} {train.profile.joint.unit}"
-    errors = [f"{one / case.noise:.2f}" for one in (true_error(case), before, fitted, mended)]
+    errors = [f"{one / case.noise:.2f}" for one in (true_error(case), before, fitted, added_effect)]
     cells = [hidden, noise, *errors, *(f"{one:.0f}" for one in spent), report, told]
     return f"| {' | '.join(cells)} |"
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from hidden_cases import read
 
+from joda.diagnosis.adding import error
 from joda.diagnosis.learning.choosing import learn
-from joda.diagnosis.mending import error
 from joda.diagnosis.split import parted
 from joda.hidden import FAMILIES, draw
 
@@ -26,15 +26,15 @@ def examined(seed: int, effect: str, family: str) -> dict:
     case = draw(seed, effect, family=family)
     known, unseen = read(case)
     begun = time.process_time()
-    mended, found = learn(*parted(known))
+    added_effect, found = learn(*parted(known))
     took = time.process_time() - begun
     errors = {
         when: vars(error(unseen, profile))
-        for when, profile in (("before", known.profile), ("after", mended.profile))
+        for when, profile in (("before", known.profile), ("after", added_effect.profile))
     }
     return {
         **{"seed": seed, "effect": effect, "family": family, "noise": case.noise},
-        **{"terms": found and vars(found.law.terms), "reason": mended.reason},
+        **{"terms": found and vars(found.law.terms), "reason": added_effect.reason},
         **{"unseen": errors, "achievable": case.achievable.together, "seconds": took},
     }
 

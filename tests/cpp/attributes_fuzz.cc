@@ -56,7 +56,7 @@ bool Check(Random& random, const Accepted& accepted) {
   std::vector<PiecewiseCubic> alone;
   for (const auto& c : accepted.components) alone.push_back({{c}, Combine::kSum});
   const double tolerance = 1e-6 * accepted.bound;
-  bool good = std::isfinite(accepted.channel.MaxDescent());
+  bool good = std::isfinite(accepted.channel.MaxStiffness());
   for (const double s : Places(random, accepted.channel.Knots())) {
     std::vector<Sample> samples;
     for (size_t k = 0; k < alone.size(); ++k) {
@@ -83,7 +83,7 @@ bool Resist(Random& random, const Effects& e) {
   const double load = 10 * Uniform(random), held = 4 * Uniform(random) - 2;
   const double damping = ExtraDamping(e, s, v);
   const FrictionBounds bounds = BoundFriction(e, 1, s, v, load);
-  const double left = BristleLeft(e.presliding, held, bounds.Bound(), v);
+  const double left = BristleStiffnessScale(e.presliding, held, bounds.Bound(), v);
   Loose handle = {0, v};
   const Backlash backlash = e.backlash.handle > 0 ? e.backlash : Backlash{1, 1};
   const double force = MoveHandle(backlash, h, load, -v, &handle);

@@ -14,7 +14,7 @@
 #include "effects.h"
 #include "fuzz.h"
 #include "joint_dynamics.h"
-#include "solo.h"
+#include "joint_simulator.h"
 
 namespace joda::fuzz {
 namespace {
@@ -219,7 +219,7 @@ double Odd(Random& random, double usual) {
 }
 
 // Positions are finite from each start on, or NaN from some place until the next one.
-bool IsReplay(const std::vector<double>& q, const std::vector<Solo::Start>& starts) {
+bool IsReplay(const std::vector<double>& q, const std::vector<JointSimulator::Start>& starts) {
   for (size_t i = 0; i < starts.size(); ++i) {
     const size_t end = i + 1 < starts.size() ? starts[i + 1].step : q.size();
     bool lost = false;
@@ -231,7 +231,7 @@ bool IsReplay(const std::vector<double>& q, const std::vector<Solo::Start>& star
   return true;
 }
 
-Trial TrySolo(Random& random) {
+Trial TryJointSimulator(Random& random) {
   const auto texts = Texts(random);
   const auto positive = [&random] { return Odd(random, std::pow(10, 4 * Uniform(random) - 3)); };
   const Body body = {
@@ -250,16 +250,16 @@ Trial TrySolo(Random& random) {
                          Odd(random, 2),
                          {Odd(random, -3), Odd(random, 3)},
                          Odd(random, 0.01 * Below(random, 2))};
-    const Solo solo(body, servo, Pointers(texts).data());
+    const JointSimulator simulator(body, servo, Pointers(texts).data());
     out.accepted = true;
     std::vector<double> force(60), command(60), before(60), after(60);
     for (double& one : force) one = Odd(random, 10 * Uniform(random) - 5);
     for (double& one : command) one = Odd(random, 10 * Uniform(random) - 5);
-    const std::vector<Solo::Start> starts = {{0, Odd(random, 0.1), 0, true},
-                                             {20, 0, Odd(random, 1), false},
-                                             {40, 0.2, 0, Below(random, 2) == 0}};
-    solo.Replay(std::pow(10, -4 + 3 * Uniform(random)), force.data(), command.data(), 60, starts,
-                before.data(), after.data());
+    const std::vector<JointSimulator::Start> starts = {{0, Odd(random, 0.1), 0, true},
+                                                       {20, 0, Odd(random, 1), false},
+                                                       {40, 0.2, 0, Below(random, 2) == 0}};
+    simulator.Replay(std::pow(10, -4 + 3 * Uniform(random)), force.data(), command.data(), 60,
+                     starts, before.data(), after.data());
     out.good = IsReplay(after, starts);
   } catch (const std::invalid_argument&) {
   }
@@ -272,7 +272,8 @@ Trial TrySolo(Random& random) {
 int main(int argc, char** argv) {
   using namespace joda::fuzz;
   mju_user_warning = [](const char*) {};  // what MuJoCo counts and resets is not told
-  constexpr Target kTargets[] = {
-      {"scenes", TryScene, 40}, {"swapped profiles", TrySwap, 20}, {"joints alone", TrySolo, 10}};
+  constexpr Target kTargets[] = {{"scenes", TryScene, 40},
+                                 {"swapped profiles", TrySwap, 20},
+                                 {"joints alone", TryJointSimulator, 10}};
   return Run(argc, argv, kTargets);
 }

@@ -211,31 +211,31 @@ TEST_CASE("friction grows with the load and with its direction") {
 
 TEST_CASE("a Prandtl bristle is elastic up to the bound, a Dahl bristle gives gradually") {
   const Presliding prandtl = {300, 0, 1}, dahl = {300, 0, 0};
-  CHECK(BristleLeft(prandtl, -1.99, 2, 1) == 1);
-  CHECK(BristleLeft(prandtl, -2, 2, 1) == 1e-6);
-  CHECK(BristleLeft(prandtl, -2, 2, -1) == 1);  // turning back
-  CHECK(BristleLeft(prandtl, -2, 2, 0) == 1);
-  CHECK(BristleLeft(prandtl, 0, 0, 1) == 1);
-  CHECK(BristleLeft(dahl, -1, 2, 1) == 0.5);
-  CHECK(BristleLeft(dahl, -1, 2, -1) == 1.5);
-  CHECK(BristleLeft(dahl, 2, 2, 1) == 2);
+  CHECK(BristleStiffnessScale(prandtl, -1.99, 2, 1) == 1);
+  CHECK(BristleStiffnessScale(prandtl, -2, 2, 1) == 1e-6);
+  CHECK(BristleStiffnessScale(prandtl, -2, 2, -1) == 1);  // turning back
+  CHECK(BristleStiffnessScale(prandtl, -2, 2, 0) == 1);
+  CHECK(BristleStiffnessScale(prandtl, 0, 0, 1) == 1);
+  CHECK(BristleStiffnessScale(dahl, -1, 2, 1) == 0.5);
+  CHECK(BristleStiffnessScale(dahl, -1, 2, -1) == 1.5);
+  CHECK(BristleStiffnessScale(dahl, 2, 2, 1) == 2);
 }
 
 TEST_CASE("the row of a bristle that slips, or is too stiff for the step, stays stiff") {
-  CHECK(BristleLeftInRow(1e-6, 0.01, 1, 1) == 1);
-  CHECK(BristleLeftInRow(0.01, 0.01, 1, 1) == 0.01);
-  CHECK(BristleLeftInRow(0.01, 0.01, 1e9, 1) == doctest::Approx(0.05).epsilon(1e-3));
-  CHECK(BristleLeftInRow(1.5, 0.01, 1e9, 1) == 1.5);
+  CHECK(BristleStiffnessScaleInRow(1e-6, 0.01, 1, 1) == 1);
+  CHECK(BristleStiffnessScaleInRow(0.01, 0.01, 1, 1) == 0.01);
+  CHECK(BristleStiffnessScaleInRow(0.01, 0.01, 1e9, 1) == doctest::Approx(0.05).epsilon(1e-3));
+  CHECK(BristleStiffnessScaleInRow(1.5, 0.01, 1e9, 1) == 1.5);
 }
 
 TEST_CASE("between break-away and the bound plasticity rises as half a sine") {
-  CHECK(PlasticPart(0.6, 0.6) == 0);
-  CHECK(PlasticPart(0.6, 0.7) == doctest::Approx(0.5 - std::sqrt(0.125)));
-  CHECK(PlasticPart(0.6, 0.8) == doctest::Approx(0.5));
-  CHECK(PlasticPart(0.6, 1) == 1);
-  CHECK(PlasticPart(0.6, -1) == 0);
-  CHECK(PlasticPart(1, 0.999) == 0);
-  CHECK(PlasticPart(1, 1) == 1);
+  CHECK(DupontAlpha(0.6, 0.6) == 0);
+  CHECK(DupontAlpha(0.6, 0.7) == doctest::Approx(0.5 - std::sqrt(0.125)));
+  CHECK(DupontAlpha(0.6, 0.8) == doctest::Approx(0.5));
+  CHECK(DupontAlpha(0.6, 1) == 1);
+  CHECK(DupontAlpha(0.6, -1) == 0);
+  CHECK(DupontAlpha(1, 0.999) == 0);
+  CHECK(DupontAlpha(1, 1) == 1);
 }
 
 TEST_CASE("the gravity offset is a sine of the position, or a force") {

@@ -78,7 +78,7 @@ TEST_CASE("the field agrees with SciPy's golden vectors") {
 TEST_CASE("an empty channel is zero") {
   CHECK(PiecewiseCubic()(0.5).value == 0);
   CHECK(PiecewiseCubic({}, Combine::kMax)(0.5).value == 0);
-  CHECK(PiecewiseCubic().MaxDescent() == 0);
+  CHECK(PiecewiseCubic().MaxStiffness() == 0);
 }
 
 TEST_CASE("a sum of lines is exact in closed form") {
@@ -132,7 +132,7 @@ TEST_CASE("no component covers a position that is not a number") {
   const PiecewiseCubic line({Line(0, 1, 1, 3)}, Combine::kSum);
   CHECK(line(std::nan("")).value == 0);
   CHECK(line(INFINITY).value == 3);
-  CHECK(line.MaxDescent(std::nan(""), std::nan("")) == 0);
+  CHECK(line.MaxStiffness(std::nan(""), std::nan("")) == 0);
 }
 
 TEST_CASE("all three crossings of two cubics are found") {
@@ -148,11 +148,11 @@ TEST_CASE("the largest descent is met at the vertex of a cubic's slope") {
   // the smooth step from 1 to 0 has its steepest slope, -1.5, in the middle
   const Component step = {"", 0, 1, {0, 0.25, 0.75, 1}, {1, 1, 0, 0}};
   const PiecewiseCubic channel({step}, Combine::kSum);
-  CHECK(channel.MaxDescent() == doctest::Approx(3).epsilon(1e-14));
-  CHECK(channel.MaxDescent(0, 0.2) == 0);
-  CHECK(channel.MaxDescent(0.2, 0.3) == channel.MaxDescent());
-  CHECK(channel.MaxDescent(2, 3) == 0);
-  CHECK(PiecewiseCubic({Line(0, 1, 0, 1)}, Combine::kSum).MaxDescent() == 0);
+  CHECK(channel.MaxStiffness() == doctest::Approx(3).epsilon(1e-14));
+  CHECK(channel.MaxStiffness(0, 0.2) == 0);
+  CHECK(channel.MaxStiffness(0.2, 0.3) == channel.MaxStiffness());
+  CHECK(channel.MaxStiffness(2, 3) == 0);
+  CHECK(PiecewiseCubic({Line(0, 1, 0, 1)}, Combine::kSum).MaxStiffness() == 0);
 }
 
 }  // namespace

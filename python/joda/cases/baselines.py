@@ -17,8 +17,8 @@ from joda.cases.subject import Subject
 from joda.compiling import reference_scales
 from joda.component import Component
 from joda.field import evaluate
-from joda.joints.single import single
-from joda.measured.gauge import static_force
+from joda.joints.joint_model import joint_model
+from joda.measured.quasi_static import static_force
 from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scenes.context import Context
 from joda.scenes.engine import set_strength
@@ -139,7 +139,7 @@ def fit_motions(
 
     lo, hi = found.joint.range
     bare = load_model(model)
-    own = single(found, Profile(joint=found.joint), bare, find_joint(bare, found.joint.name))
+    own = joint_model(found, Profile(joint=found.joint), bare, find_joint(bare, found.joint.name))
     references = reference_scales(found)
     most = np.array([MOST[name] for name in ("friction", "damping", "stiffness")])
     most *= references["friction"], references["damping"], references["friction"] / (hi - lo)
@@ -162,16 +162,16 @@ def fit_motions(
         return Baseline(float(friction), float(damping), float(stiffness), float(rest))
 
     def missed(u: Array) -> float:
-        solo = own.solo(numbers(u).profile(found), STEP)
-        after = solo.replay(force, at, start, fresh, STEP)[1]
+        simulator = own.simulator(numbers(u).profile(found), STEP)
+        after = simulator.replay(force, at, start, fresh, STEP)[1]
         path = np.sqrt(np.mean((after[samples] - wanted) ** 2)) / (hi - lo)
         shares = (after[last] - lo) / (hi - lo)
         end = np.abs(shares - np.array(ends)).max() if len(ends) else 0.0
         return float(end + PATHS * path)
 
-    guess = fit_forces(profile, found, spring)
-    first = np.cbrt(np.array([guess.friction, guess.damping, guess.stiffness]) / most)
-    first = np.append(first, (guess.rest - lo) / (hi - lo))[: 4 if spring else 2]
+    candidate = fit_forces(profile, found, spring)
+    first = np.cbrt(np.array([candidate.friction, candidate.damping, candidate.stiffness]) / most)
+    first = np.append(first, (candidate.rest - lo) / (hi - lo))[: 4 if spring else 2]
     found_best = differential_evolution(
         missed,
         [(0.0, 1.0)] * len(first),

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from joda.commands.diagnose import check_effect
+from joda.diagnosis.adding import AddedEffect, Error, add_effect, error
+from joda.diagnosis.applied_corrections import as_told
 from joda.diagnosis.findings import read_diagnosis
 from joda.diagnosis.learning.account import Account, account, learned_picture
 from joda.diagnosis.learning.account import sentences as law_sentences
 from joda.diagnosis.learning.choosing import learn
 from joda.diagnosis.learning.fitting import Learned
 from joda.diagnosis.learning.law import LABEL
-from joda.diagnosis.mending import Error, Mended, error, mend
 from joda.diagnosis.outcome import (
     NO_TRUST,
     beside,
@@ -24,9 +25,8 @@ from joda.diagnosis.outcome import (
     scene_files,
     told_errors,
 )
+from joda.diagnosis.overlap import places
 from joda.diagnosis.phrases import extrapolated, named
-from joda.diagnosis.righted import as_told
-from joda.diagnosis.share import places
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together
@@ -132,7 +132,7 @@ def add(
     told = read_diagnosis(Path(diagnosis))
     name, direction, near = _chosen(told, Path(diagnosis), effect)
     measured = read_runs(model, joint, runs, passive, trust)
-    driven = measured.single.servo is not None
+    driven = measured.joint_model.servo is not None
     if right := as_told(told.get("corrections", ()), driven):
         measured = right.of(measured)
     own = measured.profile.joint
@@ -142,30 +142,30 @@ def add(
     law: Learned | None = None
     if reason := _no_help(told, name) or (None if effect else _in_doubt(told)):
         before = error(held)
-        mended = Mended(train.profile, None, before, before, reason)
+        added_effect = AddedEffect(train.profile, None, before, before, reason)
     elif name == LABEL:
-        mended, law = learn(train, held, progress)
+        added_effect, law = learn(train, held, progress)
     else:
-        mended = mend(train, held, name, direction, near, progress)
+        added_effect = add_effect(train, held, name, direction, near, progress)
     known = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
-    told_law = account(train, held, law, mended.after.window, known) if law else None
+    told_law = account(train, held, law, added_effect.after.window, known) if law else None
     notes: list[str] = []
     corrections: Path | None = corrections_beside(target)
-    if mended.effect:
+    if added_effect.effect:
         if not told_law:  # of a learned law nothing is where no run was
-            there = places(mended.profile, name, measured.profile)[0]
+            there = places(added_effect.profile, name, measured.profile)[0]
             notes += filter(None, [extrapolated(unvisited_part(measured, there)).strip()])
         progress("drawing")
-        files, more = scene_files(Path(model), mended.profile, target, composed, right=right)
+        files, more = scene_files(Path(model), added_effect.profile, target, composed, right=right)
         corrections = corrections if corrections in files else None
         notes += more
         drawn = (
-            learned_picture(held, mended.profile, told_law)
+            learned_picture(held, added_effect.profile, told_law)
             if told_law
-            else mended_picture(held, mended.profile)
+            else mended_picture(held, added_effect.profile)
         )
         write_together(files | {picture: png(drawn)})
-    added = mended.effect is not None
+    added = added_effect.effect is not None
     return Added(
         scene=target if added else None,
         composed=composed if added else None,
@@ -173,15 +173,15 @@ def add(
         corrections=corrections if added else None,
         effect=name,
         added=added,
-        reason=mended.reason,
-        before=mended.before,
-        after=mended.after,
+        reason=added_effect.reason,
+        before=added_effect.before,
+        after=added_effect.after,
         noise_floor=held.floor,
         unit=held.unit,
         held_out=held_out(measured, held),
         blocks=in_blocks(measured, held),
-        departures=mended.departs.sentences,
-        changes=tuple(changes(measured.profile, mended.profile)),
+        departures=added_effect.departs.sentences,
+        changes=tuple(changes(measured.profile, added_effect.profile)),
         notes=(*measured.notes, *notes),
         learned=told_law,
     )

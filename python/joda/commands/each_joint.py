@@ -11,7 +11,7 @@ from joda.commands.compare import compare
 from joda.commands.diagnose import diagnose
 from joda.commands.improve import Improved, improve
 from joda.diagnosis.findings import Diagnosis
-from joda.diagnosis.improving import INTERRUPTED
+from joda.diagnosis.improvement import INTERRUPTED
 from joda.diagnosis.outcome import NO_TRUST
 from joda.errors import JodaError
 from joda.files import check_targets, file_name, named_like, write_text

@@ -15,8 +15,8 @@ from joda.commands.diagnose import sentences as of_diagnosis
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.learning.account import sentences as law_sentences
 from joda.diagnosis.learning.law import LABEL
+from joda.diagnosis.overlap import overlap
 from joda.diagnosis.phrases import named, percent
-from joda.diagnosis.share import overlap
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied
 from joda.hidden import EFFECTS, draw, write

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from joda.diagnosis.improving import Step, improved
+from joda.diagnosis.improvement import Step, improved
 from joda.diagnosis.outcome import (
     NO_TRUST,
     beside,

@@ -8,19 +8,19 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.diagnosis.adding import Error, error
 from joda.diagnosis.coverage import hardly_moved
-from joda.diagnosis.mending import Error, error
 from joda.diagnosis.outcome import parting
 from joda.diagnosis.plausible import Needs
-from joda.diagnosis.reshaping import resolved
+from joda.diagnosis.shape_refinement import resolved
 from joda.errors import JodaError
+from joda.estimation.profile_parameters import KINDS, Kind, Parameters, gravity_scale
 from joda.files import check_targets, named_like, write_together
-from joda.joints.parameters import KINDS, Kind, Parameters, gravity_scale
 from joda.measured.corrections_file import corrections_beside, corrections_text, sensing_of
 from joda.measured.driven import read_logs
 from joda.measured.excerpts import excerpts
-from joda.measured.gauge import compared
 from joda.measured.obstructed import clear_of_contacts
+from joda.measured.quasi_static import compared
 from joda.measured.reading import Measured, checked, taken
 from joda.measured.runs import QuasiStatic, Run, check_known
 from joda.measured.sensing import RIGHT
@@ -208,7 +208,7 @@ def refine(
 
     span = begin.joint.range
     sigma = noise(parts, float(np.ptp(span)))
-    by_itself = JointEngine(at_first.single, span, parts, sigma, at_first.timestep, all_of)
+    by_itself = JointEngine(at_first.joint_model, span, parts, sigma, at_first.timestep, all_of)
     engine = jointly.engine(by_itself, number) if jointly else by_itself
     problem: Problem | CurveProblem = (
         Problem(engine, parameters) if timed else CurveProblem(found, all_of, parameters, still)
@@ -229,7 +229,7 @@ def refine(
             numbers = (first, first.start), (parameters, result.theta)
             before, after = (Problem(own, which).error(theta) for which, theta in numbers)
             return before, after
-        return error(one), error(one.changed(mended, single=body))
+        return error(one), error(one.changed(mended, joint_model=body))
 
     errors = beside(at_first)
     apart = beside(taken(compiled, number, found, whole, other, servo=servo)) if other else None

@@ -1,266 +1,186 @@
-"""The model as it is, with the strengths of its components as numbers to be fitted again."""
+"""A model fitted to measured runs, and what it may lack, fitted together with it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._core import Solo
-from joda.diagnosis.cutting import windows_of
-from joda.diagnosis.hypotheses import Hypothesis, Units
-from joda.diagnosis.judge import Make, Unknowns
-from joda.diagnosis.static import Still, curve_windows
-from joda.diagnosis.windows import GRID, Windows
-from joda.joints.single import Single
+from joda.diagnosis.hypotheses import Hypothesis, hypotheses
+from joda.diagnosis.hypothesis_fits import (
+    FittedHypothesis,
+    InitialPoint,
+    coarse,
+    initial_points,
+    joined,
+    perturbed,
+    refined,
+    scored,
+    simplex_searched,
+)
+from joda.diagnosis.impacts import Impacts, Rebound, ends_of, impacts_at, restitution_fit
+from joda.diagnosis.units import units_of
+from joda.estimation.base_model import BaseModel, base_of, joint_model_for, segments_for, usable
+from joda.estimation.estimator import Fit, SegmentEstimator, excess
+from joda.joints.joint_model import JointModel
 from joda.measured.reading import Measured
-from joda.measured.trust import USUAL, Trust
-from joda.profile import CHANNELS, Profile
-from joda.scenes.actuators import Servo
-from joda.scenes.native import DAMPING, FRICTION, SPRING
+from joda.profile import Profile
+from joda.template import read_templates
 
 Array = NDArray[np.float64]
 
-BASE_DOUBT = 0.15
-"""How far off (one standard deviation, relative) the model's own strengths may be."""
-DRIVEN_DOUBT = 3.0
-"""The same of joints that an actuator drives, whose friction few models know."""
-GAIN_AT_MOST, GAIN_DOUBT = 7.0, 0.7
-"""Largest logarithm of the factor by which an actuator's gain may be off, and its doubt."""
-HELD = 1e-6
-"""Doubt of a number that is not there."""
-DELAY_AT_MOST, DELAY_DOUBT = 0.1, 0.02
-"""Longest delay of commands, and its doubt, s."""
-FAR_AWAY = ((-4.0, -2.0, 10.0), (-2.0, -1.0, 3.0), (2.0, 1.0, 1.0))
-"""Logarithms of gain and damping, and factors of friction, from which fits begin besides."""
-SOFT = (0.02, 1.0)
-"""MuJoCo's own `solreflimit`: time constant (s) and damping ratio of the ends of a range."""
-BEYOND, STRAYS = 4.0, 3
-"""So many noises outside its range a joint is beyond it; at most so many samples are by chance."""
-SLOWEST = 0.02
-"""Least speed that counts as a usual one, in ranges in the time of the longest run."""
-LEAST = 4
-"""Fewest samples of a window that counts."""
-AT_END = 0.02
-"""Of the range: what was measured as near to its end goes to the end."""
+CLEARLY, CALM = 10.0, 0.1
+"""Gain in loss from which runs tell that friction yields as MuJoCo's own does, and what that may
+leave per sample beyond noise."""
+RESTITUTION = "end_stop_restitution"
+"""Effect that only impacts tell of."""
 
 
 @dataclass(frozen=True)
-class Base:
-    """The model as it is, with numbers: a factor for each of its components' strengths, and of an
-    actuator the logarithms of its gain's and its damping's factors and its delay (s). Where it
-    damps, the joint's own damping has the same factor: no run tells one from the other.
+class Baseline:
+    """A model fitted to measured runs, and what it may lack.
 
     Attributes:
-        profile: of the joint.
-        single: the joint.
-        h: step, s.
-        places: channel and number of each component that has a factor.
-        unknowns: the numbers, the factors first.
+        estimator: of the segments.
+        base: the model as it is.
+        given: the joint with its own ends of the range.
+        fit: of its factors alone.
+        initial_points: from where hypotheses are fitted.
+        hypotheses: all of the catalogue.
     """
 
-    profile: Profile
-    single: Single
-    h: float
-    places: tuple[tuple[str, int], ...]
-    unknowns: Unknowns
+    estimator: SegmentEstimator
+    base: BaseModel
+    given: JointModel
+    fit: Fit
+    initial_points: tuple[InitialPoint, ...]
+    hypotheses: tuple[Hypothesis, ...]
 
-    @property
-    def count(self) -> int:
-        """Of the numbers."""
-        return len(self.unknowns.mean)
-
-    def beginnings(self) -> list[Array]:
-        """Numbers from which a fit may begin besides those of the model: of an actuator that is
-        much stiffer or softer, beside a friction that is larger."""
-        out = []
-        for gain, drag, rubs in FAR_AWAY if self.single.servo else ():
-            x = self.unknowns.mean.copy()
-            x[: len(self.places)] = [rubs if name == "friction" else 1.0 for name, _ in self.places]
-            x[len(self.places) : len(self.places) + 2] = gain, drag
-            out.append(x)
-        return out
-
-    def own(self, x: Array) -> Single:
-        """The joint but for its profile, with its actuator's numbers."""
-        if (servo := self.single.servo) is None:
-            return self.single
-        gain, drag, delay = map(float, x[len(self.places) : self.count])
-        return replace(self.single, servo=servo.changed(np.exp(gain), np.exp(drag), delay))
-
-    def written(self, x: Array) -> Profile:
-        """The profile with its factors."""
-        channels = {}
-        for name in CHANNELS:
-            channel = getattr(self.profile.channels, name)
-            parts = list(channel.components)
-            for (where, number), factor in self._factors(x):
-                if where == name:
-                    old = parts[number]
-                    y = tuple(factor * value for value in old.y)
-                    parts[number] = old.model_copy(update={"y": y})
-            channels[name] = channel.model_copy(update={"components": tuple(parts)})
-        return self.profile.model_copy(
-            update={"channels": self.profile.channels.model_copy(update=channels)}
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the fitted factors, with what is left over as noise; shape (k, k)."""
+        unknowns = self.base.unknowns
+        return self.estimator.covariance(
+            self.base.simulator, unknowns, self.fit, unknowns.prior_std
         )
 
-    def _factors(self, x: Array) -> list[tuple[tuple[str, int], float]]:
-        """Of each component that has one."""
-        own = [(place, float(factor)) for place, factor in zip(self.places, x, strict=False)]
-        shared = shared_damping(self.profile, self.single.servo)
-        return own + [(place, float(np.exp(x[len(self.places) + 1]))) for place in shared]
+    @cached_property
+    def impacts(self) -> dict[int, Impacts]:
+        """At each end that has some, -1 low and 1 high."""
+        return impacts_at(self.estimator.segments, self.base, self.given)
 
-    def coarser(self) -> "Base":
-        """The same for `GRID` times longer steps."""
-        return replace(self, h=GRID * self.h)
+    @cached_property
+    def rebounds(self) -> dict[int, Rebound]:
+        """What the impacts at each end tell of it, where the model is as it was fitted."""
+        profile = self.base.written(self.fit.x)
+        return {side: impacts.rebound(profile) for side, impacts in self.impacts.items()}
 
-    def solo(self, x: Array) -> Solo:
-        """The joint with its numbers."""
-        return self.with_profile(self.written(x), x)
+    def fit_hypothesis(self, hypothesis: Hypothesis) -> FittedHypothesis | None:
+        """The hypothesis fitted; None if the data cannot tell of it."""
+        if hypothesis.effect == RESTITUTION:
+            return self._thrown_back(hypothesis)
+        return self.refined(self.coarse(hypothesis))
 
-    def with_profile(self, profile: Profile, x: Array) -> Solo:
-        """The joint with its numbers but another profile."""
-        return self.own(x).stepped(self.h).solo(profile, self.h)
+    def restitution(
+        self, ends: Sequence[Hypothesis], others: Sequence[Profile] = ()
+    ) -> list[FittedHypothesis]:
+        """How bouncy the ends are that throw the joint back clearly faster than the model's do.
 
+        Args:
+            ends: an end that is bouncy, or both.
+            others: what else the joint's profile may be: with all of them that must be so too.
+        """
+        sure = {
+            side
+            for side, own in self.rebounds.items()
+            if own.bouncier and all(self.impacts[side].rebound(o).bouncier for o in others)
+        }
+        there = [self._thrown_back(end) for end in ends if sure.issuperset(ends_of(end))]
+        return [candidate for candidate in there if candidate]
 
-def base_of(profile: Profile, single: Single, h: float, trust: Trust = USUAL) -> Base:
-    """The model as it is; `trust`: how far off its numbers may be."""
-    shared = shared_damping(profile, single.servo)
-    places = tuple(
-        (name, number)
-        for name in CHANNELS
-        for number, part in enumerate(getattr(profile.channels, name).components)
-        if any(part.y) and (name, number) not in shared
-    )
-    k = len(places)
-    doubt, most = (BASE_DOUBT, 20.0) if single.servo is None else (DRIVEN_DOUBT, 100.0)
-    doubts = np.array([_doubt(profile, place, trust, doubt) for place in places])
-    unknowns = Unknowns(np.zeros(k), np.full(k, most), np.full(k, 0.01), np.ones(k), doubts)
-    if single.servo is not None:
-        unknowns = unknowns.and_(_of_servo(single.servo, trust))
-    return Base(profile, single, h, places, unknowns)
+    def _thrown_back(self, end: Hypothesis) -> FittedHypothesis | None:
+        return restitution_fit(self.estimator, self.base, self.fit, self.rebounds, end)
 
+    def coarse(self, hypothesis: Hypothesis) -> "CoarseFit":
+        """The hypothesis fitted roughly, in longer steps, to segments without impacts."""
+        estimator, base = self.estimator.coarser, self.base.coarser()
+        return CoarseFit(hypothesis, coarse(estimator, base, self.initial_points, hypothesis))
 
-def shared_damping(profile: Profile, servo: Servo | None) -> list[tuple[str, int]]:
-    """Channel and number of the joint's own damping, where an actuator damps too."""
-    if servo is None or not servo.damping > 0:
-        return []
-    parts = enumerate(profile.channels.damping.components)
-    return [("damping", number) for number, part in parts if part.label == DAMPING]
+    def refined(self, found: "CoarseFit") -> FittedHypothesis:
+        """The same fitted to the end."""
+        return refined(self.estimator, self.base, found.hypothesis, found.fits)
 
+    def coarse_scored(self, found: "CoarseFit") -> FittedHypothesis:
+        """The same as it is, in usual steps."""
+        make, unknowns = joined(self.base, found.hypothesis)
+        x, start = found.best.x, found.best.start
+        fit = self.estimator.fit(make, unknowns, x, start, iterations=0)
+        return scored(self.estimator, found.hypothesis, fit)
 
-def _doubt(profile: Profile, place: tuple[str, int], trust: Trust, usual: float) -> float:
-    """How far off a component's strength may be: those of a profile as usual."""
-    channel, number = place
-    label = getattr(profile.channels, channel).components[number].label
-    named = {DAMPING: "damping", FRICTION: "frictionloss", SPRING: "stiffness"}
-    width = trust.width(named[label], usual) if label in named else usual
-    return max(width, HELD)
+    def perturbed(self, found: FittedHypothesis) -> FittedHypothesis:
+        """The candidate with its numbers tried elsewhere."""
+        return perturbed(self.estimator, self.base, found)
 
-
-def _of_servo(servo: Servo, trust: Trust) -> Unknowns:
-    """Gain, damping and delay of an actuator, of which a model's are rarely right."""
-    damps = trust.width("damping", GAIN_DOUBT) if servo.damping else HELD  # else only the joint's
-    doubt = trust.width("actuator_gain", GAIN_DOUBT), damps, trust.width("time_delay", DELAY_DOUBT)
-    return Unknowns(
-        low=np.array([-GAIN_AT_MOST, -GAIN_AT_MOST, 0.0]),
-        high=np.array([GAIN_AT_MOST, GAIN_AT_MOST, DELAY_AT_MOST]),
-        step=np.array([0.01, 0.01, 2e-4]),
-        mean=np.array([0.0, 0.0, servo.delay]),
-        doubt=np.maximum(doubt, HELD),
-    )
+    def simplex_searched(self, found: FittedHypothesis) -> FittedHypothesis:
+        """The candidate after a search without derivatives."""
+        return simplex_searched(self.estimator, self.base, found)
 
 
-def joined(base: Base, hypothesis: Hypothesis) -> tuple[Make, Unknowns]:
-    """The model's factors and the hypothesis' numbers as one vector."""
-    n = base.count
+@dataclass(frozen=True)
+class CoarseFit:
+    """A hypothesis fitted roughly, from one or more beginnings."""
 
-    def make(x: Array) -> Solo:
-        return base.with_profile(hypothesis.write(base.written(x), x[n:]), x)
+    hypothesis: Hypothesis
+    fits: tuple[Fit, ...]
 
-    return make, base.unknowns.and_(hypothesis.unknowns)
-
-
-def units_of(windows: Windows, measured: Measured) -> Units:
-    """The joint's own units, from the measured motion."""
-    profile, inertia = measured.profile, measured.single.inertia
-    velocity = windows.start[:, 1]
-    same = ~windows.fresh[1:]
-    pace = np.diff(windows.at)[same] * windows.h
-    acceleration = np.diff(velocity)[same] / pace
-    longest = max((float(np.ptp(run.time)) for run in measured.runs), default=np.inf)
-    slowest = SLOWEST * float(np.ptp(profile.joint.range)) / longest
-    speed = max(float(np.sqrt(np.mean(velocity**2))), slowest)
-    exerted = [float(np.mean(measured.exerted(run) ** 2)) for run in measured.runs]
-    pushed = float(np.sqrt(np.mean(windows.force**2) + max(exerted, default=0.0)))
-    force = max(pushed, inertia * float(np.sqrt(np.mean(acceleration**2))) if len(pace) else 0.0)
-    friction = max((max(c.y) for c in profile.channels.friction.components), default=0.0)
-    return Units(
-        force=force or inertia,
-        speed=speed or 1.0,
-        inertia=inertia,
-        span=float(np.ptp(profile.joint.range)),
-        visited=_visited(windows, measured),
-        friction=friction,
-        forced=not measured.runs or any(run.pushed for run in measured.runs),
-        weight=max(map(abs, measured.context.gravity_force)),
-        hinge=measured.single.hinge,
-    )
+    @property
+    def best(self) -> Fit:
+        """The best one."""
+        return min(self.fits, key=lambda fit: fit.loss)
 
 
-def _visited(windows: Windows, measured: Measured) -> tuple[float, float]:
-    """Part of the range that was measured in windows that count: where a knock is, none does."""
-    lo, hi = measured.profile.joint.range
-    if measured.runs:
-        rows = windows.rows[usable(windows)]
-        positions = windows.position[rows[rows >= 0]]
-    else:
-        positions = np.concatenate([gauged.curve.position for gauged in measured.curves])
-    if not len(positions):
-        return 0.0, 1.0
-    s = (positions - lo) / (hi - lo)
-    first, last = float(s.min()), float(s.max())
-    first, last = first if first > AT_END else 0.0, last if last < 1 - AT_END else 1.0
-    return (first, last) if last - first > AT_END else (0.0, 1.0)
+def _fitted(estimator: SegmentEstimator, base: BaseModel, near: Array | None) -> tuple[Fit, Fit]:
+    """A model's strengths fitted, and as they are given."""
+    as_it_is = base.unknowns.mean
+    given = replace(estimator.started(base.simulator(as_it_is)), x=as_it_is)
+    tried = [(as_it_is, estimator.segments.start), (as_it_is, given.start)]
+    if near is not None:
+        tried.append((near, estimator.started(base.simulator(near)).start))
+    away = [replace(estimator.started(base.simulator(x)), x=x) for x in base.beginnings()]
+    tried += [(one.x, one.start) for one in away if one.loss < given.loss]
+    fits = [estimator.fit(base.simulator, base.unknowns, x, start) for x, start in tried]
+    return estimator.refit(base.simulator, base.unknowns, min(fits, key=lambda f: f.loss)), given
 
 
-def windows_for(measured: Measured, length: float | None = None, fine: bool = True) -> Windows:
-    """The runs in windows of some length (s), see `windows_of`; curves where there are no runs."""
-    if not measured.runs:
-        return curve_windows(measured)
-    lo, hi = measured.profile.joint.range
-    fixed = lo, measured.single.inertia, measured.timestep
-    return windows_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine)
+def fit_baseline(
+    measured: Measured, length: float | None = None, near: Array | None = None
+) -> Baseline:
+    """Fits the model's own strengths.
 
+    Its native friction may yield as MuJoCo's own row does, where the runs are of such a joint; else
+    it holds as the plugin's, and as that of real joints.
 
-def single_for(measured: Measured, h: float) -> Single:
-    """The joint, to be simulated in steps of h (s) where there are runs.
-
-    MuJoCo's own ends of a range yield by more than an encoder's noise to what presses on them. They
-    are hard here, unless somebody chose others or the measured ones yield too.
+    Args:
+        measured: the joint and its runs.
+        length: of the segments, s; None: by the joint's pace.
+        near: factors of the strengths with which a fit begins besides, as shorter segments told
+            them: in longer ones a model that is far off is fitted less easily.
     """
-    single = as_it_is(measured)
-    if single.solref != SOFT or not measured.runs or _yields(measured):
-        return single
-    return replace(single, solref=(2 * h, 1.0))
-
-
-def as_it_is(measured: Measured) -> Single:
-    """The joint as its scene has it, with the plugin; where there are only curves it is not
-    simulated."""
-    single = measured.single.with_plugin
-    return single if measured.runs else Still(**vars(single))
-
-
-def _yields(measured: Measured) -> bool:
-    """Whether the joint was beyond its range by more than noise."""
-    beyond = (
-        np.abs(run.position - np.clip(run.position, *measured.profile.joint.range)) / sigma
-        for run, sigma in zip(measured.runs, measured.sigma, strict=True)
-    )
-    return sum(int(np.sum(noises > BEYOND)) for noises in beyond) > STRAYS
-
-
-def usable(windows: Windows) -> NDArray[np.bool_]:
-    """Which windows tell of the joint: enough samples, and neither a knock at an end of the range
-    nor nothing but rest there."""
-    return np.asarray((windows.count >= LEAST) & ~windows.knocks & ~windows.rests)
+    segments = segments_for(measured, length)
+    estimator = SegmentEstimator(segments, usable(segments))
+    joint_model, own = joint_model_for(measured, segments.h), measured.own_row
+    base = base_of(measured.profile, joint_model, segments.h, measured.trust)
+    fit, given = _fitted(estimator, base, near)
+    if measured.runs and own and measured.profile.channels.friction.components:
+        other = replace(joint_model, friction_row=own)
+        yielding = base_of(measured.profile, other, segments.h, measured.trust)
+        fit_so, given_so = _fitted(estimator, yielding, near)
+        explained = (
+            excess(fit_so.loss, max(estimator.samples, 1.0)) < CALM
+        )  # else something else is missing
+        if explained and fit_so.loss < fit.loss - CLEARLY:
+            base, fit, given = yielding, fit_so, given_so
+    every = hypotheses(units_of(segments, measured), read_templates(), measured.profile)
+    begun = initial_points(estimator.coarser, base.coarser(), given, fit)
+    return Baseline(estimator, base, measured.joint_model, fit, begun, tuple(every))

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.component import Component
-from joda.diagnosis.asking import Asked
-from joda.diagnosis.baseline import Base, joined, shared_damping
-from joda.diagnosis.guessing import Guess
+from joda.diagnosis.baseline import Baseline
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.estimation.base_model import BaseModel, shared_damping
 from joda.profile import Joint, Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.native import DAMPING, FRICTION, SPRING
@@ -131,18 +131,23 @@ class Number:
 
 
 def numbers(
-    asked: Asked, guess: Guess | None = None, found: tuple[Array, Array] | None = None
+    baseline: Baseline,
+    candidate: FittedHypothesis | None = None,
+    found: tuple[Array, Array] | None = None,
 ) -> tuple[Number, ...]:
     """Of the model: strengths of its components, gain and delay of its actuator.
 
     Args:
-        asked: the model fitted alone.
-        guess: an effect fitted with them.
+        baseline: the model fitted alone.
+        candidate: an effect fitted with them.
         found: other values and standard errors than those of the fit, shape (k,) each.
     """
-    base = asked.base
-    x, errors = found or ((guess.fit if guess else asked.fit).x, _errors(asked, guess))
-    n, joint, servo = len(base.places), base.profile.joint, base.single.servo
+    base = baseline.base
+    x, errors = found or (
+        (candidate.fit if candidate else baseline.fit).x,
+        _errors(baseline, candidate),
+    )
+    n, joint, servo = len(base.places), base.profile.joint, base.joint_model.servo
     parts = (getattr(base.profile.channels, name).components[k] for name, k in base.places)
     told = zip(base.places, parts, x, errors, strict=False)
     out = [
@@ -152,13 +157,13 @@ def numbers(
     return (*out, *(_of_actuator(base, servo, x[n:], errors[n:]) if servo else ()))
 
 
-def _of_actuator(base: Base, servo: Servo, x: Array, errors: Array) -> list[Number]:
+def _of_actuator(base: BaseModel, servo: Servo, x: Array, errors: Array) -> list[Number]:
     """Its gain, its damping with the joint's own, and its delay."""
     n, joint = len(base.places), base.profile.joint
-    (gain, drag, late), (doubt, unsure, uneven) = (map(float, own[:3]) for own in (x, errors))
+    (gain, drag, late), (prior_std, unsure, uneven) = (map(float, own[:3]) for own in (x, errors))
     factor, stiff = float(np.exp(gain)), servo.stiffness
     given, unit = (stiff, f"{joint.force_unit}/{joint.unit}") if stiff > 0 else (1.0, "")
-    error = factor * doubt
+    error = factor * prior_std
     out = [Number(GAIN, "actuator_gain", given, factor * given, error * given, unit, given, n)]
     if servo.damping > 0:
         shared = shared_damping(base.profile, servo)
@@ -184,12 +189,12 @@ class Corrected:
 
 
 def corrected(
-    asked: Asked, found: Sequence[Number], least: float, x: Array, driven_only: bool = False
+    baseline: Baseline, found: Sequence[Number], least: float, x: Array, driven_only: bool = False
 ) -> Corrected | None:
     """The model with those numbers set right that are off.
 
     Args:
-        asked: the model fitted.
+        baseline: the model fitted.
         found: `numbers` of it.
         least: part by which a number must be off.
         x: the numbers as fitted, these first, shape (k or more,).
@@ -198,7 +203,7 @@ def corrected(
     Returns:
         None if none is.
     """
-    base = asked.base
+    base = baseline.base
     first = len(base.places) if driven_only else 0
     off = np.zeros(base.count, bool)
     off[[one.place for one in found if one.place >= first and one.off(least)]] = True
@@ -223,13 +228,17 @@ def _strength(
     return Number(label, parameter, given, factor * given, error * given, unit, abs(given), place)
 
 
-def _errors(asked: Asked, guess: Guess | None) -> Array:
+def _errors(baseline: Baseline, candidate: FittedHypothesis | None) -> Array:
     """Standard errors of all fitted numbers by the data alone, with what is left over as noise:
     what was known of them before makes none of them surer."""
-    base, fit = asked.base, guess.fit if guess else asked.fit
-    make, unknowns = joined(base, guess.hypothesis) if guess else (base.solo, base.unknowns)
-    doubt = np.full(len(fit.x), ANYTHING)
-    return np.asarray(np.sqrt(np.diag(asked.judge.covariance(make, unknowns, fit, doubt))))
+    base, fit = baseline.base, candidate.fit if candidate else baseline.fit
+    make, unknowns = (
+        joined(base, candidate.hypothesis) if candidate else (base.simulator, base.unknowns)
+    )
+    prior_std = np.full(len(fit.x), ANYTHING)
+    return np.asarray(
+        np.sqrt(np.diag(baseline.estimator.covariance(make, unknowns, fit, prior_std)))
+    )
 
 
 def corrections(found: Sequence[Number], joint: Joint, least: float) -> tuple[Correction, ...]:
@@ -279,13 +288,13 @@ def by_one_factor(found: Sequence[Number]) -> str:
     )
 
 
-def one_factor(base: Base, guess: Guess) -> str | None:
+def one_factor(base: BaseModel, candidate: FittedHypothesis) -> str | None:
     """That more inertia and all the model's strengths are one factor, a clause: then it may be that
     of the recorded force. None if that is not so."""
-    if guess.hypothesis.effect != "added_inertia" or not base.places:
+    if candidate.hypothesis.effect != "added_inertia" or not base.places:
         return None
-    inertia = 1 + guess.hypothesis.magnitude(guess.x) / base.single.inertia
-    factors = np.array([inertia, *guess.fit.x[: len(base.places)]])
+    inertia = 1 + candidate.hypothesis.magnitude(candidate.x) / base.joint_model.inertia
+    factors = np.array([inertia, *candidate.fit.x[: len(base.places)]])
     mean = float(factors.mean())
     if mean < 1 + ALIKE or np.abs(factors / mean - 1).max() > ALIKE:
         return None

@@ -3,16 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.baseline import usable, windows_for
-from joda.diagnosis.windows import Windows
+from joda.estimation.base_model import segments_for, usable
+from joda.estimation.segments import Segments
 from joda.measured.curves import FEW, TOO_LOUD, too_loud
-from joda.measured.gauge import Gauged
+from joda.measured.data_checks.timing import repeats
+from joda.measured.quasi_static import QuasiStaticComparison
 from joda.measured.reading import Measured
-from joda.measured.slow import one_way, ways
-from joda.measured.suspicions.timing import repeats
+from joda.measured.slow_runs import one_way, ways
 
 WINDOWS, MOVES = 4, 8.0
-"""Fewest windows with motion that tell anything; and what is motion, in noises."""
+"""Fewest segments with motion that tell anything; and what is motion, in noises."""
 VISITED = 0.02
 """Least part of the range that must be visited."""
 
@@ -25,7 +25,7 @@ def moved_one_way(measured: Measured) -> bool:
     return one_way(np.sum([ways(run.position, 6 * sigma) for run, sigma in pairs], axis=0))
 
 
-def _samples(curve: Gauged) -> NDArray[np.float64]:
+def _samples(curve: QuasiStaticComparison) -> NDArray[np.float64]:
     """How many are in positive and in negative direction."""
     return np.array([np.sum(curve.direction > 0), np.sum(curve.direction < 0)], float)
 
@@ -42,14 +42,14 @@ def hardly_moved(measured: Measured) -> str:
 
 def at_rest(measured: Measured) -> str:
     """That no run moves the joint, as a clause; nothing if one does."""
-    if not measured.runs or _moving(measured, windows_for(measured)):
+    if not measured.runs or _moving(measured, segments_for(measured)):
         return ""
     return "the joint does not move in these runs, and at rest nothing tells how it moves"
 
 
-def _moving(measured: Measured, windows: Windows) -> int:
-    """In how many windows the joint moves by more than noise."""
-    own = [windows.position[row[row >= 0]] for row in windows.rows[usable(windows)]]
+def _moving(measured: Measured, segments: Segments) -> int:
+    """In how many segments the joint moves by more than noise."""
+    own = [segments.position[row[row >= 0]] for row in segments.rows[usable(segments)]]
     return sum(bool(np.ptp(position) > MOVES * max(measured.sigma)) for position in own)
 
 
@@ -57,15 +57,15 @@ def too_little(measured: Measured) -> str:
     """Why a model that misses nothing may lack much, as a sentence; nothing if that is not so."""
     if why := hardly_moved(measured):
         return why
-    windows = windows_for(measured)
+    segments = segments_for(measured)
     if not measured.runs:
-        told = len(windows.position)
+        told = len(segments.position)
         return f"{told} samples are too few; record {FEW}." if told < FEW else ""
     if repeats(measured.runs):
         return "Positions repeat while the joint moves, so that what was taken for noise is motion."
-    if (moving := _moving(measured, windows)) < WINDOWS:
+    if (moving := _moving(measured, segments)) < WINDOWS:
         return (
-            f"The joint moves in {moving} windows of {windows.length:.2g} s; {WINDOWS} are needed."
+            f"The joint moves in {moving} windows of {segments.length:.2g} s; {WINDOWS} are needed."
         )
     return ""
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from joda.diagnosis.corrections import Correction
-from joda.diagnosis.weighing import Verdict
+from joda.diagnosis.selection import Verdict
 from joda.errors import JodaError
 from joda.files import read_json
 from joda.plain import plain
@@ -32,8 +32,8 @@ class Finding:
             it, 95 % within two (`joda.diagnosis.uncertainty`).
         unit: of the magnitude.
         explanation: for a person.
-        held_out_error_before, held_out_error_after: RMS misfit of windows that were held out of the
-            fit, rad or m.
+        held_out_error_before, held_out_error_after: RMS misfit of segments that were held out of
+            the fit, rad or m.
         indistinguishable_from: effects that these data cannot tell from it.
     """
 

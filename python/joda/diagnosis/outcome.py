@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from joda.diagnosis.mending import Error
-from joda.diagnosis.righted import Righted
+from joda.diagnosis.adding import Error
+from joda.diagnosis.applied_corrections import AppliedCorrections
 from joda.files import check_targets, named_like
 from joda.measured.corrections_file import corrections_beside, corrections_text
 from joda.measured.errors import MULTIPLE
@@ -83,7 +83,7 @@ def scene_files(
     scene: Path,
     composed: Path,
     servo: Servo | None = None,
-    right: Righted | None = None,
+    right: AppliedCorrections | None = None,
 ) -> tuple[dict[Path, bytes | str], list[str]]:
     """What a scene with a whole profile (`joda.scenes.native`) and the profile's file hold.
 

@@ -102,7 +102,7 @@ def explained(
         interval: where it acts, in normalised position.
         unvisited: what of that no run has visited.
         size: magnitude, its standard deviation and unit.
-        errors: of held-out windows before and after, and the noise.
+        errors: of held-out segments before and after, and the noise.
         error_unit: of these.
         joint: of which it is.
     """

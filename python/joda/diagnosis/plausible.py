@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.baseline import windows_for
-from joda.diagnosis.share import divided
+from joda.diagnosis.overlap import divided
 from joda.effects import (
     AddedInertia,
     AnyEffect,
@@ -17,6 +16,7 @@ from joda.effects import (
     QuadraticDamping,
 )
 from joda.effects.base import CurveEffect
+from joda.estimation.base_model import segments_for
 from joda.field import merge
 from joda.joints.resistance import damping, friction_bounds
 from joda.measured import smoothing
@@ -146,7 +146,7 @@ class Needs:
         for run in measured.runs:
             applied = max(applied, float(np.abs(measured.exerted(run)).max()))
         gravity = max(map(abs, measured.context.gravity_force))
-        inertia = measured.single.inertia * self.acceleration
+        inertia = measured.joint_model.inertia * self.acceleration
         self.force = inertia + applied + gravity + self.exerted(measured.profile)
         self.resistance = self._resisted(measured.profile)
         self.forced = not measured.runs or any(run.pushed for run in measured.runs)
@@ -204,9 +204,9 @@ def _speed(time: Array, position: Array) -> float:
 
 
 def _acceleration(measured: Measured, speed: float) -> float:
-    """Largest from one window of the runs to the next, or to reach the largest speed."""
-    windows = windows_for(measured)
-    same = ~windows.fresh[1:]
-    change = np.abs(np.diff(windows.start[:, 1]))[same] / (np.diff(windows.at)[same] * windows.h)
+    """Largest from one segment of the runs to the next, or to reach the largest speed."""
+    segments = segments_for(measured)
+    same = ~segments.fresh[1:]
+    change = np.abs(np.diff(segments.start[:, 1]))[same] / (np.diff(segments.at)[same] * segments.h)
     travel = max(float(np.ptp(run.position)) for run in measured.runs)
     return max(float(change.max(initial=0.0)), speed**2 / (2 * travel) if travel else 0.0)

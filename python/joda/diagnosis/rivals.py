@@ -1,7 +1,7 @@
 """Effects that the measurements cannot tell apart."""
 
-from joda.diagnosis.ranking import Ranking
-from joda.diagnosis.weighing import LEFT, LITTLE, Weighed
+from joda.diagnosis.search import Ranking
+from joda.diagnosis.selection import LEFT, LITTLE, Selection
 
 RIVAL = 0.35
 """Part of the excess that an effect may leave that counts as an alternative."""
@@ -22,11 +22,11 @@ ALIKE = 0.1
 
 
 def indistinguishable(
-    ranking: Ranking, weighed: Weighed, number: int, one_way: bool
+    ranking: Ranking, selection: Selection, number: int, one_way: bool
 ) -> tuple[str, ...]:
-    """Effects that the data cannot tell from a guess."""
-    own, left = weighed.excess
-    names = [guess.hypothesis.effect for guess in ranking.guesses]
+    """Effects that the data cannot tell from a candidate."""
+    own, left = selection.excess
+    names = [candidate.hypothesis.effect for candidate in ranking.candidates]
     alike = {
         name
         for k, name in enumerate(names)

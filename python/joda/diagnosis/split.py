@@ -14,10 +14,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.baseline import windows_for
-from joda.diagnosis.windows import Windows
+from joda.estimation.base_model import segments_for
+from joda.estimation.segments import Segments
 from joda.measured import smoothing
-from joda.measured.gauge import Gauged
+from joda.measured.quasi_static import QuasiStaticComparison
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
 
@@ -69,7 +69,7 @@ def held_blocks(measured: Measured, length: float | None = None) -> list[Block]:
     moving = [block for block in runs if _moves(measured, block)]
     if len(moving) >= FEWEST:
         return moving[3::4]
-    length = length or windows_for(measured).length
+    length = length or segments_for(measured).length
     for factor in LENGTHS:
         blocks = [
             block for k, run in enumerate(measured.runs) for block in _cut(k, run, factor * length)
@@ -80,16 +80,16 @@ def held_blocks(measured: Measured, length: float | None = None) -> list[Block]:
     return (moving if len(moving) > 1 else blocks)[1::4]
 
 
-def held_windows(measured: Measured, windows: Windows) -> Flags:
-    """Which of the windows of these measurements are held out, by their middles; shape (m,)."""
+def held_segments(measured: Measured, segments: Segments) -> Flags:
+    """Which of the segments of these measurements are held out, by their middles; shape (m,)."""
     if not measured.runs:
         few = len(measured.curves) < FEWEST
-        return np.asarray(np.arange(len(windows.at)) % 4 == 2 if few else windows.run % 4 == 3)
-    held = np.zeros(len(windows.at), bool)
-    middle = windows.time[windows.rows[np.arange(len(held)), windows.count // 2]]
-    for block in held_blocks(measured, windows.length):
+        return np.asarray(np.arange(len(segments.at)) % 4 == 2 if few else segments.run % 4 == 3)
+    held = np.zeros(len(segments.at), bool)
+    middle = segments.time[segments.rows[np.arange(len(held)), segments.count // 2]]
+    for block in held_blocks(measured, segments.length):
         first, last = measured.runs[block.run].time[block.samples][[0, -1]]
-        held |= (windows.run == block.run) & (first <= middle) & (middle <= last)
+        held |= (segments.run == block.run) & (first <= middle) & (middle <= last)
     return held
 
 
@@ -164,7 +164,7 @@ def _parted_curves(measured: Measured) -> tuple[Measured, Measured]:
     return measured.with_curves(parts[0]), measured.with_curves(parts[1])
 
 
-def _held(curve: Gauged) -> Flags:
+def _held(curve: QuasiStaticComparison) -> Flags:
     """Which samples of a curve are held out, shape (n,)."""
     n = len(curve.direction)
     stretch = np.arange(n) * min(STRETCHES, max(n // STRETCH, FEWEST)) // n

@@ -2,14 +2,14 @@
 
 from joda.diagnosis import phrases
 from joda.diagnosis.findings import Finding
-from joda.diagnosis.weighing import EVEN, MUCH, Weighed
-from joda.measured.gauge import compared
+from joda.diagnosis.selection import EVEN, MUCH, Selection
+from joda.measured.quasi_static import compared
 from joda.measured.reading import Measured
 
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
 FAR, PART = 10.0, 0.1
-"""Noises by which windows held out may be missed with what is said to be missing; or part of what
+"""Noises by which segments held out may be missed with what is said to be missing; or part of what
 they are missed by without it."""
 STILL = " With it windows held out of the fit are still missed by {:.0f} times the noise."
 SAME = (
@@ -32,31 +32,31 @@ def other_unit(measured: Measured) -> str | None:
 
 def summarised(
     first: Finding,
-    weighed: Weighed,
+    selection: Selection,
     floor: float,
     one_way: bool,
-    bouncy: bool,
+    restitution: bool,
     doubt: str | None = None,
 ) -> str:
     """The verdict in a sentence, where something is missing.
 
     "Missing is" is said only of an answer that is more likely than not, and with which the error on
-    windows held out of the fit falls from more than the noise, and not to many times the noise.
+    segments held out of the fit falls from more than the noise, and not to many times the noise.
 
     Args:
         first: the likeliest effect.
-        weighed: the ranking's probabilities.
+        selection: the ranking's probabilities.
         floor: noise of the measurement, in the unit of the errors held out.
         one_way: whether the joint was moved in one direction only.
-        bouncy: of the ends, as in `Ranking`.
-        doubt: of `one_factor` or `other_unit`: then it is a guess.
+        restitution: of the ends, as in `Ranking`.
+        doubt: of `one_factor` or `other_unit`: then it is a candidate.
     """
     name = phrases.named(first.effect)
     others = " or ".join(map(phrases.named, first.indistinguishable_from))
     either = f"{name} or {others}" if others else name
     helps = first.held_out_error_after < first.held_out_error_before
-    if weighed.verdict == "unexplained":
-        return _unexplained(either if one_way else name, weighed, one_way, bouncy)
+    if selection.verdict == "unexplained":
+        return _unexplained(either if one_way else name, selection, one_way, restitution)
     likely = f"probability {phrases.percent(first.probability)}"
     if not helps:
         return (
@@ -66,7 +66,7 @@ def summarised(
     after = first.held_out_error_after
     far = after > FAR * floor and after > PART * first.held_out_error_before
     blind = first.held_out_error_before < floor
-    probability = _sum(first, weighed) if others else first.probability
+    probability = _sum(first, selection) if others else first.probability
     head = "Best guess:" if blind or far or doubt or probability <= EVEN else "Missing is"
     more = BLIND if blind else STILL.format(after / floor) if far else ""
     if others:
@@ -75,16 +75,16 @@ def summarised(
     return f"{head} {name} ({likely}).{more}"
 
 
-def _sum(first: Finding, weighed: Weighed) -> float:
+def _sum(first: Finding, selection: Selection) -> float:
     """Probability that it is the first or one that these data cannot tell from it."""
     alike = (first.effect, *first.indistinguishable_from)
-    return sum(p for name, p in weighed.named if name in alike)
+    return sum(p for name, p in selection.named if name in alike)
 
 
-def _unexplained(what: str, weighed: Weighed, one_way: bool, bouncy: bool) -> str:
-    if bouncy and weighed.excess[0] < MUCH:
+def _unexplained(what: str, selection: Selection, one_way: bool, restitution: bool) -> str:
+    if restitution and selection.excess[0] < MUCH:
         return BOUNCY
-    share = 100 * min(weighed.share, 1.0)
+    share = 100 * min(selection.share, 1.0)
     same = SAME if one_way and " or " in what else ""
     if share <= 1:
         return f"Best guess: {what}{same}; others may explain as much."

@@ -15,9 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.asking import RESTITUTION, Asked
-from joda.diagnosis.baseline import joined
-from joda.diagnosis.guessing import Guess
+from joda.diagnosis.baseline import RESTITUTION, Baseline
 from joda.diagnosis.hypotheses.base import (
     FREE_CURVE,
     KNOWN_LAW,
@@ -27,9 +25,11 @@ from joda.diagnosis.hypotheses.base import (
     everywhere,
 )
 from joda.diagnosis.hypotheses.intervals import GRID
-from joda.diagnosis.judge import Judge, Make, Unknowns
-from joda.diagnosis.knocks import Rebound, best_ratio, ends_of
-from joda.diagnosis.windows import Mover
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.diagnosis.impacts import Rebound, best_ratio, ends_of
+from joda.estimation.estimator import Make, SegmentEstimator
+from joda.estimation.segments import Simulator
+from joda.estimation.unknowns import Unknowns
 from joda.field import merge
 from joda.profile import CHANNELS, Profile
 
@@ -103,10 +103,10 @@ class Uncertainty:
 class _Fitted:
     """A fitted effect: the estimator, the numbers, and what is to be told of them."""
 
-    judge: Judge
+    estimator: SegmentEstimator
     make: Make
     unknowns: Unknowns
-    found: Guess
+    found: FittedHypothesis
     x: Array
 
     @property
@@ -121,25 +121,25 @@ class _Fitted:
         return np.array([hypothesis.magnitude(numbers), *hypothesis.interval(numbers)])
 
 
-def uncertainty(asked: Asked, found: Guess, left: float) -> Uncertainty:
+def uncertainty(baseline: Baseline, found: FittedHypothesis, left: float) -> Uncertainty:
     """How well a fitted effect is known.
 
     Args:
-        asked: the model and its runs.
+        baseline: the model and its runs.
         found: the effect, fitted.
         left: share of the model's misfit beyond the noise that it leaves, 0 to 1.
     """
     if found.hypothesis.effect == RESTITUTION:
-        return _restitution(asked, found)
-    fitted = _fitted(asked, found)
-    gain = max(asked.fit.loss - found.fit.loss, 0.0)
+        return _restitution(baseline, found)
+    fitted = _fitted(baseline, found)
+    gain = max(baseline.fit.loss - found.fit.loss, 0.0)
     best = fitted.told(fitted.x)
-    data = from_data(fitted, TOLERATED * gain * (found.hypothesis.remains == KNOWN_SHAPE))
+    data = from_data(fitted, TOLERATED * gain * (found.hypothesis.misfit_tolerance == KNOWN_SHAPE))
     magnitude, a, b = map(float, best)
-    shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.remains])
+    shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.misfit_tolerance])
     left = float(np.clip(left, 0.0, 1.0))
     part = min(shape + HIDDEN * left**0.5 / max(1.0 - left, 1 / FARTHEST), FARTHEST)
-    seen, visited = _seen(asked, found)
+    seen, visited = _seen(baseline, found)
     beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
     if from_afar := _at_bound(found) or (_pulls(found) and b - a > REACHING):
         beyond = AFAR
@@ -161,11 +161,11 @@ def from_data(fitted: _Fitted, tolerance: float = 0.0) -> Array:
         fitted: the effect.
         tolerance: by how much its loss may rise besides, as its law is known by its shape only.
     """
-    judge, unknowns, x = fitted.judge, fitted.unknowns, fitted.x
-    about = judge.linear(fitted.make, unknowns, x, fitted.found.fit.start)
+    estimator, unknowns, x = fitted.estimator, fitted.unknowns, fitted.x
+    about = estimator.linear(fitted.make, unknowns, x, fitted.found.fit.start)
     H, slopes = about.normals()
     prior = _prior(fitted)
-    worse = judge.overdispersion(fitted.found.fit.squares)
+    worse = estimator.overdispersion(fitted.found.fit.squares)
     covariance = worse * np.linalg.pinv(H.sum(axis=0) + prior)
     rng = np.random.default_rng(0)
     normal = rng.multivariate_normal(x, covariance, DRAWS, "ignore", method="svd")
@@ -182,15 +182,15 @@ def _prior(fitted: _Fitted) -> Array:
     wide[own] = (unknowns.high - unknowns.low)[own] / np.sqrt(12)
     strengths = own[unknowns.high[own] == STRENGTH[1]]
     wide[strengths] = PLAUSIBLE * max(np.abs(fitted.x[strengths]).max(initial=0.0), TRIAL)
-    return np.diag(unknowns.doubt**-2.0 + wide**-2.0)
+    return np.diag(unknowns.prior_std**-2.0 + wide**-2.0)
 
 
-def _seen(asked: Asked, found: Guess) -> tuple[float, tuple[float, float]]:
+def _seen(baseline: Baseline, found: FittedHypothesis) -> tuple[float, tuple[float, float]]:
     """The effect's size where runs were, and where that is, in normalised position."""
-    windows, joint = asked.judge.windows, asked.base.profile.joint
+    segments, joint = baseline.estimator.segments, baseline.base.profile.joint
     lo, hi = joint.range
-    rows = windows.rows[asked.judge.counts]
-    s = (windows.position[rows[rows >= 0]] - lo) / (hi - lo)
+    rows = segments.rows[baseline.estimator.counts]
+    s = (segments.position[rows[rows >= 0]] - lo) / (hi - lo)
     low, high = np.clip(np.quantile(s, (HARDLY, 1 - HARDLY)), 0.0, 1.0) if len(s) else (0.0, 1.0)
     bare = found.hypothesis.write(Profile(joint=joint), found.x)
     magnitude = found.hypothesis.magnitude(found.x)
@@ -204,25 +204,25 @@ def _seen(asked: Asked, found: Guess) -> tuple[float, tuple[float, float]]:
     return magnitude, (float(low), float(high))
 
 
-def _there(found: Guess) -> bool:
+def _there(found: FittedHypothesis) -> bool:
     """Whether it is more than nothing, however large."""
     first = found.hypothesis.unknowns
     return bool(found.x[0] > first.low[0] + first.step[0])
 
 
-def _at_bound(found: Guess) -> bool:
+def _at_bound(found: FittedHypothesis) -> bool:
     """Whether the scale of a law that is known by its shape is as large as it may be: what is seen
     may then be the far end of something much larger."""
     high, step = found.hypothesis.unknowns.high[-1], found.hypothesis.unknowns.step[-1]
     return _shaped(found) and bool(found.x[-1] > high - step)
 
 
-def _shaped(found: Guess) -> bool:
+def _shaped(found: FittedHypothesis) -> bool:
     """Whether the law is known by its shape, and has a scale but no ends."""
-    return found.hypothesis.remains == KNOWN_SHAPE and found.hypothesis.ends == 0
+    return found.hypothesis.misfit_tolerance == KNOWN_SHAPE and found.hypothesis.ends == 0
 
 
-def _pulls(found: Guess) -> bool:
+def _pulls(found: FittedHypothesis) -> bool:
     """Whether it is a pull to one end that runs out: felt over most of the range it may be the far
     end of a stronger one with a shorter reach, as 1 / distance² looks alike from afar."""
     return _shaped(found) and found.hypothesis.interval is not everywhere
@@ -239,22 +239,22 @@ def _gaps(interval: tuple[float, float], visited: tuple[float, float]) -> list[f
     return [float(gap) / 3**0.5 for gap in lows + highs]
 
 
-def _fitted(asked: Asked, found: Guess) -> _Fitted:
-    judge, base, hypothesis = asked.judge, asked.base, found.hypothesis
-    return _Fitted(judge, *joined(base, hypothesis), found, found.fit.x)
+def _fitted(baseline: Baseline, found: FittedHypothesis) -> _Fitted:
+    estimator, base, hypothesis = baseline.estimator, baseline.base, found.hypothesis
+    return _Fitted(estimator, *joined(base, hypothesis), found, found.fit.x)
 
 
-def _restitution(asked: Asked, found: Guess) -> Uncertainty:
-    """By the knocks' likelihood, and by how far their speeds tell of another one.
+def _restitution(baseline: Baseline, found: FittedHypothesis) -> Uncertainty:
+    """By the impacts' likelihood, and by how far their speeds tell of another one.
 
-    An end is where it is, but the other one may throw back too where no knocks deny it.
+    An end is where it is, but the other one may throw back too where no impacts deny it.
     """
-    windows, base, sides = asked.judge.windows, asked.base, ends_of(found.hypothesis)
+    segments, base, sides = baseline.estimator.segments, baseline.base, ends_of(found.hypothesis)
     size = found.hypothesis.magnitude(found.x)
-    told = asked.rebounds
+    told = baseline.rebounds
     whole = Rebound.together([told[side] for side in sides if side in told])
     error = float(
-        np.hypot(best_ratio(whole, windows, base, sides)[1], OWN_SHAPE[RESTITUTION] * size)
+        np.hypot(best_ratio(whole, segments, base, sides)[1], OWN_SHAPE[RESTITUTION] * size)
     )
     known = (side in sides or (side in told and not told[side].may_be(size)) for side in (-1, 1))
     low, high = (AT_END if there else UNKNOWN_END for there in known)
@@ -265,11 +265,11 @@ def _bootstrap(
     fitted: _Fitted, H: Array, g: Array, prior: Array, rng: np.random.Generator
 ) -> Array:
     """Numbers that samples of runs, drawn with replacement, would have given; shape (draws, k)."""
-    judge = fitted.judge
-    run = judge.windows.run
-    runs = np.unique(run[judge.counts])
+    estimator = fitted.estimator
+    run = estimator.segments.run
+    runs = np.unique(run[estimator.counts])
     block = run if len(runs) >= FEW_RUNS else np.arange(len(run))
-    blocks = np.unique(block[judge.counts])
+    blocks = np.unique(block[estimator.counts])
     Hb = np.stack([H[block == b].sum(axis=0) for b in blocks])
     gb = np.stack([g[block == b].sum(axis=0) for b in blocks])
     drawn = rng.multinomial(len(blocks), np.full(len(blocks), 1 / len(blocks)), DRAWS)
@@ -288,9 +288,9 @@ def _spread(fitted: _Fitted, draws: Array) -> Array:
 
 def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Array:
     """Standard deviations by the profile likelihood of each of the effect's numbers, shape (3,)."""
-    judge, unknowns, start = fitted.judge, fitted.unknowns, fitted.found.fit.start
+    estimator, unknowns, start = fitted.estimator, fitted.unknowns, fitted.found.fit.start
     best, x = fitted.told(fitted.x), fitted.x
-    least = judge.loss(fitted.found.fit.squares) + unknowns.penalty(x)
+    least = estimator.loss(fitted.found.fit.squares) + unknowns.penalty(x)
     out = np.zeros(3)
     for k in fitted.own:
         rest = np.arange(len(x)) != k
@@ -301,10 +301,10 @@ def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Arra
             for far in STEPS:
                 value = float(np.clip(x[k] + way * far * step, unknowns.low[k], unknowns.high[k]))
 
-                def make(y: Array, value: float = value, k: int = int(k)) -> Mover:
+                def make(y: Array, value: float = value, k: int = int(k)) -> Simulator:
                     return fitted.make(np.insert(y, k, value))
 
-                fit = judge.fit(make, others, y, near, ITERATIONS)
+                fit = estimator.fit(make, others, y, near, ITERATIONS)
                 y, near = fit.x, fit.start
                 rise = max(fit.loss - least, 0.0) / overdispersion
                 moved = np.abs(fitted.told(np.insert(y, k, value)) - best)

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joda.diagnosis.asking import Asked, asked
-from joda.diagnosis.baseline import joined, usable, windows_for
-from joda.diagnosis.calibrating import Calibration, calibrated
+from joda.diagnosis.baseline import Baseline, fit_baseline
+from joda.diagnosis.calibration import Calibration, calibration_of
 from joda.diagnosis.corrections import (
     FAR_OFF,
     OFF,
@@ -22,18 +21,20 @@ from joda.diagnosis.corrections import (
     one_factor,
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
+from joda.diagnosis.experiments import Model, means_of, next_experiment, there_and_back
 from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
-from joda.diagnosis.looks import Looked, looked
+from joda.diagnosis.horizons import HorizonSearch, looked
+from joda.diagnosis.hypothesis_fits import joined
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.plausible import unseen_place
-from joda.diagnosis.probes import Model, means_of, next_experiment, there_and_back
-from joda.diagnosis.ranking import Ranking, Told
 from joda.diagnosis.rivals import indistinguishable
+from joda.diagnosis.search import Progress, Ranking
+from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection, Verdict, weigh
 from joda.diagnosis.summary import BOUNCY, SAME, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
-from joda.diagnosis.weighing import LITTLE, MUCH, SURE, Evidence, Verdict, Weighed, weigh
-from joda.diagnosis.whole import BEYOND, CHANCE, FreeRuns, worst
+from joda.estimation.base_model import segments_for, usable
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
 from joda.measured.misfit import rms
@@ -90,7 +91,8 @@ WITHOUT = (
     "times what noise, start and force explain; joda compare says where."
 )
 SOME = 2.0
-"""How many times what errors explain a whole run is missed by, where windows alone are adequate."""
+"""How many times what errors explain a whole run is missed by, where segments alone are adequate.
+"""
 ADRIFT = (
     " But more is left of whole runs than noise of position and force makes: a small fault of the "
     "model, or what the force did between its samples."
@@ -139,7 +141,7 @@ class Diagnosed:
 def diagnosed(
     measured: Measured,
     exclude: Collection[str] = (),
-    told: Told = lambda done, total, what: None,
+    told: Progress = lambda done, total, what: None,
     calibrate: bool = True,
 ) -> Diagnosed:
     """Finds what a model lacks.
@@ -150,30 +152,30 @@ def diagnosed(
         told: how much is done, of how much, and what.
         calibrate: whether numbers of the joint's body and of the measurement may be off.
     """
-    if not usable(windows_for(measured)).any():
+    if not usable(segments_for(measured)).any():
         return Diagnosed(_said(measured, "insufficient_data", TOO_SHORT, (), None))
     if why := at_rest(measured):
         why = f"{why[0].upper()}{why[1:]}."
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
-    begun = asked(measured)
-    found = calibrated(measured, begun) if calibrate else None
+    baseline = fit_baseline(measured)
+    found = calibration_of(measured, baseline) if calibrate else None
     if found and found.alone:
         return _set_right(measured, found, looked(found.righted.of(measured), exclude, told))
-    plain = looked(measured, exclude, told, begun)
+    plain = looked(measured, exclude, told, baseline)
     ranking, beside = plain.first[0], False
-    if calibrate and found is None and plain.weighed.verdict != "adequate":
+    if calibrate and found is None and plain.selection.verdict != "adequate":
         ranking, beside = plain.ranking, True
-        found = calibrated(measured, ranking.asked, beside)
-    if found and found.beats(ranking.asked, ranking.guesses, clearly=beside):
+        found = calibration_of(measured, ranking.baseline, beside)
+    if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
         looks = looked(found.righted.of(measured), exclude, told)
-        if looks.weighed.verdict != "unexplained" or plain.weighed.verdict == "unexplained":
+        if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
             return _set_right(measured, found, looks)
     return replace(_concluded(measured, plain), looks=plain.evidence)
 
 
-def _set_right(measured: Measured, found: Calibration, looks: Looked) -> Diagnosed:
+def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> Diagnosed:
     """What looking at a joint and runs says whose numbers were set right, with these."""
     out = replace(_concluded(found.righted.of(measured), looks), looks=looks.evidence)
     numbers = found.corrections(measured)
@@ -185,93 +187,99 @@ def _set_right(measured: Measured, found: Calibration, looks: Looked) -> Diagnos
     return replace(out, diagnosis=told, calibration=found)
 
 
-def _concluded(measured: Measured, looks: Looked) -> Diagnosed:
+def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
     """What looking at the measurements says."""
-    ranking, weighed = looks.ranking, looks.weighed
+    ranking, selection = looks.ranking, looks.selection
     first_ranking, first_weighed = looks.first
     one_way = moved_one_way(measured)
     puzzled = first_weighed.verdict == "unexplained" and bool(measured.runs)
     puzzling = first_ranking if puzzled else None
-    if weighed.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
+    if selection.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
-    suffice = not weighed.likely and looks.free and looks.free.suffice
-    if weighed.verdict == "adequate" or suffice:
+    suffice = not selection.likely and looks.free and looks.free.suffice
+    if selection.verdict == "adequate" or suffice:
         return _calm(measured, ranking, looks.free)
-    held = Holdout(ranking.asked, measured)
-    named = range(min(NAMED, len(ranking.guesses)))
+    held = Holdout(ranking.baseline, measured)
+    named = range(min(NAMED, len(ranking.candidates)))
     every = {
         k: finding(
-            measured, ranking, held, k, weighed, indistinguishable(ranking, weighed, k, one_way)
+            measured, ranking, held, k, selection, indistinguishable(ranking, selection, k, one_way)
         )
         for k in named
-        if k == 0 or weighed.probabilities[k] > WORTH_NAMING
+        if k == 0 or selection.probabilities[k] > WORTH_NAMING
     }
     sized = [k for k, one in every.items() if one.sized]
-    experiment = _next(measured, ranking, weighed, one_way)
+    experiment = _next(measured, ranking, selection, one_way)
     if not sized or unseen_place(measured, every[sized[0]].interval):
-        why = BOUNCY if ranking.bouncy else NO_EFFECT
+        why = BOUNCY if ranking.restitution else NO_EFFECT
         if sized:
             there = every[sized[0]].interval
             why = OUT_THERE.format(*there, 100 * visited_share(measured, there))
         said = _said(measured, "unexplained", why, (), experiment)
-        return _driven(Diagnosed(said, puzzling=puzzling), ranking.asked)
+        return _driven(Diagnosed(said, puzzling=puzzling), ranking.baseline)
     findings = tuple(every[k] for k in sized)
-    profile = ranking.guesses[sized[0]].written(ranking.asked.base)
+    profile = ranking.candidates[sized[0]].written(ranking.baseline.base)
     first = findings[0]
     helps = first.held_out_error_after < first.held_out_error_before
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
-    if first_weighed.verdict == "adequate" and hardly and weighed.excess[0] < MUCH:
-        # nor do windows held out know of anything
+    if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
+        # nor do segments held out know of anything
         return _calm(measured, first_ranking, looks.free)
-    verdict = weighed.verdict if helps else "unexplained"
-    base, guess = ranking.asked.base, ranking.guesses[sized[0]]
-    doubt = one_factor(base, guess) or other_unit(measured)
-    summary = summarised(first, weighed, measured.floor, one_way, ranking.bouncy, doubt)
+    verdict = selection.verdict if helps else "unexplained"
+    base, candidate = ranking.baseline.base, ranking.candidates[sized[0]]
+    doubt = one_factor(base, candidate) or other_unit(measured)
+    summary = summarised(first, selection, measured.floor, one_way, ranking.restitution, doubt)
     sure = verdict == "missing_effect" and not doubt  # else they stand in for what is not known
-    own = numbers(ranking.asked, guess) if sure else ()
+    own = numbers(ranking.baseline, candidate) if sure else ()
     summary += f" But {doubt}." if doubt else off_beside(own)
     worth = tuple(one for one in findings if one.probability >= WORTH_NAMING)
     said = replace(
         _said(measured, verdict, summary, worth, experiment),
         corrections=corrections(own, measured.profile.joint, FAR_OFF),
         doubt=doubt,
-        unexplained_probability=weighed.unknown if verdict == weighed.verdict else None,
+        unexplained_probability=selection.unknown if verdict == selection.verdict else None,
     )
-    servo = corrected(ranking.asked, own, FAR_OFF, guess.fit.x, driven_only=True) if sure else None
+    servo = (
+        corrected(ranking.baseline, own, FAR_OFF, candidate.fit.x, driven_only=True)
+        if sure
+        else None
+    )
     told = Diagnosed(said, profile if worth else None, findings, puzzling, corrected=servo)
-    return told if sure or doubt else _driven(told, ranking.asked)
+    return told if sure or doubt else _driven(told, ranking.baseline)
 
 
-def _driven(found: Diagnosed, begun: Asked) -> Diagnosed:
+def _driven(found: Diagnosed, baseline: Baseline) -> Diagnosed:
     """The same with the numbers of the model that suit the runs best without an effect, where an
     actuator drives the joint: of that few models know any."""
-    own = numbers(begun)
-    if begun.base.single.servo is None or not (right := corrected(begun, own, OFF, begun.fit.x)):
+    own = numbers(baseline)
+    if baseline.base.joint_model.servo is None or not (
+        right := corrected(baseline, own, OFF, baseline.fit.x)
+    ):
         return found
     said = found.diagnosis
     told = replace(
         said,
         summary=f"{said.summary}{off_without(own)}",
-        corrections=corrections(own, begun.base.profile.joint, OFF),
+        corrections=corrections(own, baseline.base.profile.joint, OFF),
     )
     return replace(found, diagnosis=told, corrected=right)
 
 
 def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosed:
-    """No effect shows in windows: the model is adequate, unless whole runs or curves deny it."""
+    """No effect shows in segments: the model is adequate, unless whole runs or curves deny it."""
 
     def unexplained(summary: str, experiment: str | None) -> Diagnosed:
         return Diagnosed(_said(measured, "unexplained", summary, (), experiment))
 
-    if not measured.runs and _uneven(measured, ranking.asked):
+    if not measured.runs and _uneven(measured, ranking.baseline):
         return unexplained(_said_uneven(measured), GAUGE_AGAIN)
-    left = worst(measured, ranking.asked)
+    left = worst(measured, ranking.baseline)
     if left.free > BEYOND:
         return unexplained(DRIFTING.format(left.free), AGAIN)
     if free and free.drifting:
         return unexplained(SLOWLY, AGAIN)
     told_by = (free.numbers, free.errors) if free and free.denied else None
-    own, worst_run = numbers(ranking.asked, found=told_by), worst_missed(measured)
+    own, worst_run = numbers(ranking.baseline, found=told_by), worst_missed(measured)
     told = off(own)
     if free and free.denied and not told:
         return unexplained(TOGETHER, AGAIN)
@@ -299,11 +307,11 @@ def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagno
         summary += f" But {doubt}."
     calm = _said(measured, "adequate", summary, (), None)
     calm = replace(calm, corrections=corrections(own, measured.profile.joint, OFF))
-    driven = ranking.asked.base.single.servo is not None
+    driven = ranking.baseline.base.joint_model.servo is not None
     if doubt or (by_one_factor(own) and not driven):
         return Diagnosed(calm)
-    x = free.numbers if free and free.denied else ranking.asked.fit.x
-    return Diagnosed(calm, corrected=corrected(ranking.asked, own, OFF, x))
+    x = free.numbers if free and free.denied else ranking.baseline.fit.x
+    return Diagnosed(calm, corrected=corrected(ranking.baseline, own, OFF, x))
 
 
 def _said_uneven(measured: Measured) -> str:
@@ -314,9 +322,9 @@ def _said_uneven(measured: Measured) -> str:
     return UNEVEN.format(missed, measured.unit, measured.floor)
 
 
-def _uneven(measured: Measured, begun: Asked) -> bool:
+def _uneven(measured: Measured, baseline: Baseline) -> bool:
     """Whether curves are beyond their noise also with the model's own strengths as fitted."""
-    fitted = begun.base.written(begun.fit.x)
+    fitted = baseline.base.written(baseline.fit.x)
     curves = [curve.against(fitted, measured.context) for curve in measured.curves]
     failing = failing_force(curves, measured.profile.joint)
     return curves_verdict(curves, failing) == "beyond_noise"
@@ -351,32 +359,32 @@ def finding(
     ranking: Ranking,
     held: Holdout,
     number: int,
-    weighed: Weighed,
+    selection: Selection,
     alike: tuple[str, ...] = (),
 ) -> Finding:
-    """A guess of a ranking, told.
+    """A candidate of a ranking, told.
 
     Args:
         measured: the joint and its runs.
         ranking: of what may be missing.
-        held: errors of windows held out.
-        number: of the guess.
-        weighed: the ranking's probabilities.
+        held: errors of segments held out.
+        number: of the candidate.
+        selection: the ranking's probabilities.
         alike: effects that the data cannot tell from it.
     """
-    guess = ranking.guesses[number]
-    hypothesis, x = guess.hypothesis, guess.x
-    before, after = held.errors(guess)
+    candidate = ranking.candidates[number]
+    hypothesis, x = candidate.hypothesis, candidate.x
+    before, after = held.errors(candidate)
     magnitude = hypothesis.magnitude(x)
-    own, left = weighed.excess
-    doubt = uncertainty(ranking.asked, guess, left[number] / max(own, LITTLE))
+    own, left = selection.excess
+    doubt = uncertainty(ranking.baseline, candidate, left[number] / max(own, LITTLE))
     interval = hypothesis.interval(x)
     joint = measured.profile.joint
     return Finding(
         effect=hypothesis.effect,
         interval=interval,
         interval_error=doubt.ends,
-        probability=weighed.probabilities[number],
+        probability=selection.probabilities[number],
         direction=hypothesis.direction,
         magnitude=magnitude,
         magnitude_error=doubt.magnitude,
@@ -397,18 +405,18 @@ def finding(
     )
 
 
-def _next(measured: Measured, ranking: Ranking, weighed: Weighed, one_way: bool) -> str | None:
+def _next(measured: Measured, ranking: Ranking, selection: Selection, one_way: bool) -> str | None:
     """The experiment that tells the likeliest two apart; None if the first is sure."""
     if not measured.runs:
         return GAUGE_BACK if one_way else None
-    means = means_of(measured, ranking.asked.judge.windows, ranking.asked.base.h)
+    means = means_of(measured, ranking.baseline.estimator.segments, ranking.baseline.base.h)
     if one_way:
         return there_and_back(means).sentence
-    if weighed.verdict == "unexplained":
+    if selection.verdict == "unexplained":
         return AGAIN
-    if weighed.probabilities[0] > SURE or len(ranking.guesses) < 2:
+    if selection.probabilities[0] > SURE or len(ranking.candidates) < 2:
         return None
     first, second = (
-        Model(*joined(ranking.asked.base, g.hypothesis), g.fit.x) for g in ranking.guesses[:2]
+        Model(*joined(ranking.baseline.base, g.hypothesis), g.fit.x) for g in ranking.candidates[:2]
     )
     return next_experiment(first, second, means)

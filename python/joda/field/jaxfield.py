@@ -21,7 +21,15 @@ from joda.component import Component
 from joda.field.jaxcubics import Array, Cubics, curve, largest, pchip
 from joda.field.jaxmerge import merge
 
-__all__ = ["Channel", "Cubics", "evaluate", "from_channel", "max_descent", "prepare", "to_channel"]
+__all__ = [
+    "Channel",
+    "Cubics",
+    "evaluate",
+    "from_channel",
+    "max_stiffness",
+    "prepare",
+    "to_channel",
+]
 
 
 @partial(
@@ -126,7 +134,7 @@ def evaluate(channel: Channel | Cubics, s: ArrayLike) -> tuple[Array, Array]:
     return value, slope
 
 
-def max_descent(channel: Channel | Cubics, lo: ArrayLike, hi: ArrayLike) -> Array:
+def max_stiffness(channel: Channel | Cubics, lo: ArrayLike, hi: ArrayLike) -> Array:
     """Steepest descent max(-dF/ds, 0) on the cubics that touch [lo, hi].
 
     Args:
@@ -152,10 +160,10 @@ def prepare(channel: Channel, pieces: bool = False) -> Cubics:
 
     Args:
         channel: the channel.
-        pieces: whether `max_descent` will be asked for.
+        pieces: whether `max_stiffness` will be asked for.
 
     Returns:
-        what `evaluate` and `max_descent` take in the channel's place.
+        what `evaluate` and `max_stiffness` take in the channel's place.
     """
     size, knots = channel.x.shape
     if not size:

@@ -12,12 +12,12 @@ import numpy as np
 from joda.errors import JodaError
 from joda.files import make_folder, write_text
 from joda.hidden.achievable import Achievable, achievable
-from joda.hidden.die import Die, Hidden
 from joda.hidden.families import FAMILIES
 from joda.hidden.family import Family
 from joda.hidden.joint import base_model
 from joda.hidden.laws import Array, Law, Tilt
 from joda.hidden.measuring import Encoder, measure, shows
+from joda.hidden.sampler import Hidden, Sampler
 from joda.hidden.truth import Joint, Truth
 from joda.measured.runs import Run, write_run
 
@@ -164,8 +164,8 @@ def _attempt(
     rng: np.random.Generator, of: Family, seed: int, names: list[str], forced: bool, attempt: int
 ) -> Case:
     bare = of.draw_truth(rng, names, forced)
-    die = Die(rng, bare, attempt / (TRIES - 1))
-    hidden = [of.builders[name](die) for name in names]
+    sampler = Sampler(rng, bare, attempt / (TRIES - 1))
+    hidden = [of.builders[name](sampler) for name in names]
     truth = replace(bare, hidden=_laws(hidden))
     encoder = of.draw_encoder(rng, bare.joint)
     motions = of.move(rng, truth, names, forced)

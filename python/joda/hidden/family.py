@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joda.hidden.die import Builder
 from joda.hidden.measuring import Encoder, Motions
+from joda.hidden.sampler import Builder
 from joda.hidden.truth import Joint, Truth
 
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from joda.hidden import household, machinery, switches
-from joda.hidden.die import Builder, Die, Hidden
 from joda.hidden.family import Family
 from joda.hidden.gestures import Session, perform, shove, some, sweep, toss, track
 from joda.hidden.instrument import drawn
@@ -20,6 +19,7 @@ from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
 from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
+from joda.hidden.sampler import Builder, Hidden, Sampler
 from joda.hidden.truth import Joint, Truth
 
 KNOCKING = "end_stop_restitution"
@@ -100,9 +100,9 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
 def _any_of(name: str) -> Builder:
     """A law of this name as one of the other families has it."""
 
-    def build(die: Die) -> Hidden:
-        family = OTHERS[int(die.rng.integers(len(OTHERS)))]
-        return family.known[name](die)
+    def build(sampler: Sampler) -> Hidden:
+        family = OTHERS[int(sampler.rng.integers(len(OTHERS)))]
+        return family.known[name](sampler)
 
     return build
 

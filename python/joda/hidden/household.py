@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from joda.hidden import forms, memory, rubbing, shapes, strange
-from joda.hidden.die import Builder, Die
 from joda.hidden.drag import DragAlong
 from joda.hidden.family import Family
 from joda.hidden.gestures import Session, perform, press, shove, some, toss, trembling
@@ -19,6 +18,7 @@ from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp, release
 from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
+from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import Joint, Truth
 
 WEIGHTY = ("load_dependent_friction",)
@@ -99,49 +99,49 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
 
 
 # --- laws
-def _whole(die: Die) -> Shape:
-    return shapes.Logistic(die.between(-0.4, 0.05), die.between(0.95, 1.4), 0.01)
+def _whole(sampler: Sampler) -> Shape:
+    return shapes.Logistic(sampler.between(-0.4, 0.05), sampler.between(0.95, 1.4), 0.01)
 
 
-def _constant(die: Die) -> Shape:
+def _constant(sampler: Sampler) -> Shape:
     return shapes.Slope()
 
 
-def _sloping(die: Die) -> Shape:
-    return shapes.Slope(die.way() * die.between(0.1, 0.5))
+def _sloping(sampler: Sampler) -> Shape:
+    return shapes.Slope(sampler.way() * sampler.between(0.1, 0.5))
 
 
-def _detent(die: Die) -> Shape:
-    a, b = die.stretch(0.08, 0.35)
+def _detent(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.08, 0.35)
     return shapes.Well(shapes.windowed_sine, 0.5 * (a + b), 0.5 * (b - a))
 
 
-def _two_wells(die: Die) -> Shape:
-    a, b = die.stretch(0.3, 0.6)
+def _two_wells(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.3, 0.6)
     half = 0.25 * (b - a)
     wells = tuple(shapes.Well(shapes.windowed_sine, at, half) for at in (a + half, b - half))
     return shapes.Sum(wells, (1.0, 1.0))
 
 
-def _dead_centre(die: Die) -> Shape:
-    return shapes.Cubic(die.between(0.4, 0.6), die.between(0.42, 0.8))
+def _dead_centre(sampler: Sampler) -> Shape:
+    return shapes.Cubic(sampler.between(0.4, 0.6), sampler.between(0.42, 0.8))
 
 
 def _to_end(pull: forms.ShapeOf, high: bool) -> forms.ShapeOf:
-    return lambda die: shapes.ToEnd(pull(die), high)
+    return lambda sampler: shapes.ToEnd(pull(sampler), high)
 
 
-def _magnet(die: Die) -> Shape:
-    power = die.between(1.3, 3.5)
-    return shapes.Gap(die.between(0.02, 0.06) * power, power)
+def _magnet(sampler: Sampler) -> Shape:
+    power = sampler.between(1.3, 3.5)
+    return shapes.Gap(sampler.between(0.02, 0.06) * power, power)
 
 
-def _lever(die: Die) -> Shape:
-    return shapes.Lever(die.between(0.1, 0.6), die.between(0.8, 1.6))
+def _lever(sampler: Sampler) -> Shape:
+    return shapes.Lever(sampler.between(0.1, 0.6), sampler.between(0.8, 1.6))
 
 
-def _zone(die: Die) -> Shape:
-    a, b = die.stretch(0.1, 0.2) if die.chance() else die.stretch(0.3, 0.75)
+def _zone(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.1, 0.2) if sampler.chance() else sampler.stretch(0.3, 0.75)
     return shapes.RaisedCosine(a, b)
 
 
@@ -163,17 +163,17 @@ KNOWN: dict[str, Builder] = {
     "position_dependent_friction": forms.friction(_zone, 0.25, 0.8),
     "position_dependent_damping": forms.damping(_zone),
     "stribeck_friction": forms.stribeck(
-        lambda die, size, slow: rubbing.PowerStribeck(size, slow, 1.0)
+        lambda sampler, size, slow: rubbing.PowerStribeck(size, slow, 1.0)
     ),
     "asymmetric_friction": forms.friction(_sloping, 0.15, 0.5, one_way=True),
     "direction_dependent_damping": forms.damping(_sloping, one_way=True),
-    "quadratic_damping": forms.quadratic(lambda die, size: DragAlong(size, _sloping(die))),
+    "quadratic_damping": forms.quadratic(lambda sampler, size: DragAlong(size, _sloping(sampler))),
     "presliding_friction": forms.presliding(
-        lambda die, size, stiffness: memory.slips(size, stiffness, 4), (0.004, 0.06)
+        lambda sampler, size, stiffness: memory.slips(size, stiffness, 4), (0.004, 0.06)
     ),
-    "load_dependent_friction": forms.loaded(lambda die, size: rubbing.Loaded(size)),
+    "load_dependent_friction": forms.loaded(lambda sampler, size: rubbing.Loaded(size)),
     "added_inertia": forms.inertia(forms.rigid),
-    "gravity_offset": forms.weight(lambda die: die.between(0, 2 * np.pi)),
+    "gravity_offset": forms.weight(lambda sampler: sampler.between(0, 2 * np.pi)),
     "backlash": forms.behind((0.01, 0.05), (0.5, 0.85), (100.0, 160.0)),
     "end_stop_restitution": forms.rebound(soft=True, both=0.3),
 }

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from joda.hidden import forms, memory, rubbing, shapes, strange
-from joda.hidden.die import Builder, Die
 from joda.hidden.drag import DragAlong
 from joda.hidden.family import Family
 from joda.hidden.gestures import Session, perform, press, shove, some, steps, sweep, toss, track
@@ -19,6 +18,7 @@ from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
 from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
+from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import Joint, Truth
 
 WEIGHTY = ("load_dependent_friction",)
@@ -85,53 +85,53 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
 
 
 # --- laws
-def _whole(die: Die) -> Shape:
+def _whole(sampler: Sampler) -> Shape:
     return shapes.Slope()
 
 
-def _pull(die: Die) -> Shape:
-    return shapes.Trapezoid(*die.stretch(0.3, 0.9), die.between(0.02, 0.1))
+def _pull(sampler: Sampler) -> Shape:
+    return shapes.Trapezoid(*sampler.stretch(0.3, 0.9), sampler.between(0.02, 0.1))
 
 
-def _rippled(die: Die) -> Shape:
-    ripple = shapes.Sine(die.between(0, 1), die.between(0.08, 0.3))
-    return shapes.Sum((shapes.Slope(), ripple), (1.0, die.between(0.05, 0.3)))
+def _rippled(sampler: Sampler) -> Shape:
+    ripple = shapes.Sine(sampler.between(0, 1), sampler.between(0.08, 0.3))
+    return shapes.Sum((shapes.Slope(), ripple), (1.0, sampler.between(0.05, 0.3)))
 
 
-def _zone(die: Die) -> Shape:
-    a, b = die.stretch(0.06, 0.15) if die.chance() else die.stretch(0.2, 0.6)
-    return shapes.Trapezoid(a, b, die.between(0.005, 0.05))
+def _zone(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.06, 0.15) if sampler.chance() else sampler.stretch(0.2, 0.6)
+    return shapes.Trapezoid(a, b, sampler.between(0.005, 0.05))
 
 
-def _detent(die: Die) -> Shape:
-    a, b = die.stretch(0.1, 0.35)
-    ratio = die.size(0.5, 1.0) ** die.way()
+def _detent(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.1, 0.35)
+    ratio = sampler.size(0.5, 1.0) ** sampler.way()
     return shapes.Well(shapes.gaussian, 0.5 * (a + b), 0.5 * (b - a), ratio)
 
 
-def _two_wells(die: Die) -> Shape:
-    a, b = die.stretch(0.3, 0.6)
+def _two_wells(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.3, 0.6)
     half = 0.25 * (b - a)
     wells = tuple(shapes.Well(shapes.quartic, at, half) for at in (a + half, b - half))
-    return shapes.Sum(wells, (1.0, die.between(0.7, 1.3)))
+    return shapes.Sum(wells, (1.0, sampler.between(0.7, 1.3)))
 
 
-def _strut(die: Die) -> Shape:
-    arm = die.between(0.2, 0.6)
-    slack = 0.0 if die.chance() else 1 + arm + die.between(0.0, 0.5)
-    return shapes.Strut(die.between(0.4, 0.6), arm, die.between(1.5, 3.0), slack)
+def _strut(sampler: Sampler) -> Shape:
+    arm = sampler.between(0.2, 0.6)
+    slack = 0.0 if sampler.chance() else 1 + arm + sampler.between(0.0, 0.5)
+    return shapes.Strut(sampler.between(0.4, 0.6), arm, sampler.between(1.5, 3.0), slack)
 
 
 def _to_end(pull: forms.ShapeOf, high: bool) -> forms.ShapeOf:
-    return lambda die: shapes.ToEnd(pull(die), high)
+    return lambda sampler: shapes.ToEnd(pull(sampler), high)
 
 
-def _dipole(die: Die) -> Shape:
-    return shapes.Gap(die.between(0.08, 0.3), 4.0)
+def _dipole(sampler: Sampler) -> Shape:
+    return shapes.Gap(sampler.between(0.08, 0.3), 4.0)
 
 
-def _spring(die: Die) -> Shape:
-    return shapes.Progressive(die.between(0.05, 0.6), die.between(0.6, 2.2))
+def _spring(sampler: Sampler) -> Shape:
+    return shapes.Progressive(sampler.between(0.05, 0.6), sampler.between(0.6, 2.2))
 
 
 _snap = forms.barrier(shapes.quartic, (0.6, 1.4))
@@ -152,20 +152,22 @@ KNOWN: dict[str, Builder] = {
     "position_dependent_friction": forms.friction(_zone, 0.2, 0.8),
     "position_dependent_damping": forms.damping(_zone),
     "stribeck_friction": forms.stribeck(
-        lambda die, size, slow: rubbing.PowerStribeck(size, slow, die.between(0.5, 2.0))
+        lambda sampler, size, slow: rubbing.PowerStribeck(size, slow, sampler.between(0.5, 2.0))
     ),
     "asymmetric_friction": forms.friction(_rippled, 0.12, 0.5, one_way=True),
     "direction_dependent_damping": forms.damping(_rippled, one_way=True),
-    "quadratic_damping": forms.quadratic(lambda die, size: DragAlong(size, _rippled(die))),
+    "quadratic_damping": forms.quadratic(lambda sampler, size: DragAlong(size, _rippled(sampler))),
     "presliding_friction": forms.presliding(
-        lambda die, size, stiffness: memory.BrittleBristle(size, stiffness, die.between(0.2, 0.8)),
+        lambda sampler, size, stiffness: memory.BrittleBristle(
+            size, stiffness, sampler.between(0.2, 0.8)
+        ),
         (0.002, 0.05),
     ),
     "load_dependent_friction": forms.loaded(
-        lambda die, size: rubbing.LoadedContact(size, die.joint.force)
+        lambda sampler, size: rubbing.LoadedContact(size, sampler.joint.force)
     ),
     "added_inertia": forms.inertia(forms.attached),
-    "gravity_offset": forms.weight(lambda die: die.between(0, 2 * np.pi)),
+    "gravity_offset": forms.weight(lambda sampler: sampler.between(0, 2 * np.pi)),
     "backlash": forms.behind((0.005, 0.03), (0.3, 0.7), (50.0, 100.0)),
     "end_stop_restitution": forms.rebound(soft=True, both=0.7),
 }

@@ -3,85 +3,87 @@
 import numpy as np
 
 from joda.hidden import fleeting, laws, rubbing, truth
-from joda.hidden.die import Builder, Die, Hidden, everywhere
+from joda.hidden.sampler import Builder, Hidden, Sampler, everywhere
 
 
-def _relaxation(die: Die) -> Hidden:
-    force, joint = die.force(0.3, 1.0), die.joint
-    law = truth.Maxwell(2 * force / joint.span, die.between(0.15, 0.6) * joint.time)
-    return everywhere(law, law.stiffness, die.unit("1"))
+def _relaxation(sampler: Sampler) -> Hidden:
+    force, joint = sampler.force(0.3, 1.0), sampler.joint
+    law = truth.Maxwell(2 * force / joint.span, sampler.between(0.15, 0.6) * joint.time)
+    return everywhere(law, law.stiffness, sampler.unit("1"))
 
 
-def _ageing(die: Die) -> Hidden:
-    force, joint = die.force(0.2, 0.6), die.joint
+def _ageing(sampler: Sampler) -> Hidden:
+    force, joint = sampler.force(0.2, 0.6), sampler.joint
     law = truth.Ageing(
-        force, die.between(0.05, 0.2) * joint.time, die.between(0.005, 0.02) * joint.span
+        force, sampler.between(0.05, 0.2) * joint.time, sampler.between(0.005, 0.02) * joint.span
     )
-    return everywhere(law, force, die.unit())
+    return everywhere(law, force, sampler.unit())
 
 
-def _warming(die: Die) -> Hidden:
-    time = die.between(0.8, 2.0) * die.joint.time
-    if die.chance():
-        force = die.force(0.2, 0.6)
-        return everywhere(rubbing.Cold(force, 0.0, time), force, die.unit())
-    size = die.damping(0.3, 0.8)
-    return everywhere(rubbing.Cold(0.0, size, time), size, die.unit("s"))
+def _warming(sampler: Sampler) -> Hidden:
+    time = sampler.between(0.8, 2.0) * sampler.joint.time
+    if sampler.chance():
+        force = sampler.force(0.2, 0.6)
+        return everywhere(rubbing.Cold(force, 0.0, time), force, sampler.unit())
+    size = sampler.damping(0.3, 0.8)
+    return everywhere(rubbing.Cold(0.0, size, time), size, sampler.unit("s"))
 
 
-def _cogging(die: Die) -> Hidden:
-    force = die.force(0.15, 0.6)
-    law = laws.Ripple(force, die.between(6, 12), die.between(0, 2 * np.pi))
-    return everywhere(law, force, die.unit())
+def _cogging(sampler: Sampler) -> Hidden:
+    force = sampler.force(0.15, 0.6)
+    law = laws.Ripple(force, sampler.between(6, 12), sampler.between(0, 2 * np.pi))
+    return everywhere(law, force, sampler.unit())
 
 
-def _root(die: Die) -> Hidden:
-    size = die.force(0.2, 0.6) * (die.joint.time / die.joint.span) ** 0.5
-    return everywhere(rubbing.RootDamping(size), size, f"{die.unit()}·(s/x)^½")
+def _root(sampler: Sampler) -> Hidden:
+    size = sampler.force(0.2, 0.6) * (sampler.joint.time / sampler.joint.span) ** 0.5
+    return everywhere(rubbing.RootDamping(size), size, f"{sampler.unit()}·(s/x)^½")
 
 
-def _delay(die: Die) -> Hidden:
-    time = die.between(0.03, 0.08)
+def _delay(sampler: Sampler) -> Hidden:
+    time = sampler.between(0.03, 0.08)
     return everywhere(truth.Delay(time), time, "s")
 
 
-def _shaking(die: Die) -> Hidden:
-    force = die.force(0.2, 0.5)
+def _shaking(sampler: Sampler) -> Hidden:
+    force = sampler.force(0.2, 0.5)
     return everywhere(
-        laws.Shaking(force, die.between(0.8, 2.5) / die.joint.time), force, die.unit()
+        laws.Shaking(force, sampler.between(0.8, 2.5) / sampler.joint.time), force, sampler.unit()
     )
 
 
-def _cable(die: Die) -> Hidden:
-    force, taut = die.force(0.3, 0.8), die.between(0.2, 0.5)
-    law = truth.Cable(force, taut, die.between(0.1, 0.25), die.between(0.5, 1.5) * die.joint.time)
-    return Hidden((law,), (taut, 1.0), force, die.unit(), "positive")
+def _cable(sampler: Sampler) -> Hidden:
+    force, taut = sampler.force(0.3, 0.8), sampler.between(0.2, 0.5)
+    law = truth.Cable(
+        force, taut, sampler.between(0.1, 0.25), sampler.between(0.5, 1.5) * sampler.joint.time
+    )
+    return Hidden((law,), (taut, 1.0), force, sampler.unit(), "positive")
 
 
-def _fading(die: Die) -> Hidden:
-    force, joint = die.force(0.3, 0.8), die.joint
-    periods, phase = die.between(3, 6), die.between(0, 2 * np.pi)
-    velocity = die.between(0.3, 0.8) * joint.span / joint.time
-    return everywhere(fleeting.FadingWave(force, periods, phase, velocity), force, die.unit())
+def _fading(sampler: Sampler) -> Hidden:
+    force, joint = sampler.force(0.3, 0.8), sampler.joint
+    periods, phase = sampler.between(3, 6), sampler.between(0, 2 * np.pi)
+    velocity = sampler.between(0.3, 0.8) * joint.span / joint.time
+    return everywhere(fleeting.FadingWave(force, periods, phase, velocity), force, sampler.unit())
 
 
-def _drift(die: Die) -> Hidden:
-    force = die.force(0.2, 0.5)
-    law = fleeting.Drift(die.way() * force, die.between(0.8, 2.5) * die.joint.time)
-    return everywhere(law, force, die.unit())
+def _drift(sampler: Sampler) -> Hidden:
+    force = sampler.force(0.2, 0.5)
+    law = fleeting.Drift(sampler.way() * force, sampler.between(0.8, 2.5) * sampler.joint.time)
+    return everywhere(law, force, sampler.unit())
 
 
-def _tremor(die: Die) -> Hidden:
-    force, count = die.force(0.15, 0.4), 7
-    frequencies = tuple(die.between(0.3, 3.0) / die.joint.time for _ in range(count))
-    phases = tuple(die.between(0, 2 * np.pi) for _ in range(count))
-    return everywhere(fleeting.Tremor(force, frequencies, phases), force, die.unit())
+def _tremor(sampler: Sampler) -> Hidden:
+    force, count = sampler.force(0.15, 0.4), 7
+    frequencies = tuple(sampler.between(0.3, 3.0) / sampler.joint.time for _ in range(count))
+    phases = tuple(sampler.between(0, 2 * np.pi) for _ in range(count))
+    return everywhere(fleeting.Tremor(force, frequencies, phases), force, sampler.unit())
 
 
-def _ratchet(die: Die) -> Hidden:
-    force, way = die.force(0.3, 0.7), die.way()
-    law = fleeting.Ratchet(force, die.between(6, 14), way)
-    return everywhere(law, force, die.unit(), way)
+def _ratchet(sampler: Sampler) -> Hidden:
+    force, way = sampler.force(0.3, 0.7), sampler.way()
+    law = fleeting.Ratchet(force, sampler.between(6, 14), way)
+    return everywhere(law, force, sampler.unit(), way)
 
 
 BEYOND: dict[str, Builder] = {

@@ -1,64 +1,66 @@
 """Forms of effects that no catalogue has, beside those of `outside`."""
 
 from joda.hidden import laws, masses, memory, rubbing, truth
-from joda.hidden.die import Die, Hidden, everywhere
+from joda.hidden.sampler import Hidden, Sampler, everywhere
 
 
-def two_relaxations(die: Die) -> Hidden:
+def two_relaxations(sampler: Sampler) -> Hidden:
     """Two springs, each in series with a dashpot: one yields at once, one slowly."""
-    force, joint = die.force(0.4, 1.2), die.joint
-    quick, slow = (die.between(*lasts) * joint.time for lasts in ((0.08, 0.2), (0.4, 1.0)))
+    force, joint = sampler.force(0.4, 1.2), sampler.joint
+    quick, slow = (sampler.between(*lasts) * joint.time for lasts in ((0.08, 0.2), (0.4, 1.0)))
     stiffness = 2 * force / joint.span
     elements = (truth.Maxwell(1.5 * stiffness, quick), truth.Maxwell(stiffness, slow))
-    return Hidden(elements, (0.0, 1.0), stiffness, die.unit("1"))
+    return Hidden(elements, (0.0, 1.0), stiffness, sampler.unit("1"))
 
 
-def switching(die: Die) -> Hidden:
+def switching(sampler: Sampler) -> Hidden:
     """A force that is periodic in time, and jumps."""
-    force = die.force(0.2, 0.5)
-    law = laws.Switching(force, die.between(0.5, 1.5) / die.joint.time)
-    return everywhere(law, force, die.unit())
+    force = sampler.force(0.2, 0.5)
+    law = laws.Switching(force, sampler.between(0.5, 1.5) / sampler.joint.time)
+    return everywhere(law, force, sampler.unit())
 
 
-def governor(die: Die) -> Hidden:
+def governor(sampler: Sampler) -> Hidden:
     """A centrifugal brake."""
-    force = die.force(0.3, 0.8)
-    law = rubbing.Governor(force, die.between(0.4, 0.8) * die.joint.span / die.joint.time)
-    return everywhere(law, force, die.unit())
+    force = sampler.force(0.3, 0.8)
+    law = rubbing.Governor(
+        force, sampler.between(0.4, 0.8) * sampler.joint.span / sampler.joint.time
+    )
+    return everywhere(law, force, sampler.unit())
 
 
-def sloshing(die: Die) -> Hidden:
+def sloshing(sampler: Sampler) -> Hidden:
     """A load that swings on the joint."""
-    size = die.size(0.4, 1.0) * die.joint.inertia
-    frequency = die.between(5, 14) / die.joint.time
+    size = sampler.size(0.4, 1.0) * sampler.joint.inertia
+    frequency = sampler.between(5, 14) / sampler.joint.time
     law = masses.Attached(size, size * frequency**2, 2 * 0.05 * size * frequency)
-    return everywhere(law, size, "kg·m²" if die.joint.kind == "hinge" else "kg")
+    return everywhere(law, size, "kg·m²" if sampler.joint.kind == "hinge" else "kg")
 
 
-def cushion(die: Die) -> Hidden:
+def cushion(sampler: Sampler) -> Hidden:
     """Air that is caught before the high end, and leaks."""
-    begin, force = die.between(0.2, 0.55), die.force(0.6, 1.5)
-    stiffness = force / ((1 - begin) * die.joint.span)
-    law = memory.Cushion(stiffness, begin, die.between(0.5, 1.5) * die.joint.time)
-    return Hidden((law,), (begin, 1.0), stiffness, die.unit("1"), "positive")
+    begin, force = sampler.between(0.2, 0.55), sampler.force(0.6, 1.5)
+    stiffness = force / ((1 - begin) * sampler.joint.span)
+    law = memory.Cushion(stiffness, begin, sampler.between(0.5, 1.5) * sampler.joint.time)
+    return Hidden((law,), (begin, 1.0), stiffness, sampler.unit("1"), "positive")
 
 
-def lost_motion(die: Die) -> Hidden:
+def lost_motion(sampler: Sampler) -> Hidden:
     """A damper behind a play."""
-    size = die.damping(0.4, 1.0)
-    law = memory.LostMotion(size, die.between(0.2, 0.5) * die.joint.span)
-    return everywhere(law, size, die.unit("s"))
+    size = sampler.damping(0.4, 1.0)
+    law = memory.LostMotion(size, sampler.between(0.2, 0.5) * sampler.joint.span)
+    return everywhere(law, size, sampler.unit("s"))
 
 
-def running_in(die: Die) -> Hidden:
+def running_in(sampler: Sampler) -> Hidden:
     """Friction that goes with the way made."""
-    force = die.force(0.3, 0.8)
-    law = memory.RunningIn(force, float(die.between(0.8, 2.5) * die.joint.span))
-    return everywhere(law, force, die.unit())
+    force = sampler.force(0.3, 0.8)
+    law = memory.RunningIn(force, float(sampler.between(0.8, 2.5) * sampler.joint.span))
+    return everywhere(law, force, sampler.unit())
 
 
-def ageing(die: Die) -> Hidden:
+def ageing(sampler: Sampler) -> Hidden:
     """Friction that grows at rest, over a longer time and with a longer slip."""
-    force, joint = die.force(0.3, 0.7), die.joint
-    time, slip = die.size(0.1, 0.5) * joint.time, die.size(0.01, 0.05) * joint.span
-    return everywhere(truth.Ageing(force, time, slip), force, die.unit())
+    force, joint = sampler.force(0.3, 0.7), sampler.joint
+    time, slip = sampler.size(0.1, 0.5) * joint.time, sampler.size(0.01, 0.05) * joint.span
+    return everywhere(truth.Ageing(force, time, slip), force, sampler.unit())

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from joda.hidden import forms, rubbing, shapes, strange, truth
-from joda.hidden.die import Builder, Die
 from joda.hidden.drag import Orifice
 from joda.hidden.family import Family
 from joda.hidden.gestures import Session, perform, press, shove, some, toss, trembling
@@ -19,6 +18,7 @@ from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp
 from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
+from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import Joint, Truth
 
 WEIGHTY = ("load_dependent_friction",)
@@ -84,45 +84,47 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
 
 
 # --- laws
-def _whole(die: Die) -> Shape:
-    return shapes.Trapezoid(die.between(0.0, 0.08), die.between(0.92, 1.0), 0.02)
+def _whole(sampler: Sampler) -> Shape:
+    return shapes.Trapezoid(sampler.between(0.0, 0.08), sampler.between(0.92, 1.0), 0.02)
 
 
-def _zone(die: Die) -> Shape:
-    a, b = die.stretch(0.12, 0.7)
-    return shapes.Logistic(a, b, die.between(0.005, 0.03))
+def _zone(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.12, 0.7)
+    return shapes.Logistic(a, b, sampler.between(0.005, 0.03))
 
 
-def _growing(die: Die) -> Shape:
-    return shapes.Progressive(die.between(1.0, 2.0), 2.0)
+def _growing(sampler: Sampler) -> Shape:
+    return shapes.Progressive(sampler.between(1.0, 2.0), 2.0)
 
 
-def _detent(die: Die) -> Shape:
-    a, b = die.stretch(0.1, 0.35)
-    return shapes.Well(shapes.triangle, 0.5 * (a + b), 0.5 * (b - a), die.between(0.5, 1.0))
+def _detent(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.1, 0.35)
+    return shapes.Well(shapes.triangle, 0.5 * (a + b), 0.5 * (b - a), sampler.between(0.5, 1.0))
 
 
-def _two_wells(die: Die) -> Shape:
-    a, b = die.stretch(0.3, 0.6)
+def _two_wells(sampler: Sampler) -> Shape:
+    a, b = sampler.stretch(0.3, 0.6)
     half = 0.25 * (b - a)
     wells = tuple(shapes.Well(shapes.triangle, at, half) for at in (a + half, b - half))
-    return shapes.Sum(wells, (1.0, die.between(0.6, 1.0)))
+    return shapes.Sum(wells, (1.0, sampler.between(0.6, 1.0)))
 
 
-def _dead_centre(die: Die) -> Shape:
-    return shapes.Sine(die.between(0.4, 0.6), die.between(1.1, 2.4))
+def _dead_centre(sampler: Sampler) -> Shape:
+    return shapes.Sine(sampler.between(0.4, 0.6), sampler.between(1.1, 2.4))
 
 
 def _to_end(pull: forms.ShapeOf, high: bool) -> forms.ShapeOf:
-    return lambda die: shapes.ToEnd(pull(die), high)
+    return lambda sampler: shapes.ToEnd(pull(sampler), high)
 
 
-def _magnet(die: Die) -> Shape:
-    return shapes.Decay(die.between(0.04, 0.12))
+def _magnet(sampler: Sampler) -> Shape:
+    return shapes.Decay(sampler.between(0.04, 0.12))
 
 
-def _spring(die: Die) -> Shape:
-    return shapes.TwoRate(die.between(0.1, 0.8), die.between(0.3, 0.6), die.between(0.5, 2.0))
+def _spring(sampler: Sampler) -> Shape:
+    return shapes.TwoRate(
+        sampler.between(0.1, 0.8), sampler.between(0.3, 0.6), sampler.between(0.5, 2.0)
+    )
 
 
 _snap = forms.barrier(shapes.triangle, (0.6, 1.0))
@@ -143,24 +145,30 @@ KNOWN: dict[str, Builder] = {
     "position_dependent_friction": forms.friction(_zone, 0.25, 0.8),
     "position_dependent_damping": forms.damping(_zone),
     "stribeck_friction": forms.stribeck(
-        lambda die, size, slow: rubbing.RationalStribeck(size, slow)
+        lambda sampler, size, slow: rubbing.RationalStribeck(size, slow)
     ),
     "asymmetric_friction": forms.friction(_growing, 0.15, 0.5, one_way=True),
     "direction_dependent_damping": forms.damping(_growing, one_way=True),
     "quadratic_damping": forms.quadratic(
-        lambda die, size: Orifice(size, die.between(0.05, 0.2) * die.joint.span / die.joint.time)
+        lambda sampler, size: Orifice(
+            size, sampler.between(0.05, 0.2) * sampler.joint.span / sampler.joint.time
+        )
     ),
     "presliding_friction": forms.presliding(
-        lambda die, size, stiffness: truth.Bristle(
-            size, stiffness, die.between(0.1, 0.6) * float(np.sqrt(stiffness * die.joint.inertia))
+        lambda sampler, size, stiffness: truth.Bristle(
+            size,
+            stiffness,
+            sampler.between(0.1, 0.6) * float(np.sqrt(stiffness * sampler.joint.inertia)),
         ),
         (0.01, 0.1),
     ),
     "load_dependent_friction": forms.loaded(
-        lambda die, size: rubbing.LoadedBearing(size, die.between(0.05, 0.3) * die.joint.force)
+        lambda sampler, size: rubbing.LoadedBearing(
+            size, sampler.between(0.05, 0.3) * sampler.joint.force
+        )
     ),
     "added_inertia": forms.inertia(forms.linked),
-    "gravity_offset": forms.weight(lambda die: die.rng.choice([0.0, np.pi])),
+    "gravity_offset": forms.weight(lambda sampler: sampler.rng.choice([0.0, np.pi])),
     "backlash": forms.handle((0.02, 0.06), (0.2, 0.6)),
     "end_stop_restitution": forms.rebound(soft=False, both=0.6),
 }

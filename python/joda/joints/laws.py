@@ -148,7 +148,7 @@ def friction_row(
         return stiff, jnp.zeros_like(v)
     direction = jnp.where(jnp.abs(v) < STILL, 0, jnp.sign(v))
     r = jnp.clip(-held * direction / jnp.where(bound > 0, bound, 1), -1, 1)
-    left = jnp.maximum(1 - _plastic(bristles.breakaway, r) * r, SLIPPING)
+    left = jnp.maximum(1 - _dupont_alpha(bristles.breakaway, r) * r, SLIPPING)
     resolved = jnp.maximum(h * h * (part * bristles.stiffness), NOTHING)
     # The row must also stop a part that turns back within the step. While it slips the bound gives
     # the law's force, so that all of the stiffness can be there; else what is too stiff for the
@@ -341,7 +341,7 @@ def _stribeck(own: Stribeck, s: Array, v: Array) -> Array:
     return _value(own.curve, s) * jnp.exp(-jnp.where(moves, jnp.exp(power), 0))
 
 
-def _plastic(breakaway: Array, r: Array) -> Array:
+def _dupont_alpha(breakaway: Array, r: Array) -> Array:
     """How far bristles slip that carry the part r of their largest force (Dupont et al. 2002)."""
     width = jnp.where(breakaway < 1, 1 - breakaway, 1)
     rising = 0.5 + 0.5 * jnp.sin(jnp.pi * (r - 0.5 * (1 + breakaway)) / width)

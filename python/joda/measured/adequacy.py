@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest, norm
 
+from joda.measured.data_checks.timing import repeats
 from joda.measured.errors import MULTIPLE, Errors, Missed
 from joda.measured.failing import FORCE, LENGTHS
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
-from joda.measured.suspicions.timing import repeats
 from joda.measured.whiteness import drifts, free_parts, strays
 
 Array = NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.measured.adequacy import CHANCE, Adequate, runs_test, sign_test
-from joda.measured.gauge import Gauged
-from joda.measured.places import BINS, places, significant
+from joda.measured.failing_intervals import BINS, failing_intervals, significant
+from joda.measured.quasi_static import QuasiStaticComparison
 from joda.profile import Joint
 
 SAID = 0.1
@@ -77,7 +77,7 @@ class FailingForce:
     significant: bool
 
 
-def curve_error(found: Gauged, joint: Joint) -> CurveError:
+def curve_error(found: QuasiStaticComparison, joint: Joint) -> CurveError:
     """The errors of a curve."""
     return CurveError(
         file=found.curve.name,
@@ -87,7 +87,7 @@ def curve_error(found: Gauged, joint: Joint) -> CurveError:
     )
 
 
-def failing_force(curves: Sequence[Gauged], joint: Joint) -> list[FailingForce]:
+def failing_force(curves: Sequence[QuasiStaticComparison], joint: Joint) -> list[FailingForce]:
     """Where the model's force is wrong by more than noise, the largest share first."""
     if not curves:
         return []
@@ -103,7 +103,7 @@ def failing_force(curves: Sequence[Gauged], joint: Joint) -> list[FailingForce]:
         ("position", np.linspace(0, 1, BINS + 1), (place - lo) / (hi - lo)),
         ("direction", np.array([-1.0, 0.0, 1.0]), way / 2),
     ):
-        for interval, inside in places(edges, values, found, apart=by == "direction"):
+        for interval, inside in failing_intervals(edges, values, found, apart=by == "direction"):
             means = [excess[inside & (way == d)].mean() for d in (1, -1) if d in way[inside]]
             error = float(np.sqrt(np.mean(excess[inside] ** 2)))
             if by == "direction" and max(map(abs, means)) < AGREE * error:
@@ -122,7 +122,9 @@ def failing_force(curves: Sequence[Gauged], joint: Joint) -> list[FailingForce]:
     return sorted(out, key=lambda place: -place.share)
 
 
-def curves_verdict(curves: Sequence[Gauged], failing: Sequence[FailingForce]) -> Adequate:
+def curves_verdict(
+    curves: Sequence[QuasiStaticComparison], failing: Sequence[FailingForce]
+) -> Adequate:
     """Whether the model's quasi-static force is within the noise: in size, and without a pattern.
 
     Noise that is a good part of the force may be what changes from sample to sample instead: then
@@ -136,13 +138,13 @@ def curves_verdict(curves: Sequence[Gauged], failing: Sequence[FailingForce]) ->
     return "not_enough_data" if few or any(map(too_loud, curves)) else "within_noise"
 
 
-def too_loud(curve: Gauged) -> bool:
+def too_loud(curve: QuasiStaticComparison) -> bool:
     """Whether a curve's noise, or what changes from sample to sample, is much of its force."""
     loud = LOUD if curve.repeated and not _periodic(curve) else ALONE
     return curve.sigma > loud * float(np.sqrt(np.mean(curve.curve.force**2)))
 
 
-def _periodic(curve: Gauged) -> bool:
+def _periodic(curve: QuasiStaticComparison) -> bool:
     """Whether one period stands out of the error along either way: Fisher's test of the largest
     ordinate of the periodogram (1929), by its bound."""
     known = curve.direction != 0
@@ -159,11 +161,11 @@ def _periodic(curve: Gauged) -> bool:
     return False
 
 
-def _z(curve: Gauged) -> Array:
+def _z(curve: QuasiStaticComparison) -> Array:
     return curve.excess / curve.cautious
 
 
-def _pattern(curve: Gauged) -> float:
+def _pattern(curve: QuasiStaticComparison) -> float:
     """Probability of signs of the excess along the way as uneven as these, were the model true."""
     known = curve.direction != 0
     position, way = curve.curve.position[known], curve.direction[known]

@@ -113,8 +113,8 @@ def joints_in(model: mujoco.MjModel, path: Path) -> list[str]:
     if "position" in names:
         return []
     slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
-    single = [k for k in range(model.njnt) if model.jnt_type[k] in (slide, hinge)]
-    every = [model.joint(k).name for k in single]
+    joint_model = [k for k in range(model.njnt) if model.jnt_type[k] in (slide, hinge)]
+    every = [model.joint(k).name for k in joint_model]
     return [name for name in every if name and f"position:{name}".lower() in names]
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.measured import smoothing
+from joda.measured.failing_intervals import BINS, failing_intervals
 from joda.measured.misfit import rms
-from joda.measured.places import BINS, places
 from joda.measured.reading import Measured
 from joda.measured.replay import Window
 from joda.measured.runs import Run
@@ -181,7 +181,7 @@ def _usual_force(measured: Measured, run: Run) -> float:
     """RMS of what acts on the joint in a run, by load or, where there is none, by its speed."""
     load = float(np.sqrt(np.mean(measured.load(run) ** 2)))
     pace = float(np.ptp(run.position)) / float(np.ptp(run.time)) ** 2
-    return max(load, measured.single.inertia * pace)
+    return max(load, measured.joint_model.inertia * pace)
 
 
 def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[float]:
@@ -218,7 +218,7 @@ def _by(by: By, values: Array, found: Array, beyond: Array) -> list[Failing]:
     if not beyond.sum() or (by not in ("direction", "time") and np.ptp(values) == 0):
         return []
     out = []
-    for interval, inside in places(
+    for interval, inside in failing_intervals(
         _edges(by, values), values, found, apart=by in ("velocity", "load", "direction")
     ):
         rows = found[inside]

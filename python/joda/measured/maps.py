@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.measured.failing import FORCE, window_rows
-from joda.measured.gauge import Gauged, static_force
+from joda.measured.quasi_static import QuasiStaticComparison, static_force
 from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.measured.visited import Interval
@@ -136,7 +136,9 @@ def _map(axes: "Axes", rows: Array, x: int) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def draw_curves(part: "Figure | SubFigure", measured: Measured, curves: Sequence[Gauged]) -> None:
+def draw_curves(
+    part: "Figure | SubFigure", measured: Measured, curves: Sequence[QuasiStaticComparison]
+) -> None:
     """Measured quasi-static force over position, and the model's in both directions."""
     shape = (len(curves) + 1) // 2, min(len(curves), 2)
     plots = part.subplots(*shape, squeeze=False, sharey=True).ravel()
@@ -161,7 +163,7 @@ def draw_models(
         own.suptitle(label, x=0.01, ha="left", fontsize=10)
 
 
-def _curve(axes: "Axes", measured: Measured, curve: Gauged) -> None:
+def _curve(axes: "Axes", measured: Measured, curve: QuasiStaticComparison) -> None:
     joint = measured.profile.joint
     lo, hi = joint.range
     grid, s = np.linspace(lo, hi, 501), (curve.curve.position - lo) / (hi - lo)

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
-from joda.joints.single import Single, single, weighing
+from joda.joints.joint_model import JointModel, joint_model, weighing
 from joda.measured import smoothing
 from joda.measured.corrections_file import sensing_of
+from joda.measured.data_checks import data_checks
 from joda.measured.driven import read_logs
-from joda.measured.gauge import Gauged, gauged
 from joda.measured.misfit import missed
 from joda.measured.obstructed import Clear, clear_of_contacts
+from joda.measured.quasi_static import QuasiStaticComparison, gauged
 from joda.measured.replay import WINDOW, Replayer
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.sensing import Sensing
-from joda.measured.slow import as_curve
-from joda.measured.suspicions import suspicions
+from joda.measured.slow_runs import as_curve
 from joda.measured.trust import USUAL, Trust
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
@@ -60,7 +60,7 @@ class Measured:
     Attributes:
         context: of the joint.
         profile: all that acts on it (`joda.scenes.native`).
-        single: all of the joint but its profile, as it is replayed.
+        joint_model: all of the joint but its profile, as it is replayed.
         own_row: of friction that is MuJoCo's own in the scene, whichever is replayed; None if none
             is.
         timestep: of the model, s.
@@ -77,13 +77,13 @@ class Measured:
 
     context: Context
     profile: Profile
-    single: Single
+    joint_model: JointModel
     own_row: Row | None
     timestep: float
     replayer: Replayer
     runs: tuple[Run, ...]
     sigma: tuple[float, ...]
-    curves: tuple[Gauged, ...]
+    curves: tuple[QuasiStaticComparison, ...]
     notes: tuple[str, ...]
     contacts: tuple[Contact, ...]
     whole: bool
@@ -102,20 +102,20 @@ class Measured:
         self,
         profile: Profile | None = None,
         runs: Sequence[int] | None = None,
-        single: Single | None = None,
+        joint_model: JointModel | None = None,
     ) -> "Measured":
         """The same joint with another profile, another body, or with some of its runs only."""
         numbers = range(len(self.runs)) if runs is None else runs
         new = self.profile if profile is None else profile
-        own = single or (self.single if profile is None else self.single.with_plugin)
-        found = self.context if single is None else weighing(self.context, single)
+        own = joint_model or (self.joint_model if profile is None else self.joint_model.with_plugin)
+        found = self.context if joint_model is None else weighing(self.context, joint_model)
         return replace(
             self,
             context=found,
             profile=new,
-            single=own,
+            joint_model=own,
             replayer=self.replayer
-            if profile is None and single is None
+            if profile is None and joint_model is None
             else Replayer(found, new, own, self.timestep),
             runs=tuple(self.runs[k] for k in numbers),
             sigma=tuple(self.sigma[k] for k in numbers),
@@ -151,7 +151,7 @@ class Measured:
 
     def exerted(self, run: Run) -> Array:
         """By the actuators on the joint, N·m or N, shape (n,)."""
-        servo = self.single.servo
+        servo = self.joint_model.servo
         if servo is None or run.command is None:
             return np.zeros(len(run.time))
         at = run.time - servo.delay
@@ -160,7 +160,7 @@ class Measured:
         return servo.force(command, run.position, velocity)
 
     def _driven(self, run: Run) -> bool:
-        return self.single.servo is not None and run.command is not None
+        return self.joint_model.servo is not None and run.command is not None
 
     def paths(self) -> list[Array]:
         """Predicted positions of all runs, rad or m; NaN from where the force is not known."""
@@ -171,7 +171,7 @@ class Measured:
         """The same joint with parts of its runs, and of each the number of its run."""
         return replace(self, runs=tuple(parts), sigma=tuple(self.sigma[k] for k in of))
 
-    def with_curves(self, curves: Sequence[Gauged]) -> "Measured":
+    def with_curves(self, curves: Sequence[QuasiStaticComparison]) -> "Measured":
         """The same joint with some of its curves, or with parts of them."""
         return replace(self, curves=tuple(curves))
 
@@ -187,7 +187,7 @@ def checked(read: Sequence[Run | QuasiStatic], found: Context, timestep: float) 
     Raises:
         JodaError: they cannot be of this joint as they stand, or cannot be replayed.
     """
-    doubts = [doubt for run in read for doubt in suspicions(run, found)]
+    doubts = [doubt for run in read for doubt in data_checks(run, found)]
     for doubt in doubts:
         if doubt.fatal:
             raise JodaError(" ".join(filter(None, (doubt.sentence, range_doubt(found.joint)))))
@@ -267,7 +267,7 @@ def taken(
     least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
     sigma = tuple(max(smoothing.noise(run.time, run.position), least) for run in timed)
     row = own_friction_row(model, joint)
-    own = replace(single(found, profile, model, joint), servo=servo)
+    own = replace(joint_model(found, profile, model, joint), servo=servo)
     replayer = Replayer(found, profile, own, step)
     if row and timed:
         yielding = replace(own, friction_row=row)
@@ -302,7 +302,7 @@ def taken(
     return Measured(
         context=found,
         profile=profile,
-        single=own,
+        joint_model=own,
         own_row=row,
         timestep=step,
         replayer=replayer,

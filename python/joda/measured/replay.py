@@ -11,8 +11,8 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
+from joda.joints.joint_model import JointModel
 from joda.joints.rig import rig
-from joda.joints.single import Single
 from joda.measured import smoothing
 from joda.measured.runs import Run, held
 from joda.profile import Profile
@@ -123,18 +123,20 @@ class _Prior:
 class Replayer:
     """A joint with a profile, ready to replay runs."""
 
-    def __init__(self, context: Context, profile: Profile, single: Single, timestep: float) -> None:
+    def __init__(
+        self, context: Context, profile: Profile, joint_model: JointModel, timestep: float
+    ) -> None:
         """Args: the joint in its scene; its whole profile (`scenes.native`); the rest; step, s."""
-        alone = context.model_copy(update={"equivalent_inertia": single.inertia})
-        self.servo = single.servo
-        self.model = rig(alone, profile, single.friction_row, self.servo)
+        alone = context.model_copy(update={"equivalent_inertia": joint_model.inertia})
+        self.servo = joint_model.servo
+        self.model = rig(alone, profile, joint_model.friction_row, self.servo)
         self.model.opt.timestep = self.h = timestep
         if not self.model.nplugin:
-            self.model.opt.integrator = single.integrator
-        solref, solimp = single.limits(profile, timestep)
+            self.model.opt.integrator = joint_model.integrator
+        solref, solimp = joint_model.limits(profile, timestep)
         self.model.jnt_solref[0], self.model.jnt_solimp[0] = solref, solimp
         self.data = mujoco.MjData(self.model)
-        self.inertia = single.inertia
+        self.inertia = joint_model.inertia
 
     def whole(self, run: Run, start: Start | None) -> Array:
         """Predicted positions at the run's times, from its start; NaN where force is unknown on."""

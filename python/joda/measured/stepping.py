@@ -26,7 +26,7 @@ def timestep_note(measured: Measured, window: float, whole: float) -> str | None
     step, unit = measured.timestep / FINER, measured.profile.joint.unit
     if not max(window, whole) >= least:
         return None
-    finer = Replayer(measured.context, measured.profile, measured.single, step)
+    finer = Replayer(measured.context, measured.profile, measured.joint_model, step)
     # another fault may add up to less in other steps: whole runs must then be within the noise
     tried = (
         ("windows are", window, missed, CLEARLY * window),

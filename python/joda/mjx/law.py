@@ -52,7 +52,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
         stacks = prepared.conservative
         force = force + _each(stacks, order["conservative"], jaxfield.evaluate, s)[0]
         far = reach(v, force, inertia, per_range, h)
-        near = _each(stacks, order["conservative"], jaxfield.max_descent, s - far, s + far)
+        near = _each(stacks, order["conservative"], jaxfield.max_stiffness, s - far, s + far)
     constant = stays_beyond(s, v, force, inertia, per_range, h)
     stiffness = implicit_stiffness(force, near, descent, constant, inertia, per_range, h)
     if damper:

@@ -20,7 +20,7 @@ from joda.files import check_target, file_name, make_folder, write_bytes
 from joda.pictures.canvas import Canvas
 from joda.pictures.caption import captioned
 from joda.pictures.offscreen import HEIGHT, WIDTH, Image, answer, ask
-from joda.pictures.stage import Stage, View
+from joda.pictures.scene_renderer import SceneRenderer, View
 from joda.pictures.style import COMPRESSED, clean
 from joda.profile import Joint
 from joda.scenes.model import describe_joint, find_joint, load_model
@@ -81,7 +81,7 @@ def _make(request: Any) -> list[str]:
     joint = describe_joint(model, index)
     if not moving(model, index):
         raise JodaError(f"{path}: joint '{joint.name}' moves no geom that can be seen.")
-    stage = Stage(copy(model), index, canvas, tuple(size))
+    stage = SceneRenderer(copy(model), index, canvas, tuple(size))
     fractions = np.linspace(0, 1, count)
     stem = file_name(joint.name)
     digits = max(2, len(str(count - 2)))
@@ -228,7 +228,7 @@ def _slide_marks(axis: Array, low: Array, union: Array) -> list[Marks]:
     return marks
 
 
-def _shots(stage: Stage, positions: Array) -> Iterator[Image]:
+def _shots(stage: SceneRenderer, positions: Array) -> Iterator[Image]:
     """The pictures at these positions, rad or m, all with the same camera."""
     lo, hi = positions[0], positions[-1]
     clouds = []
@@ -255,7 +255,7 @@ def _shots(stage: Stage, positions: Array) -> Iterator[Image]:
 
 
 def _choose(
-    stage: Stage,
+    stage: SceneRenderer,
     candidates: Iterator[tuple[View, float]],
     union: Array,
     positions: Sequence[float],

@@ -1,8 +1,17 @@
-"""What is added to a joint for a wish that its kind does not have."""
+"""What is added to a joint for a requirement that its kind does not have."""
 
-from joda.propose.parts import HELD, RISE, SNAP, SPRING, Part, catch, part, rising
+from joda.propose.archetype_effects import (
+    HELD,
+    RISE,
+    SNAP,
+    SPRING,
+    ArchetypeEffect,
+    catch,
+    part,
+    rising,
+)
 
-WISHED: dict[str, tuple[Part, ...]] = {
+WISHED: dict[str, tuple[ArchetypeEffect, ...]] = {
     "closes_near": (catch("strong", 0.1, "it is to close by itself"),),
     "held_shut": (catch("strong", 0.1, "it is to stay shut"),),
     "closes_from": rising(
@@ -37,7 +46,7 @@ WISHED: dict[str, tuple[Part, ...]] = {
     "soft": (part("constant_damping_hinge", (0, 0.3), "it is to close softly", damping="medium"),),
     "arrives": (part("constant_damping_hinge", (0, 0.3), "it is not to slam", damping="medium"),),
 }
-"""What is added for a wish that the kind does not have."""
+"""What is added for a requirement that the kind does not have."""
 
 RISING = {"closes_from", "caught"}
-"""Wishes whose pull is of two parts."""
+"""Requirements whose pull is of two parts."""

@@ -17,9 +17,9 @@ from joda.component import Frozen
 from joda.errors import JodaError
 from joda.files import read_text
 from joda.profile import describe
-from joda.propose.parts import Part
+from joda.propose.archetype_effects import ArchetypeEffect
 from joda.propose.plausible import forces
-from joda.propose.wishes import WISHES
+from joda.propose.requirements import REQUIREMENTS
 from joda.scenes.shape import Shape
 
 Feature = bool | float | str | tuple[float, float]
@@ -42,8 +42,8 @@ class Archetype(Frozen):
         common: how common it is before anything is known of it, as a logarithm; 0 as any other.
         unknown: whether this is what remains where no other fits.
         force: the row of `forces.toml` that says what opening one takes.
-        wishes: what it does, by name, see `joda.propose.wishes`.
-        parts: the effects that it does it by.
+        requirements: what it does, by name, see `joda.propose.requirements`.
+        effects: the effects that it does it by.
     """
 
     title: str
@@ -58,8 +58,8 @@ class Archetype(Frozen):
     common: float = 0.0
     unknown: bool = False
     force: str = ""
-    wishes: tuple[str, ...]
-    parts: Annotated[tuple[Part, ...], Field(max_length=20)]
+    requirements: tuple[str, ...]
+    effects: Annotated[tuple[ArchetypeEffect, ...], Field(max_length=20)]
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -73,9 +73,11 @@ class Archetype(Frozen):
                 raise ValueError(f"shape.{name} must be {'a number' if number else 'a word'}")
             if isinstance(value, tuple) and value[0] > value[1]:
                 raise ValueError(f"shape.{name} must be [least, most]")
-        for wish in self.wishes:
-            if wish not in WISHES:
-                raise ValueError(f"wishes: '{wish}' is none of {', '.join(WISHES)}")
+        for requirement in self.requirements:
+            if requirement not in REQUIREMENTS:
+                raise ValueError(
+                    f"requirements: '{requirement}' is none of {', '.join(REQUIREMENTS)}"
+                )
         if self.force and self.force not in forces():
             raise ValueError(f"force: '{self.force}' is none of {', '.join(forces())}")
         return self

@@ -38,7 +38,7 @@ class Seen:
     Attributes:
         behaviour: the facts.
         context: the joint.
-        number, most: the numbers that the wish names, 0 where it names none.
+        number, most: the numbers that the requirement names, 0 where it names none.
     """
 
     behaviour: Behaviour

@@ -16,8 +16,8 @@ from joda.field import evaluate
 from joda.profile import CHANNELS
 from joda.profile import Channel as Curves
 from joda.proposal import EffectProposal, Proposal, Strength
-from joda.propose.mend import rescale
-from joda.propose.wishes import LONGEST_CLAUSE
+from joda.propose.adjustment import rescale
+from joda.propose.requirements import LONGEST_CLAUSE
 from joda.scenes.context import Context
 from joda.template import Template
 

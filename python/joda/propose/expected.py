@@ -11,11 +11,11 @@ from pydantic import Field, field_validator
 from joda.component import Frozen
 from joda.interaction.behaviour import Behaviour
 from joda.profile import File
-from joda.propose.wishes import WISHES, Wanted, read_wishes, unmet
+from joda.propose.requirements import REQUIREMENTS, Requirement, read_requirements, unmet
 from joda.scenes.context import Context
 
 ENDING = ".expected.json"
-MOVES, OPENS = WISHES["moves"].says, "opens towards {}q"
+MOVES, OPENS = REQUIREMENTS["moves"].says, "opens towards {}q"
 
 
 class Expected(Frozen):
@@ -35,7 +35,7 @@ class Expected(Frozen):
     @classmethod
     def _read(cls, sentences: tuple[str, ...]) -> tuple[str, ...]:
         for sentence in sentences:
-            if len(read_wishes(sentence)) != 1:
+            if len(read_requirements(sentence)) != 1:
                 raise ValueError(
                     f"'{sentence}' is not one behaviour; give sentences as docs/generation.md "
                     "lists them, such as 'stays shut until it is pulled'"
@@ -43,15 +43,19 @@ class Expected(Frozen):
         return sentences
 
     @property
-    def wanted(self) -> list[Wanted]:
+    def wanted(self) -> list[Requirement]:
         """The behaviours; one that is named twice counts once."""
-        return list(dict.fromkeys(wish for one in self.behaviours for wish in read_wishes(one)))
+        return list(
+            dict.fromkeys(
+                requirement for one in self.behaviours for requirement in read_requirements(one)
+            )
+        )
 
     @property
     def sentences(self) -> list[str]:
         """All that is judged: besides the behaviours, that a hand can open and close it."""
         way = [OPENS.format(self.opens)] if self.opens else []
-        return [*way, MOVES, *(wish.sentence for wish in self.wanted)]
+        return [*way, MOVES, *(requirement.sentence for requirement in self.wanted)]
 
     def judge(self, behaved: Behaviour, context: Context) -> dict[str, str]:
         """Each of the sentences to what the joint does instead; empty where it is true."""

@@ -17,14 +17,14 @@ from joda.interaction.pulling import SLOW
 from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
 from joda.propose import Answer, Task, Turn
 from joda.propose.added import RISING, WISHED
+from joda.propose.adjustment import adjusted_strengths, rescale
 from joda.propose.archetype import Archetype
+from joda.propose.archetype_effects import ArchetypeEffect
 from joda.propose.checks import FELT, SOFT, share
 from joda.propose.complaints import revise
-from joda.propose.mend import mend, rescale
-from joda.propose.parts import Part
 from joda.propose.plausible import forces
 from joda.propose.recognise import Recognition, recognise, scale_doubt
-from joda.propose.wishes import WISHES, Wanted, read_wishes, state, unmet
+from joda.propose.requirements import REQUIREMENTS, Requirement, read_requirements, state, unmet
 from joda.scenes.context import Context
 
 APART = 0.785
@@ -39,10 +39,10 @@ EXCLUSIVE = {
     "closes_from", "closes_anywhere", "stays_put", "stays_half", "opens_past", "two_sides",
     "returns_to_middle", "clicks", "holds_between",
 }  # fmt: skip
-"""Wishes about the middle of the way: the user's replace those of the kind."""
+"""Requirements about the middle of the way: the user's replace those of the kind."""
 
 FORCEFUL = EXCLUSIVE | {"left_open", "takes", "free", "caught", "latched", "held_shut", "snaps"}
-"""Wishes that say how strong something is; without them it takes what such joints take."""
+"""Requirements that say how strong something is; without them it takes what such joints take."""
 
 CLOSES = {"closes_near", "closes_from", "closes_anywhere"}
 
@@ -66,7 +66,7 @@ class Offline:
         last = turns[-1]
         if last.complaint:
             return Answer(self._revised(task, last), recognised=found)
-        wanted = read_wishes(last.proposal.whole_motion_descrptn)
+        wanted = read_requirements(last.proposal.whole_motion_descrptn)
         lacking = unmet(wanted, last.behaviour, task.context)
         if not lacking:
             return Answer(None, recognised=found)
@@ -81,16 +81,17 @@ class Offline:
             mended = self._mended(mended, task, wanted)
         return Answer(None if mended == last.proposal else mended, recognised=found)
 
-    def _mended(self, proposal: Proposal, task: Task, wanted: Sequence[Wanted]) -> Proposal:
-        """With strengths that fulfil the wishes, and further effects where strengths cannot."""
+    def _mended(self, proposal: Proposal, task: Task, wanted: Sequence[Requirement]) -> Proposal:
+        """With strengths that fulfil the requirements, and further effects where strengths cannot.
+        """
         arguments = task.context, task.templates, wanted, self.key
-        mended, hopeless = mend(proposal, *arguments)
+        mended, hopeless = adjusted_strengths(proposal, *arguments)
         added = [part for name in sorted(hopeless & WISHED.keys()) for part in WISHED[name]]
         if added:
             there = {_place(effect) for effect in proposal.effect_proposals}
             more = _effects(added, task.context, wanted, 0.3)
             more = tuple(effect for effect in more if _place(effect) not in there)
-            mended, _ = mend(_with(proposal, more), *arguments)
+            mended, _ = adjusted_strengths(_with(proposal, more), *arguments)
         return mended
 
     def _revised(self, task: Task, last: Turn) -> Proposal:
@@ -101,17 +102,21 @@ class Offline:
         except JodaError:
             said = last.complaint
             # "It does not stay open" asks for just that; "it should not" for the opposite.
-            asked = read_wishes(said)
+            asked = read_requirements(said)
             if not FORBIDS.search(said.lower()):
-                asked = [wish for wish in asked if not WISHES[wish.name].denies]
-                asked += read_wishes(said, refused=True)
+                asked = [
+                    requirement
+                    for requirement in asked
+                    if not REQUIREMENTS[requirement.name].denies
+                ]
+                asked += read_requirements(said, refused=True)
             if not asked:
                 raise
         asked = _counted(asked, task.context)
-        names = {wish.name for wish in asked}
+        names = {requirement.name for requirement in asked}
         gone = names | _conflicting(names)
-        old = read_wishes(last.proposal.whole_motion_descrptn)
-        wanted = [wish for wish in old if wish.name not in gone] + asked
+        old = read_requirements(last.proposal.whole_motion_descrptn)
+        wanted = [requirement for requirement in old if requirement.name not in gone] + asked
         stated = last.proposal.model_copy(update={"whole_motion_descrptn": state(wanted)})
         if not unmet(asked, last.behaviour, task.context):
             raise JodaError(f"in simulation {state(asked).lower().rstrip('.')} already.")
@@ -134,38 +139,42 @@ class Offline:
         proposal = Proposal(
             joint_summary=summary, whole_motion_descrptn=state(wanted), effect_proposals=effects
         )
-        if any(wish.name in RISING for wish in wanted):  # one pull in two parts, drawn apart
-            proposal, _ = mend(proposal, context, task.templates, wanted, self.key)
+        if any(
+            requirement.name in RISING for requirement in wanted
+        ):  # one pull in two parts, drawn apart
+            proposal, _ = adjusted_strengths(proposal, context, task.templates, wanted, self.key)
         return proposal
 
 
-def _plan(kind: Archetype, context: Context, description: str) -> tuple[list[Wanted], list[Part]]:
-    """Wishes and parts: the user's, and those of the kind that do not contradict them."""
-    asked = {wish.name: wish for wish in read_wishes(description)}
-    denied = {wish.name for wish in read_wishes(description, refused=True)}
+def _plan(
+    kind: Archetype, context: Context, description: str
+) -> tuple[list[Requirement], list[ArchetypeEffect]]:
+    """Requirements and parts: the user's, and those of the kind that do not contradict them."""
+    asked = {requirement.name: requirement for requirement in read_requirements(description)}
+    denied = {requirement.name for requirement in read_requirements(description, refused=True)}
     dropped = denied | _conflicting(asked.keys())
-    wanted = [Wanted(name) for name in kind.wishes if name not in dropped | asked.keys()]
+    wanted = [Requirement(name) for name in kind.requirements if name not in dropped | asked.keys()]
     wanted += asked.values()
-    names = {wish.name for wish in wanted}
-    parts = [part for part in kind.parts if not part.serves or names & set(part.serves)]
-    served = {name for part in parts for name in part.serves} | set(kind.wishes) - dropped
+    names = {requirement.name for requirement in wanted}
+    parts = [part for part in kind.effects if not part.serves or names & set(part.serves)]
+    served = {name for part in parts for name in part.serves} | set(kind.requirements) - dropped
     added = [part for name in asked if name not in served for part in WISHED.get(name, ())]
     taken = {name for part in added for name in part.serves}
     parts = [part for part in parts if not part.serves or set(part.serves) - taken]
     if kind.force and not asked.keys() & FORCEFUL:
-        usual = forces()[kind.force].wanted([wish.name for wish in wanted], context)
-        wanted += [wish for wish in usual if wish.name not in asked]
+        usual = forces()[kind.force].wanted([requirement.name for requirement in wanted], context)
+        wanted += [requirement for requirement in usual if requirement.name not in asked]
     return _counted(wanted, context), parts + added
 
 
-def _counted(wanted: Sequence[Wanted], context: Context) -> list[Wanted]:
+def _counted(wanted: Sequence[Requirement], context: Context) -> list[Requirement]:
     """With a number of positions, where nobody says how many."""
     count = _positions(context)
-    return [Wanted(w.name, w.number or count) if w.name == "clicks" else w for w in wanted]
+    return [Requirement(w.name, w.number or count) if w.name == "clicks" else w for w in wanted]
 
 
 def _conflicting(names: AbstractSet[str]) -> set[str]:
-    """The wishes that these leave no room for."""
+    """The requirements that these leave no room for."""
     out = EXCLUSIVE if names & EXCLUSIVE else set()
     if "closes_anywhere" in names:
         out = out | {"stays_open"}
@@ -182,14 +191,17 @@ def _positions(context: Context) -> int:
     return min(max(round((hi - lo) / APART) + 1, 2), 12) if context.joint.type == "hinge" else 3
 
 
-def _number(wanted: Sequence[Wanted], name: str) -> float:
-    return next((wish.number for wish in wanted if wish.name == name), 0)
+def _number(wanted: Sequence[Requirement], name: str) -> float:
+    return next((requirement.number for requirement in wanted if requirement.name == name), 0)
 
 
 def _effects(
-    parts: Sequence[Part], context: Context, wanted: Sequence[Wanted], confidence: float
+    parts: Sequence[ArchetypeEffect],
+    context: Context,
+    wanted: Sequence[Requirement],
+    confidence: float,
 ) -> tuple[EffectProposal, ...]:
-    """Parts placed on the joint's own range, as many and as far as the wishes say."""
+    """Parts placed on the joint's own range, as many and as far as the requirements say."""
     mirrored = context.closed_end == "high_end"
     words = {
         "closed": "high_end" if mirrored else "low_end",
@@ -220,7 +232,7 @@ def _effects(
     return tuple(out)
 
 
-def _spread(part: Part, positions: int) -> list[tuple[str, tuple[float, float]]]:
+def _spread(part: ArchetypeEffect, positions: int) -> list[tuple[str, tuple[float, float]]]:
     """A part's effects: `detents` are one at each position, springs at the ends of the way."""
     if part.effect != "detents":
         return [(part.effect, part.place)]
@@ -242,9 +254,16 @@ def _with(proposal: Proposal, effects: Sequence[EffectProposal]) -> Proposal:
     return proposal.model_copy(update={"effect_proposals": (*proposal.effect_proposals, *effects)})
 
 
-def _slow(wanted: Sequence[Wanted]) -> list[tuple[str, float]]:
-    """The wishes that it shuts slowly, and at how many m/s at most."""
-    return [("soft", SOFT), *((wish.name, wish.most) for wish in wanted if wish.name == "arrives")]
+def _slow(wanted: Sequence[Requirement]) -> list[tuple[str, float]]:
+    """The requirements that it shuts slowly, and at how many m/s at most."""
+    return [
+        ("soft", SOFT),
+        *(
+            (requirement.name, requirement.most)
+            for requirement in wanted
+            if requirement.name == "arrives"
+        ),
+    ]
 
 
 def _softer(proposal: Proposal, context: Context, last: Turn, limit: float) -> Proposal:
@@ -279,9 +298,12 @@ def _lighter(proposal: Proposal, context: Context, last: Turn) -> Proposal:
     return proposal.model_copy(update={"effect_proposals": tuple(effects)})
 
 
-def _less_damped(proposal: Proposal, context: Context, wanted: Sequence[Wanted]) -> Proposal:
+def _less_damped(proposal: Proposal, context: Context, wanted: Sequence[Requirement]) -> Proposal:
     """Damping that leaves a slow hand at least half of the most that opening may take."""
-    most = next(wish.most for wish in wanted if wish.name == "takes") * context.lever_arm
+    most = (
+        next(requirement.most for requirement in wanted if requirement.name == "takes")
+        * context.lever_arm
+    )
     span = float(np.ptp(context.joint.range))
     allowed = 0.3 * most * SLOW / span
     reference = reference_scales(context)["damping"]

@@ -13,15 +13,15 @@ import numpy as np
 from pydantic import model_validator
 
 from joda.component import Frozen
-from joda.propose.wishes import Wanted
+from joda.propose.requirements import Requirement
 from joda.scenes.context import Context
 
 Basis = Literal["standard", "measured", "estimate"]
 
 CLOSING = {"closes_near", "closes_from", "closes_anywhere", "falls_shut"}
-"""Wishes of a joint that closes by itself, from somewhere."""
+"""Requirements of a joint that closes by itself, from somewhere."""
 STAYING = {"stays_put", "stays_half"}
-"""Wishes of a joint that holds on its way."""
+"""Requirements of a joint that holds on its way."""
 
 
 class Said(Frozen):
@@ -69,23 +69,23 @@ class Force(Said):
     shuts: Shuts | None = None
     holds: Holds | None = None
 
-    def wanted(self, names: Collection[str], context: Context) -> list[Wanted]:
-        """What a joint of which such wishes are stated must keep besides.
+    def wanted(self, names: Collection[str], context: Context) -> list[Requirement]:
+        """What a joint of which such requirements are stated must keep besides.
 
         Args:
-            names: of the wishes.
+            names: of the requirements.
             context: the joint.
         """
-        out = [Wanted("takes", *self.opening)]
+        out = [Requirement("takes", *self.opening)]
         if self.shuts and CLOSING & set(names):
-            out.append(Wanted("arrives", most=self.shuts.most))
+            out.append(Requirement("arrives", most=self.shuts.most))
         if self.holds and STAYING & set(names) and self.reached(context):
-            out.append(Wanted("holds_between", *self.holds.between))
+            out.append(Requirement("holds_between", *self.holds.between))
         return out
 
-    def by(self, wish: str) -> str:
-        """Who says what such a wish is about."""
-        said = {"arrives": self.shuts, "holds_between": self.holds}.get(wish) or self
+    def by(self, requirement: str) -> str:
+        """Who says what such a requirement is about."""
+        said = {"arrives": self.shuts, "holds_between": self.holds}.get(requirement) or self
         return said.source or "an estimate"
 
     def reached(self, context: Context) -> bool:

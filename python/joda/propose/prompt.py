@@ -19,7 +19,7 @@ from joda.errors import JodaError
 from joda.profile import CHANNELS
 from joda.propose import Task, Turn
 from joda.propose.replies import closed_object, schema
-from joda.propose.wishes import WISHES
+from joda.propose.requirements import REQUIREMENTS
 from joda.scenes.context import Context
 from joda.template import Template
 
@@ -113,7 +113,7 @@ def system(templates: Mapping[str, Template]) -> str:
         for label, (low, high) in BANDS.items()
     )
     effects = "\n".join(_effect(template) for template in templates.values())
-    checked = [wish.says for name, wish in WISHES.items() if name != "moves"]
+    checked = [requirement.says for name, requirement in REQUIREMENTS.items() if name != "moves"]
     behaviours = "\n".join(f"- it {says.format(number='N', most='M')}" for says in checked)
     return "\n".join(
         (
@@ -161,9 +161,9 @@ def _references(context: Context) -> str:
 
 
 def _round(number: int, turn: Turn) -> str:
-    unmet = [f"- {wish}" for wish in turn.unmet] or ["(none)"]
+    unmet = [f"- {requirement}" for requirement in turn.unmet] or ["(none)"]
     parts = [f"# Result of round {number}", "## Simulated", turn.facts.strip()]
-    parts += ["## Wishes not met", "\n".join(unmet)]
+    parts += ["## Requirements not met", "\n".join(unmet)]
     if turn.complaint:
         parts += ["## The user", _read("revision", complaint=turn.complaint.strip())]
     return "\n\n".join(parts)

@@ -34,8 +34,8 @@ from joda.propose.archetype import Archetype, read_archetypes
 from joda.propose.history import Failure, History, Round
 from joda.propose.plausible import CLOSING, STAYING
 from joda.propose.recognise import recognise
+from joda.propose.requirements import Requirement, read_requirements, unmet
 from joda.propose.sketch import sketch
-from joda.propose.wishes import Wanted, read_wishes, unmet
 from joda.scenes.attaching import attach
 from joda.scenes.context import Context, context
 from joda.template import read_templates
@@ -261,18 +261,27 @@ class Session:
         """What comes of an answer; raises JodaError if nothing does."""
         proposal = answer.proposal
         if proposal is None:
-            wish = f" for '{complaint}'" if complaint else ""
-            raise JodaError(f"{proposer} has nothing to propose{wish}; choose another proposer.")
+            requirement = f" for '{complaint}'" if complaint else ""
+            raise JodaError(
+                f"{proposer} has nothing to propose{requirement}; choose another proposer."
+            )
         self.progress("simulating the proposal")
         profile = self._compiled(proposal)
         behaved = behaviour(self.context, profile, self._around)
-        wanted = read_wishes(proposal.whole_motion_descrptn)
+        wanted = read_requirements(proposal.whole_motion_descrptn)
         # what was asked for at first may be what the user has complained about since
         heard = complaint or any(round.complaint for round in self.history.rounds)
         said = "" if heard else self.history.description
-        every = [*wanted, *(wish for wish in read_wishes(said) if wish not in wanted)]
+        every = [
+            *wanted,
+            *(requirement for requirement in read_requirements(said) if requirement not in wanted),
+        ]
         lacking = unmet(every, behaved, self.context)
-        came = (wish.sentence for wish in (Wanted("moves"), *every) if wish.name not in lacking)
+        came = (
+            requirement.sentence
+            for requirement in (Requirement("moves"), *every)
+            if requirement.name not in lacking
+        )
         met = tuple(f"It {sentence}." for sentence in came)
         round = Round(
             number=len(self.history.rounds) + 1,
@@ -301,31 +310,31 @@ class Session:
         found = recognise(self.context, self.history.description, self.task.archetypes)[1]
         if found.force is None or found.likely < SURE:
             return ()
-        asked = read_wishes(self.history.description)  # the user knows better where it holds
+        asked = read_requirements(self.history.description)  # the user knows better where it holds
         told = found.force.wanted(CLOSING if asked else CLOSING | STAYING, self.context)
         doubts = [
-            f"which {wish.sentence} ({found.force.by(wish.name)}), but {instead}"
-            for wish in told
-            if (instead := wish.instead(behaved, self.context))
+            f"which {requirement.sentence} ({found.force.by(requirement.name)}), but {instead}"
+            for requirement in told
+            if (instead := requirement.instead(behaved, self.context))
         ]
         looks = f"It looks like a {found.title} ({found.likely:.0%}), {'; and '.join(doubts)}."
         return (looks,) if doubts else ()
 
     def _hindered(
-        self, profile: Profile, every: Sequence[Wanted], lacking: Mapping[str, str]
+        self, profile: Profile, every: Sequence[Requirement], lacking: Mapping[str, str]
     ) -> tuple[str, ...]:
         """What of the lacking the joint would do by itself: the scene is in the way of that."""
         if not self._around or not lacking:
             return ()
         alone = unmet(every, behaviour(self.context, profile), self.context)
-        wishes = [wish.sentence for wish in (Wanted("moves"), *every)
-                  if wish.name in lacking.keys() - alone.keys()]  # fmt: skip
+        requirements = [requirement.sentence for requirement in (Requirement("moves"), *every)
+                  if requirement.name in lacking.keys() - alone.keys()]  # fmt: skip
         return (
             (
-                f"By itself it {', '.join(wishes)}; what forbids that is the scene: "
+                f"By itself it {', '.join(requirements)}; what forbids that is the scene: "
                 f"{self._around.words}{self._around.remedy}.",
             )
-            if wishes
+            if requirements
             else ()
         )
 

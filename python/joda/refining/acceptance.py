@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.diagnosis.mending import Error
+from joda.diagnosis.adding import Error
 from joda.diagnosis.plausible import Needs, implausible
 from joda.field import evaluate
 from joda.measured.errors import MULTIPLE

@@ -1,29 +1,29 @@
 """Fits a profile between the jumps of its force, and then the places of the jumps.
 
 A joint crosses a jump in one step or in the next: what it does then is a staircase in every number
-and in every start, on which slopes lead nowhere. Windows that keep clear of all jumps are smooth
+and in every start, on which slopes lead nowhere. Segments that keep clear of all jumps are smooth
 in the numbers even if they are long. They are fitted with the jumps held; then each jump is moved
-to where short windows over it are missed least.
+to where short segments over it are missed least.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.judge import Judge
-from joda.diagnosis.windows import Windows
+from joda.estimation.estimator import SegmentEstimator
+from joda.estimation.segments import Segments
 from joda.field import evaluate
 from joda.profile import CHANNELS
 from joda.refining.shooting import LEAST as FEWEST
-from joda.refining.shooting import Shooting, Told
+from joda.refining.shooting import Progress, Shooting
 
 Array = NDArray[np.float64]
 
 LENGTHS = (0.4, 0.2, 0.1)
-"""Lengths of windows, s: the longest is taken that leaves enough of them clear of jumps."""
+"""Lengths of segments, s: the longest is taken that leaves enough of them clear of jumps."""
 ENOUGH = 0.2
 """Share of the samples that is."""
 CLEAR = 0.01
-"""How far from a jump a window is clear of it, in normalised position."""
+"""How far from a jump a segment is clear of it, in normalised position."""
 SIDE = 1e-6
 """How far from a place its two sides are, in normalised position."""
 HELD = 1e-4
@@ -35,8 +35,8 @@ STEPS = 4
 LESS = 4.0
 """By how much the loss must fall for a jump to be moved: two standard deviations."""
 MUCH = 1.2
-"""How many times as large the loss of short windows is where numbers are much worse: what crosses a
-jump is by chance missed more or less."""
+"""How many times as large the loss of short segments is where numbers are much worse: what crosses
+a jump is by chance missed more or less."""
 CHANCE = 3.0
 """By how much per number the loss of two good fits may differ by chance."""
 
@@ -48,13 +48,13 @@ class Between:
         """Takes what simulates the joint, and what of its profile may change."""
         self.shooting, self.parameters = shooting, shooting.parameters
 
-    def fit(self, theta: Array, iterations: int, told: Told) -> Array:
+    def fit(self, theta: Array, iterations: int, told: Progress) -> Array:
         """The numbers with the least misfit, shape (n,).
 
         Args:
             theta: where to begin, shape (n,).
             iterations: at most so many; each fits all numbers once, or moves jumps by one size.
-            told: see `Told`.
+            told: see `Progress`.
         """
         moves = MOVES if iterations > len(MOVES) + 1 and len(self._ends(theta)) else ()
         rest = iterations - len(moves)
@@ -64,32 +64,32 @@ class Between:
         return self._smooth(theta, rest // 2, told)
 
     def worse(self, theta: Array, than: Array) -> bool:
-        """Whether numbers miss windows between the jumps by more than others and chance do, or
+        """Whether numbers miss segments between the jumps by more than others and chance do, or
         short ones anywhere by much more."""
-        judge, every = self._clear(than), self.shooting.judge(LENGTHS[-1])
-        loss, least = self._loss(judge, theta), self._loss(judge, than)
-        usual = least / max(int(judge.windows.count[judge.counts].sum()), 1)
+        estimator, every = self._clear(than), self.shooting.estimator(LENGTHS[-1])
+        loss, least = self._loss(estimator, theta), self._loss(estimator, than)
+        usual = least / max(int(estimator.segments.count[estimator.counts].sum()), 1)
         if loss > least + CHANCE * len(theta) * max(usual, 1.0):
             return True
         return self._loss(every, theta) > MUCH * self._loss(every, than)
 
-    def _smooth(self, theta: Array, iterations: int, told: Told) -> Array:
-        """Gauss-Newton over windows between the jumps, which are held."""
-        judge = self._clear(theta)
-        if not judge.counts.any():
+    def _smooth(self, theta: Array, iterations: int, told: Progress) -> Array:
+        """Gauss-Newton over segments between the jumps, which are held."""
+        estimator = self._clear(theta)
+        if not estimator.counts.any():
             return theta
         held = np.isin(np.arange(len(theta)), self._ends(theta))
         mean = np.where(held, theta, self.parameters.start)
-        doubt = np.where(held, HELD, 1.0) * self.parameters.doubt
-        return self.shooting.fit_windows(judge, theta, doubt, iterations, told, mean)
+        prior_std = np.where(held, HELD, 1.0) * self.parameters.prior_std
+        return self.shooting.fit_windows(estimator, theta, prior_std, iterations, told, mean)
 
-    def _moved(self, theta: Array, move: float, told: Told) -> Array:
-        """Each jump in turn where short windows over it are missed least, in steps of one size."""
+    def _moved(self, theta: Array, move: float, told: Progress) -> Array:
+        """Each jump in turn where short segments over it are missed least, in steps of one size."""
         G, h = self.parameters.constraints.G, self.parameters.constraints.h
-        windows, ends = self.shooting.engine.windows(LENGTHS[-1]), self._ends(theta)
-        over = self._meet(windows, theta[ends], CLEAR + STEPS * move)
-        judge = self.shooting.engine.judge(windows, over & (windows.count >= FEWEST))
-        best = judge.started(self.shooting.mover(theta))
+        segments, ends = self.shooting.engine.segments(LENGTHS[-1]), self._ends(theta)
+        over = self._meet(segments, theta[ends], CLEAR + STEPS * move)
+        estimator = self.shooting.engine.estimator(segments, over & (segments.count >= FEWEST))
+        best = estimator.started(self.shooting.mover(theta))
         for end in ends:
             about = theta
             for step in (*range(-STEPS, 0), *range(1, STEPS + 1)):
@@ -97,17 +97,17 @@ class Between:
                 trial[end] += step * move
                 if np.any(G @ trial < h):
                     continue
-                new = judge.started(self.shooting.mover(trial))
+                new = estimator.started(self.shooting.mover(trial))
                 if new.loss < best.loss - LESS:
                     theta, best = trial, new
-        told(theta, self.shooting.robust(judge, best))
+        told(theta, self.shooting.robust(estimator, best))
         return theta
 
     def _jumps(self, theta: Array) -> dict[tuple[str, int, int], float]:
         """Ends of intervals, by channel, component and 0 or 1, where a curve jumps by so much that
         to cross it a step earlier moves the joint by more than the noise: normalised positions."""
         engine = self.shooting.engine
-        starts = engine.windows(LENGTHS[-1]).start
+        starts = engine.segments(LENGTHS[-1]).start
         speed = float(np.sqrt(np.mean(starts[:, 1] ** 2)))
         moved = engine.h * LENGTHS[0] / engine.inertia
         channels = self.parameters.written(theta, exact=True).channels
@@ -128,29 +128,29 @@ class Between:
         ends = [k for k, slot in enumerate(slots) if slot.kind == "intervals"]
         return [k for k in ends if (slots[k].channel, slots[k].component, slots[k].index) in jumps]
 
-    def _clear(self, theta: Array) -> Judge:
-        """Of windows between the jumps."""
+    def _clear(self, theta: Array) -> SegmentEstimator:
+        """Of segments between the jumps."""
         jumps = np.array(list(self._jumps(theta).values()))
         for length in LENGTHS:
-            windows = self.shooting.engine.windows(length)
-            clear = ~self._meet(windows, jumps, CLEAR)
-            judge = self.shooting.engine.judge(
-                windows, clear & (windows.count >= FEWEST), apart=True
+            segments = self.shooting.engine.segments(length)
+            clear = ~self._meet(segments, jumps, CLEAR)
+            estimator = self.shooting.engine.estimator(
+                segments, clear & (segments.count >= FEWEST), apart=True
             )
-            if windows.count[judge.counts].sum() > ENOUGH * windows.count.sum():
+            if segments.count[estimator.counts].sum() > ENOUGH * segments.count.sum():
                 break
-        return judge
+        return estimator
 
-    def _meet(self, windows: Windows, places: Array, near: float) -> NDArray[np.bool_]:
-        """Which windows come near one of some places, in normalised position."""
+    def _meet(self, segments: Segments, places: Array, near: float) -> NDArray[np.bool_]:
+        """Which segments come near one of some places, in normalised position."""
         lo, hi = self.parameters.profile.joint.range
-        s, real = (windows.position[windows.rows] - lo) / (hi - lo), windows.rows >= 0
+        s, real = (segments.position[segments.rows] - lo) / (hi - lo), segments.rows >= 0
         first = np.where(real, s, np.inf).min(axis=1, initial=np.inf)[:, None]
         last = np.where(real, s, -np.inf).max(axis=1, initial=-np.inf)[:, None]
         between = (first - near < places) & (places < last + near)
         return np.asarray(between.any(axis=1))
 
-    def _loss(self, judge: Judge, theta: Array) -> float:
-        """Of windows, and of being off the first numbers."""
-        off = (theta - self.parameters.start) / self.parameters.doubt
-        return judge.started(self.shooting.mover(theta)).loss + float(off @ off)
+    def _loss(self, estimator: SegmentEstimator, theta: Array) -> float:
+        """Of segments, and of being off the first numbers."""
+        off = (theta - self.parameters.start) / self.parameters.prior_std
+        return estimator.started(self.shooting.mover(theta)).loss + float(off @ off)

@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.joints.least_squares import Fit, levenberg_marquardt
-from joda.joints.parameters import Parameters
-from joda.measured.gauge import gauged, static_force
+from joda.estimation.least_squares import Fit, levenberg_marquardt
+from joda.estimation.profile_parameters import Parameters
+from joda.measured.quasi_static import gauged, static_force
 from joda.measured.runs import QuasiStatic
 from joda.profile import Profile
 from joda.scenes.context import Context
@@ -124,7 +124,7 @@ class CurveProblem:
 
     def _residuals(self, theta: Array, sigma: float) -> Array:
         """Of samples and of the prior."""
-        prior = (theta - self.parameters.start) / self.parameters.doubt
+        prior = (theta - self.parameters.start) / self.parameters.prior_std
         return np.concatenate([self._misfit(theta) / sigma, prior])
 
     def _slopes(self, theta: Array, sigma: float) -> Array:
@@ -132,7 +132,7 @@ class CurveProblem:
         steps = NUDGE * np.eye(len(theta))
         pairs = ((self._misfit(theta + d), self._misfit(theta - d)) for d in steps)
         by_number = np.stack([(up - down) / (2 * NUDGE * sigma) for up, down in pairs], axis=1)
-        return np.vstack([by_number, np.diag(1 / self.parameters.doubt)])
+        return np.vstack([by_number, np.diag(1 / self.parameters.prior_std)])
 
 
 def _share(position: Array) -> Array:

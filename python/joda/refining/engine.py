@@ -7,12 +7,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._core import Solo
-from joda.diagnosis.cutting import windows_of
-from joda.diagnosis.judge import Judge
-from joda.diagnosis.windows import Mover, Windows
-from joda.joints.parameters import Parameters
-from joda.joints.single import Single
+from joda._core import JointSimulator
+from joda.estimation.estimator import SegmentEstimator
+from joda.estimation.profile_parameters import Parameters
+from joda.estimation.segmentation import segments_of
+from joda.estimation.segments import Segments, Simulator
+from joda.joints.joint_model import JointModel
 from joda.measured import smoothing
 from joda.measured.runs import Run
 from joda.profile import Profile
@@ -56,16 +56,18 @@ class Engine(Protocol):
     @property
     def range(self) -> tuple[float, float]: ...  # noqa: D102
 
-    def mover(self, parameters: Parameters, theta: Array) -> Mover:
+    def mover(self, parameters: Parameters, theta: Array) -> Simulator:
         """It with numbers of the joint's profile."""
         ...
 
-    def windows(self, length: float) -> Windows:
-        """The runs in windows of some length, s."""
+    def segments(self, length: float) -> Segments:
+        """The runs in segments of some length, s."""
         ...
 
-    def judge(self, windows: Windows, counts: NDArray[np.bool_], apart: bool = False) -> Judge:
-        """Fits it to windows, see `Judge`."""
+    def estimator(
+        self, segments: Segments, counts: NDArray[np.bool_], apart: bool = False
+    ) -> SegmentEstimator:
+        """Fits it to segments, see `SegmentEstimator`."""
         ...
 
 
@@ -74,52 +76,54 @@ class JointEngine:
     """A joint by itself in C++, all others held; slopes are differences.
 
     Attributes:
-        single: the joint.
+        joint_model: the joint.
         range, runs, sigma, h: see `Engine`.
         whole: what makes all that acts on the joint of its profile.
     """
 
-    single: Single
+    joint_model: JointModel
     range: tuple[float, float]
     runs: Sequence[Run]
     sigma: float
     h: float
     whole: Callable[[Profile], Profile] = lambda profile: profile
-    _cut: dict[float, Windows] = field(default_factory=dict, init=False, repr=False)
+    _cut: dict[float, Segments] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def inertia(self) -> float:
         """See `Engine`."""
-        return self.single.inertia
+        return self.joint_model.inertia
 
-    def body(self, parameters: Parameters, theta: Array) -> Single:
+    def body(self, parameters: Parameters, theta: Array) -> JointModel:
         """All of the joint but its profile, with its numbers."""
-        old, ratio = self.single, float(np.exp(parameters.number(theta, "damping_ratio")))
+        old, ratio = self.joint_model, float(np.exp(parameters.number(theta, "damping_ratio")))
         return replace(
             old,
             inertia=old.inertia * float(np.exp(parameters.number(theta, "inertia"))),
             solref=(old.solref[0], old.solref[1] * ratio),
         )
 
-    def mover(self, parameters: Parameters, theta: Array) -> Solo:
+    def mover(self, parameters: Parameters, theta: Array) -> JointSimulator:
         """See `Engine`."""
         profile = self.whole(parameters.written(theta, exact=True))
         # a restitution of both ends is in the solver parameters already
         kept = tuple(e for e in profile.effects if e.key != "end_stop_restitution both")
-        return self.body(parameters, theta).solo(
+        return self.body(parameters, theta).simulator(
             profile.model_copy(update={"effects": kept}), self.h
         )
 
-    def windows(self, length: float) -> Windows:
+    def segments(self, length: float) -> Segments:
         """See `Engine`."""
         if length not in self._cut:
-            (lo, hi), own = self.range, self.single.inertia
+            (lo, hi), own = self.range, self.joint_model.inertia
             sigmas = [self.sigma] * len(self.runs)
-            self._cut[length] = windows_of(
+            self._cut[length] = segments_of(
                 self.runs, sigmas, hi - lo, lo, own, self.h, length, fine=False
             )
         return self._cut[length]
 
-    def judge(self, windows: Windows, counts: NDArray[np.bool_], apart: bool = False) -> Judge:
+    def estimator(
+        self, segments: Segments, counts: NDArray[np.bool_], apart: bool = False
+    ) -> SegmentEstimator:
         """See `Engine`."""
-        return Judge(windows, counts, apart)
+        return SegmentEstimator(segments, counts, apart)

@@ -1,8 +1,8 @@
 """Fits the numbers of a joint's profile to measured motions.
 
-First over short windows, each from its own measured start, so that errors do not pile up and the
+First over short segments, each from its own measured start, so that errors do not pile up and the
 misfit stays smooth in the numbers: the components' sizes, then all; then over longer ones; then
-between the jumps of the force (`joda.refining.between`); then over windows that must join into
+between the jumps of the force (`joda.refining.between`); then over segments that must join into
 whole runs (multiple shooting: Bock 1983). The starts are fitted too, within their measurement's
 error. What the motion does not show is held by a prior at its first value, of the size found.
 """
@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.judge import Judge
-from joda.diagnosis.mending import Error
-from joda.joints.least_squares import Fit
-from joda.joints.parameters import Parameters
+from joda.diagnosis.adding import Error
+from joda.estimation.estimator import SegmentEstimator
+from joda.estimation.least_squares import Fit
+from joda.estimation.profile_parameters import Parameters
 from joda.measured.runs import known
 from joda.refining.between import Between
 from joda.refining.engine import Engine
@@ -26,24 +26,24 @@ from joda.refining.sizes import sized
 Array = NDArray[np.float64]
 
 SHORT, LONG = 0.1, 0.4
-"""Lengths of windows, s."""
+"""Lengths of segments, s."""
 MOST = 150
-"""Most windows; long measurements get longer ones."""
+"""Most segments; long measurements get longer ones."""
 HELD = 0.01
 """How much less than later the ends of intervals may move at first."""
 FIRST = 6
-"""Iterations at most with short windows, the ends of intervals held."""
+"""Iterations at most with short segments, the ends of intervals held."""
 TURNS, SETTLED = 2, 0.98
-"""How often at most short and long windows take turns, and the share of their misfit that must be
+"""How often at most short and long segments take turns, and the share of their misfit that must be
 left for the last turn."""
 MANY = 20
 """Fewest iterations that are to be had for sizes to be fitted first."""
 STUCK = 1.5
-"""Short windows that are missed by more than so many times the noise: the fit may have stuck."""
+"""Short segments that are missed by more than so many times the noise: the fit may have stuck."""
 FOLLOWS = 0.01
-"""Whole runs that are missed by less than this, in ranges, need no windows any more."""
+"""Whole runs that are missed by less than this, in ranges, need no segments any more."""
 BETWEEN = 12
-"""Iterations at most with windows between the jumps."""
+"""Iterations at most with segments between the jumps."""
 MISSED = 1.2
 """Whole runs that are missed by more than so many times the noise leave something to fit."""
 
@@ -71,7 +71,7 @@ class Problem:
         durations = [float(np.ptp(time)) for time, _ in self.runs]
         least = sum(durations) / MOST
         self.short, self.long, self.whole = (
-            self.shooting.judge(length)
+            self.shooting.estimator(length)
             for length in (max(SHORT, least), max(LONG, least), max(durations) + engine.h)
         )
 
@@ -87,15 +87,20 @@ class Problem:
     def error(self, theta: Array) -> Error:
         """How far the joint is off, from starts that are fitted."""
         missed = []
-        for judge in (self.whole, self.long):
-            rows, own = judge.windows.rows[judge.counts], sum(len(time) for time, _ in self.runs)
+        for estimator in (self.whole, self.long):
+            rows, own = (
+                estimator.segments.rows[estimator.counts],
+                sum(len(time) for time, _ in self.runs),
+            )
             kept = rows[(rows >= 0) & (rows < own)]
-            missed.append(float(np.sqrt(np.mean(self.shooting.misfit(judge, theta)[kept] ** 2))))
+            missed.append(
+                float(np.sqrt(np.mean(self.shooting.misfit(estimator, theta)[kept] ** 2)))
+            )
         return Error(*missed)
 
     def paths(self, theta: Array) -> list[Array]:
         """Predicted positions at the times of `runs`, from starts that are fitted."""
-        path = self.whole.windows.position + self.shooting.misfit(self.whole, theta)
+        path = self.whole.segments.position + self.shooting.misfit(self.whole, theta)
         return np.split(path, np.cumsum([len(time) for time, _ in self.runs]))[: len(self.runs)]
 
     def fit(
@@ -125,7 +130,7 @@ class Problem:
         return replace(again, history=history)
 
     def _missed(self, found: Fit) -> float:
-        """By how much short windows are missed, RMS, rad or m."""
+        """By how much short segments are missed, RMS, rad or m."""
         return self.shooting.rms(self.short, found.theta)
 
     def _fit(
@@ -134,9 +139,9 @@ class Problem:
         told: Callable[[str, int, float], None],
         sizes: bool,
     ) -> Fit:
-        """Fits short windows, longer ones, between the jumps, whole runs.
+        """Fits short segments, longer ones, between the jumps, whole runs.
 
-        Whole runs that nearly follow after the first windows need no more of them; only if some of
+        Whole runs that nearly follow after the first segments need no more of them; only if some of
         their misfit is left then, they are fitted between the jumps too.
 
         Args:
@@ -146,7 +151,7 @@ class Problem:
         history: list[tuple[str, float]] = []
         self._best = self.parameters.start
         interrupted = False
-        free = self.parameters.doubt
+        free = self.parameters.prior_std
         ends = np.array([slot.kind == "intervals" for slot in self.parameters.slots])
         held = np.where(ends, HELD * free, free)
 
@@ -155,10 +160,14 @@ class Problem:
             history.append((name, misfit))
             told(name, len(history), misfit)
 
-        def run(name: str, judge: Judge, most: int, doubt: Array = free) -> None:
+        def run(name: str, estimator: SegmentEstimator, most: int, prior_std: Array = free) -> None:
             if count := min(most, iterations - len(history)):
                 self.shooting.fit_windows(
-                    judge, self._best, doubt, count, lambda x, misfit: heard(name, x, misfit)
+                    estimator,
+                    self._best,
+                    prior_std,
+                    count,
+                    lambda x, misfit: heard(name, x, misfit),
                 )
 
         def between() -> None:
@@ -197,14 +206,18 @@ class Problem:
         covariance = self.shooting.covariance(self.long, self._best)
         return Fit(self._best, covariance, tuple(history), interrupted)
 
-    def _alternate(self, run: Callable[[str, Judge, int], None], iterations: int) -> None:
-        """Short and long windows in turn, their starts measured anew: each leaves the places where
+    def _alternate(
+        self, run: Callable[[str, SegmentEstimator, int], None], iterations: int
+    ) -> None:
+        """Short and long segments in turn, their starts measured anew: each leaves the places where
         the other gets stuck, at jumps and where the joint sticks. Keeps the best."""
         best, least = self._best, np.inf
         for _ in range(TURNS):
             run("short windows", self.short, max(iterations // 12, 1))
             run("long windows", self.long, max(iterations // 6, 1))
-            misfits = [self.shooting.rms(judge, self._best) for judge in (self.short, self.long)]
+            misfits = [
+                self.shooting.rms(estimator, self._best) for estimator in (self.short, self.long)
+            ]
             misfit = float(np.prod(misfits))
             if misfit < least:
                 best = self._best

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.estimation.least_squares import Fit
+from joda.estimation.profile_parameters import Parameters
 from joda.field import evaluate
-from joda.joints.least_squares import Fit
-from joda.joints.parameters import Parameters
 from joda.pictures.changes import draw_channels
 from joda.pictures.style import COLOURS, clean, house_style
 from joda.profile import CHANNELS, NOUNS, Profile
@@ -63,7 +63,7 @@ def unseen(
         covariance: of the fitted numbers.
         away: where no run was.
     """
-    prior = np.diag(parameters.doubt**2)
+    prior = np.diag(parameters.prior_std**2)
     out = {}
     slopes = _curve_slopes(parameters)
     nowhere = _within([(a, b) for a, b in away if b - a > NARROW])

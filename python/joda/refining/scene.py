@@ -10,10 +10,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from joda.diagnosis.cutting import starts, windows_of
-from joda.diagnosis.judge import Judge, Make, Unknowns
-from joda.diagnosis.windows import Mover, Windows
-from joda.joints.parameters import Parameters
+from joda.estimation.estimator import Make, SegmentEstimator
+from joda.estimation.profile_parameters import Parameters
+from joda.estimation.segmentation import segments_of, starts
+from joda.estimation.segments import Segments, Simulator
+from joda.estimation.unknowns import Unknowns
 from joda.measured import smoothing
 from joda.measured.runs import known
 from joda.measured.scene_log import SceneRun
@@ -55,11 +56,11 @@ class SceneMover:
     ) -> tuple[Array, Array]:
         """Positions before and after each step, of one joint after the other.
 
-        Friction begins anew in each window, without a load.
+        Friction begins anew in each segment, without a load.
 
         Args:
             force: all that is put into the scene at each step, shape (steps, inputs).
-            at: step at which each window begins, shape (m,).
+            at: step at which each segment begins, shape (m,).
             start: states there, shape (m, 2 joints).
             fresh, h, command: not used.
         """
@@ -69,12 +70,12 @@ class SceneMover:
         )
 
     def states(self, start: ArrayLike) -> Array:
-        """Starts of windows in rad or m, and per s."""
+        """Starts of segments in rad or m, and per s."""
         return np.asarray(start) * np.repeat(self.units, 2)
 
 
 def pieces(force: ArrayLike, at: ArrayLike) -> list[Array]:
-    """What is put into the scene in each window."""
+    """What is put into the scene in each segment."""
     return np.split(np.asarray(force), np.asarray(at)[1:])
 
 
@@ -84,41 +85,43 @@ def in_turn(paths: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class SceneJudge(Judge):
-    """Fits a scene to windows: slopes are the motion's derivatives, but differences by the places
+class SceneJudge(SegmentEstimator):
+    """Fits a scene to segments: slopes are the motion's derivatives, but differences by the places
     of jumps, which no motion along them shows."""
 
     def slopes(
         self,
         make: Make,
-        solo: Mover,
+        simulator: Simulator,
         unknowns: Unknowns,
         x: Array,
         start: Array,
         r: Array,
         central: bool,
     ) -> tuple[Array, Array]:
-        """See `Judge.slopes`."""
-        assert isinstance(solo, SceneMover)
-        windows, k = self.windows, len(x)
-        jumps = np.flatnonzero(solo.jumps[:k])
+        """See `SegmentEstimator.slopes`."""
+        assert isinstance(simulator, SceneMover)
+        segments, k = self.segments, len(x)
+        jumps = np.flatnonzero(simulator.jumps[:k])
         smooth = np.setdiff1d(np.arange(k), jumps)
         ways = [_way(make, x, number, unknowns.step[number]) for number in smooth]
-        turns = windows.doubt[:, None, :] * np.eye(start.shape[1]) * np.repeat(solo.units, 2)
-        put = pieces(windows.force, windows.at)
-        found = solo.scene.slopes(solo.numbers, ways, solo.states(start), turns, put)
+        turns = (
+            segments.prior_std[:, None, :] * np.eye(start.shape[1]) * np.repeat(simulator.units, 2)
+        )
+        put = pieces(segments.force, segments.at)
+        found = simulator.scene.slopes(simulator.numbers, ways, simulator.states(start), turns, put)
         before, after = (
-            in_turn(np.concatenate([one[a:b] for one in found]) / solo.units)
+            in_turn(np.concatenate([one[a:b] for one in found]) / simulator.units)
             for a, b in ((None, -1), (1, None))
         )
-        slopes = windows.weighed(windows.sampled(before, after))
+        slopes = segments.selection(segments.sampled(before, after))
         slopes = np.nan_to_num(np.clip(slopes, -STEEP, STEEP))
         J = np.zeros((*r.shape, k))
         J[:, :, smooth] = slopes[:, :, : len(smooth)]
         for number in jumps:
             off = unknowns.step[number] * np.eye(k)[number]
-            up, down = (windows.misfit(make(x + way * off), start) for way in (1, -1))
-            J[:, :, number] = windows.weighed(up - down) / (2 * unknowns.step[number])
+            up, down = (segments.misfit(make(x + way * off), start) for way in (1, -1))
+            J[:, :, number] = segments.selection(up - down) / (2 * unknowns.step[number])
         return J, slopes[:, :, len(smooth) :]
 
 
@@ -150,7 +153,7 @@ class SceneEngine:
     runs: Sequence[SceneRun]
     sigma: float
     inertia: float
-    _cut: dict[float, Windows] = field(default_factory=dict, init=False, repr=False)
+    _cut: dict[float, Segments] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def h(self) -> float:
@@ -181,25 +184,27 @@ class SceneEngine:
         numbers = self.scene.numbers({name: profile}, changed)
         return SceneMover(self.scene, numbers, self.units, _jumps(parameters))
 
-    def windows(self, length: float) -> Windows:
+    def segments(self, length: float) -> Segments:
         """See `Engine`."""
         if length not in self._cut:
             self._cut[length] = self._together(length)
         return self._cut[length]
 
-    def judge(self, windows: Windows, counts: NDArray[np.bool_], apart: bool = False) -> SceneJudge:
+    def estimator(
+        self, segments: Segments, counts: NDArray[np.bool_], apart: bool = False
+    ) -> SceneJudge:
         """See `Engine`."""
-        return SceneJudge(windows, counts, apart)
+        return SceneJudge(segments, counts, apart)
 
-    def _together(self, length: float) -> Windows:
-        """Windows of the fitted joint, with the other joints' samples after its own."""
+    def _together(self, length: float) -> Segments:
+        """Segments of the fitted joint, with the other joints' samples after its own."""
         lo, hi = self.range
         sigmas = [self.sigma] * len(self.runs)
-        own = windows_of(self.runs, sigmas, hi - lo, lo, self.inertia, self.h, length, fine=False)
+        own = segments_of(self.runs, sigmas, hi - lo, lo, self.inertia, self.h, length, fine=False)
         begun, ends = np.flatnonzero(own.fresh), len(own.force)
         parts = [(run, piece) for run in self.runs for piece in known(run)]
         firsts = np.append(own.at[begun], ends)
-        put, start, doubt, position = [], [own.start], [own.doubt], [own.position]
+        put, start, prior_std, position = [], [own.start], [own.prior_std], [own.position]
         for (run, piece), a, b in zip(parts, firsts[:-1], firsts[1:], strict=True):
             put.append(run.inputs(run.time[piece[0]] + self.h * np.arange(b - a + 1)))
         count, steps = len(own.position), len(own.force)
@@ -212,7 +217,7 @@ class SceneEngine:
                 states.append(starts(time, measured, at, self.sigma))
                 position.append(measured)
             start.append(np.concatenate([one for one, _ in states]))
-            doubt.append(np.concatenate([one for _, one in states]))
+            prior_std.append(np.concatenate([one for _, one in states]))
         others, same = range(1, len(self.units)), np.tile(own.rows, len(self.units))
         several = np.repeat(np.arange(len(self.units)), own.rows.shape[1])
         shared = np.zeros((len(own.at), same.shape[1], own.shared.shape[2]))
@@ -222,7 +227,7 @@ class SceneEngine:
             force=np.concatenate(put),
             command=None,
             start=np.concatenate(start, axis=1),
-            doubt=np.concatenate(doubt, axis=1),
+            prior_std=np.concatenate(prior_std, axis=1),
             step=np.concatenate([own.step, *(own.step + k * steps for k in others)]),
             share=np.tile(own.share, len(self.units)),
             position=np.concatenate(position),

@@ -1,22 +1,22 @@
-"""Fits numbers to windows of measured runs and to their starts (multiple shooting: Bock 1983)."""
+"""Fits numbers to segments of measured runs and to their starts (multiple shooting: Bock 1983)."""
 
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.judge import Fit as Found
-from joda.diagnosis.judge import Judge, Unknowns
-from joda.diagnosis.windows import Mover
-from joda.joints.parameters import Parameters
+from joda.estimation.estimator import Fit as Found
+from joda.estimation.estimator import SegmentEstimator, Unknowns
+from joda.estimation.profile_parameters import Parameters
+from joda.estimation.segments import Simulator
 from joda.refining.engine import Engine
 
 Array = NDArray[np.float64]
-Told = Callable[[Array, float], None]
+Progress = Callable[[Array, float], None]
 """After each iteration, the numbers and the RMS misfit (rad or m)."""
 
 LEAST = 4
-"""Fewest samples of a window that counts."""
+"""Fewest samples of a segment that counts."""
 NUDGE = 0.004
 """Step of a number for differences, in its own unit."""
 
@@ -32,60 +32,60 @@ class Shooting:
         """The same joint and runs with other numbers."""
         return Shooting(self.engine, parameters)
 
-    def mover(self, theta: Array) -> Mover:
+    def mover(self, theta: Array) -> Simulator:
         """The joint with its numbers."""
         return self.engine.mover(self.parameters, theta)
 
-    def judge(self, length: float) -> Judge:
-        """Of windows of some length, s."""
-        windows = self.engine.windows(length)
-        return self.engine.judge(windows, windows.count >= LEAST, apart=True)
+    def estimator(self, length: float) -> SegmentEstimator:
+        """Of segments of some length, s."""
+        segments = self.engine.segments(length)
+        return self.engine.estimator(segments, segments.count >= LEAST, apart=True)
 
     def fit_windows(
         self,
-        judge: Judge,
+        estimator: SegmentEstimator,
         theta: Array,
-        doubt: Array,
+        prior_std: Array,
         iterations: int,
-        told: Told = lambda theta, misfit: None,
+        told: Progress = lambda theta, misfit: None,
         held: Array | None = None,
     ) -> Array:
-        """Gauss-Newton over windows and their starts, shape (n,).
+        """Gauss-Newton over segments and their starts, shape (n,).
 
         Args:
-            judge: of the windows.
+            estimator: of the segments.
             theta: where to begin, shape (n,).
-            doubt: standard deviations before any data, shape (n,).
+            prior_std: standard deviations before any data, shape (n,).
             iterations: at most so many.
-            told: see `Told`.
+            told: see `Progress`.
             held: about which values; None: those at first.
         """
-        unknowns = self.unknowns(held, doubt)
-        start = judge.started(self.mover(theta)).start
+        unknowns = self.unknowns(held, prior_std)
+        start = estimator.started(self.mover(theta)).start
 
         def heard(fit: Found) -> None:
-            told(fit.x, self.robust(judge, fit))
+            told(fit.x, self.robust(estimator, fit))
 
-        return judge.fit(self.mover, unknowns, theta, start, iterations, told=heard).x
+        return estimator.fit(self.mover, unknowns, theta, start, iterations, told=heard).x
 
-    def covariance(self, judge: Judge, theta: Array) -> Array:
-        """Of the numbers' errors, from windows and the prior, shape (n, n)."""
-        doubt, unknowns = self.parameters.doubt, self.unknowns()
-        start = judge.started(self.mover(theta)).start
-        H = judge.linear(self.mover, unknowns, theta, start, bend=np.inf).normal()[0]
-        return np.asarray(np.linalg.inv(H + np.diag(doubt**-2.0)))
+    def covariance(self, estimator: SegmentEstimator, theta: Array) -> Array:
+        """Of the numbers' errors, from segments and the prior, shape (n, n)."""
+        prior_std, unknowns = self.parameters.prior_std, self.unknowns()
+        start = estimator.started(self.mover(theta)).start
+        H = estimator.linear(self.mover, unknowns, theta, start, cauchy_scale=np.inf).normal()[0]
+        return np.asarray(np.linalg.inv(H + np.diag(prior_std**-2.0)))
 
-    def rms(self, judge: Judge, theta: Array) -> float:
-        """RMS misfit of windows, from starts that are fitted, rad or m."""
-        rows = judge.windows.rows[judge.counts]
-        return float(np.sqrt(np.mean(self.misfit(judge, theta)[rows[rows >= 0]] ** 2)))
+    def rms(self, estimator: SegmentEstimator, theta: Array) -> float:
+        """RMS misfit of segments, from starts that are fitted, rad or m."""
+        rows = estimator.segments.rows[estimator.counts]
+        return float(np.sqrt(np.mean(self.misfit(estimator, theta)[rows[rows >= 0]] ** 2)))
 
-    def misfit(self, judge: Judge, theta: Array) -> Array:
+    def misfit(self, estimator: SegmentEstimator, theta: Array) -> Array:
         """Predicted minus measured positions, from starts that are fitted, rad or m, shape (n,)."""
         mover = self.mover(theta)
-        return judge.windows.misfit(mover, judge.started(mover).start)
+        return estimator.segments.misfit(mover, estimator.started(mover).start)
 
-    def unknowns(self, mean: Array | None = None, doubt: Array | None = None) -> Unknowns:
+    def unknowns(self, mean: Array | None = None, prior_std: Array | None = None) -> Unknowns:
         """The numbers, about which values and how well they are known; None: as at first."""
         own, n = self.parameters, len(self.parameters.start)
         bounds, steps = (np.full(n, -np.inf), np.full(n, np.inf)), np.full(n, NUDGE)
@@ -93,11 +93,13 @@ class Shooting:
             *bounds,
             steps,
             own.start if mean is None else mean,
-            own.doubt if doubt is None else doubt,
+            own.prior_std if prior_std is None else prior_std,
             own.constraints,
         )
 
-    def robust(self, judge: Judge, fit: Found) -> float:
-        """RMS misfit of windows that count, rad or m."""
-        count = int(judge.windows.count[judge.counts].sum())
-        return self.engine.sigma * float(np.sqrt(fit.squares[judge.counts].sum() / max(count, 1)))
+    def robust(self, estimator: SegmentEstimator, fit: Found) -> float:
+        """RMS misfit of segments that count, rad or m."""
+        count = int(estimator.segments.count[estimator.counts].sum())
+        return self.engine.sigma * float(
+            np.sqrt(fit.squares[estimator.counts].sum() / max(count, 1))
+        )

@@ -2,7 +2,7 @@
 
 A component that is five times too large, or off by a tenth of the range, leads a fit of its control
 points astray: they are held near where they were, in units of what the component was. Sizes are few
-and show in short windows; from several starts the fit finds them where one start would get stuck.
+and show in short segments; from several starts the fit finds them where one start would get stuck.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.judge import Judge
-from joda.joints.parameters import Kind, Parameters
+from joda.estimation.estimator import SegmentEstimator
+from joda.estimation.profile_parameters import Kind, Parameters
 from joda.refining.shooting import Shooting
 
 Array = NDArray[np.float64]
@@ -27,12 +27,12 @@ MOST = 6
 EDGE = 0.001
 """How near the ends of the range an end of an interval comes: one that is there stays there."""
 NOISE = 1.1
-"""Windows that are missed by less than so many times the noise leave nothing to look for."""
+"""Segments that are missed by less than so many times the noise leave nothing to look for."""
 
 
 def sized(
     shooting: Shooting,
-    judge: Judge,
+    estimator: SegmentEstimator,
     iterations: int,
     told: Callable[[Parameters, float], None],
 ) -> None:
@@ -40,10 +40,10 @@ def sized(
 
     Args:
         shooting: the joint and its runs; intervals are fitted if they are among its numbers.
-        judge: of short windows.
+        estimator: of short segments.
         iterations: at most so many from each start.
         told: after each start, the parameters about the best profile so far, and its RMS misfit in
-            those windows, rad or m.
+            those segments, rad or m.
     """
     parameters, found = shooting.parameters, shooting.parameters.profile
     stages: list[tuple[Kind, ...]] = [("sizes",)]
@@ -54,14 +54,14 @@ def sized(
         if "places" in kinds:  # sizes that were fitted elsewhere may lead nowhere
             own = parameters.about(parameters.profile, stages[0])
             bases += [own.written(own.start - by, exact=True) for by in (0.0, WEAKER)]
-        starts = _starts(shooting, judge, [parameters.about(base, kinds) for base in bases])
+        starts = _starts(shooting, estimator, [parameters.about(base, kinds) for base in bases])
         least = np.inf
         for other, start in starts:
-            x = other.fit_windows(judge, start, other.parameters.doubt, iterations)
+            x = other.fit_windows(estimator, start, other.parameters.prior_std, iterations)
             x = _inside(other.parameters, x)
-            loss = judge.started(other.mover(x)).loss
+            loss = estimator.started(other.mover(x)).loss
             if loss < least:
-                least, misfit = loss, other.rms(judge, x)
+                least, misfit = loss, other.rms(estimator, x)
                 found = other.parameters.written(x, exact=True)
             told(parameters.about(found), misfit)
             if misfit < NOISE * shooting.engine.sigma:
@@ -69,12 +69,12 @@ def sized(
 
 
 def _starts(
-    shooting: Shooting, judge: Judge, bases: Sequence[Parameters]
+    shooting: Shooting, estimator: SegmentEstimator, bases: Sequence[Parameters]
 ) -> list[tuple[Shooting, Array]]:
     """Where to begin: of what `_trials` has of each, the ones with the least loss."""
     trials = [(shooting.about(one), x) for one in bases for x in _trials(one)]
     if len(trials) > MOST:
-        trials.sort(key=lambda trial: judge.started(trial[0].mover(trial[1])).loss)
+        trials.sort(key=lambda trial: estimator.started(trial[0].mover(trial[1])).loss)
     return trials[:MOST]
 
 

@@ -397,7 +397,7 @@ def act(
         bristles = passage.resistance * n[int(Number.PRESLIDING_FRICTION_STIFFNESS)]
         if bristles > 0.0:
             breakaway = n[int(Number.PRESLIDING_FRICTION_BREAKAWAY)]
-            left = laws.bristle_left(breakaway, psi, bound, v)
+            left = laws.bristle_stiffness_scale(breakaway, psi, bound, v)
             stiffness = laws.bristle_row(left, h, bristles, inertia)
             if joint.damps != 0:
                 rate = n[int(Number.PRESLIDING_FRICTION_DAMPING)]

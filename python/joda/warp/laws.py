@@ -12,7 +12,7 @@ STILL = wp.constant(1e-6)
 MOST_COST = wp.constant(1e3)
 """Largest bound² / D of a row of bristles: beside it float32 still resolves the others' cost."""
 LEAST_BRISTLE = wp.constant(1e-6)
-"""As kLeastBristle in cpp/effects.h, and so on."""
+"""As kMinBristleStiffness in cpp/effects.h, and so on."""
 LEAST_IN_ROW = wp.constant(0.05)
 HEAVIEST_LOAD = wp.constant(0.95)
 EXPLICIT_STIFFNESS = wp.constant(1.0)
@@ -51,16 +51,16 @@ def stribeck(excess: float, velocity: float, exponent: float, v: float) -> float
 
 
 @wp.func
-def bristle_left(breakaway: float, held: float, bound: float, v: float) -> float:
+def bristle_stiffness_scale(breakaway: float, held: float, bound: float, v: float) -> float:
     """Part of the bristles' stiffness that is left where they hold `held` within +-bound."""
     against = wp.where(wp.abs(v) < STILL, 0.0, -held * sign(v))
     r = wp.where(bound > 0.0, wp.clamp(against / bound, -1.0, 1.0), 0.0)
-    plastic = 0.5 + 0.5 * wp.sin(wp.pi * (r - 0.5 * (1.0 + breakaway)) / (1.0 - breakaway))
+    alpha = 0.5 + 0.5 * wp.sin(wp.pi * (r - 0.5 * (1.0 + breakaway)) / (1.0 - breakaway))
     if breakaway == 0.0 or r >= 1.0:
-        plastic = 1.0
+        alpha = 1.0
     elif r <= breakaway:
-        plastic = 0.0
-    return wp.max(LEAST_BRISTLE, 1.0 - plastic * r)
+        alpha = 0.0
+    return wp.max(LEAST_BRISTLE, 1.0 - alpha * r)
 
 
 @wp.func

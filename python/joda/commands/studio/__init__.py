@@ -40,16 +40,16 @@ def studio(
     """
     if find_spec("nicegui") is None:
         raise JodaError('joda studio needs NiceGUI: install it with: pip install "joda[studio]"')
-    from joda.commands.studio.desk import Desk
     from joda.commands.studio.guard import free_port
+    from joda.commands.studio.session import StudioSession
 
     place = Path(folder) if folder is not None else None
-    with closing(Desk(Path(scene), joint, place, passive)) as desk:
+    with closing(StudioSession(Path(scene), joint, place, passive)) as session:
         for run in runs:
-            desk.add_run(Path(run).absolute())
+            session.add_run(Path(run).absolute())
         number = free_port(port)
 
         from joda.commands.studio.page import serve
         from joda.commands.studio.shared import Shared
 
-        serve(Shared(desk), number, browser, ready)
+        serve(Shared(session), number, browser, ready)

@@ -33,7 +33,7 @@ class Editors:
     def _heard(self, what: str) -> None:
         if what != "profile":
             return
-        profile = self._shared.desk.profile
+        profile = self._shared.session.profile
         for editor in self._editors.values():
             editor.show(profile)
         if profile.effects == self._listed:
@@ -49,7 +49,7 @@ class Editors:
                     remove.props("flat round size=xs").tooltip("remove this effect")
 
     def _remove(self, number: int) -> None:
-        self._shared.edit(edits.without_effect(self._shared.desk.timeline.present, number))
+        self._shared.edit(edits.without_effect(self._shared.session.timeline.present, number))
 
 
 class _Editor:
@@ -58,9 +58,9 @@ class _Editor:
     def __init__(self, shared: Shared, channel: str) -> None:
         self._shared, self._channel = shared, channel
         self._selected = 0
-        self._last = max(len(getattr(shared.desk.profile.channels, channel).components) - 1, 0)
+        self._last = max(len(getattr(shared.session.profile.channels, channel).components) - 1, 0)
         self._listed: tuple[Any, ...] | None = None
-        found = shared.desk.context
+        found = shared.session.context
         balance = np.array(found.positions), -np.array(found.gravity_force)
         self._gravity = balance if channel == "conservative" else None
         with ui.element("section").classes(f"card editor {channel}"):
@@ -69,10 +69,10 @@ class _Editor:
                 self._chips = ui.element("div").classes("chips")
                 if self._gravity is not None and self._gravity[1].any():
                     ui.label("- - balances gravity").classes("aside balance")
-            self.curves = Curves(self._view(shared.desk.profile), told(self._heard))
+            self.curves = Curves(self._view(shared.session.profile), told(self._heard))
 
     def _view(self, profile: Profile) -> dict[str, Any]:
-        opened = self._shared.desk.opened
+        opened = self._shared.session.opened
         return charts.editor(profile, opened, self._channel, self._selected, self._gravity)
 
     def show(self, profile: Profile) -> None:
@@ -99,16 +99,16 @@ class _Editor:
 
     def _select(self, number: int) -> None:
         self._selected = number
-        self.show(self._shared.desk.profile)
+        self.show(self._shared.session.profile)
 
     def _remove(self, number: int) -> None:
-        present = self._shared.desk.timeline.present
+        present = self._shared.session.timeline.present
         self._shared.edit(edits.without_component(present, self._channel, number))
 
     def _heard(self, event: str, what: dict[str, Any]) -> None:
         """What the user does to the curves."""
-        desk = self._shared.desk
-        present = desk.timeline.present
+        session = self._shared.session
+        present = session.timeline.present
         own: Channel = getattr(present.channels, self._channel)
         number = int(what.get("component", self._selected))
         if "point" in what and (
@@ -129,5 +129,5 @@ class _Editor:
             self._shared.edit(edits.begun(present, self._channel, s, y))
         else:
             self._selected = number
-            desk.drag(handle, s, y, done=event == "drop")
+            session.drag(handle, s, y, done=event == "drop")
             self._shared.edited()

@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from joda.commands.studio.desk import Desk
 from joda.commands.studio.motions import Outdated, Replayed, Stale, replayed, simulated
+from joda.commands.studio.session import StudioSession
 from joda.errors import JodaError
 from joda.profile import Profile
 from joda.scenes.motion import Motion
@@ -14,7 +14,7 @@ from joda.scenes.motion import Motion
 PATIENCE = 0.25
 """How long (s) what takes longer goes on although a newer profile waits."""
 
-Stage = Callable[[Profile, Stale], Any]
+SceneRenderer = Callable[[Profile, Stale], Any]
 
 
 class Live:
@@ -28,10 +28,10 @@ class Live:
         failed: by stage, why there is nothing, in a sentence.
     """
 
-    def __init__(self, desk: Desk, told: Callable[[str], None]) -> None:
+    def __init__(self, session: StudioSession, told: Callable[[str], None]) -> None:
         """Args: what is worked on; told which stage has something new, in the event loop."""
-        self.desk, self._told = desk, told
-        lo, hi = desk.opened.joint.range
+        self.session, self._told = session, told
+        lo, hi = session.opened.joint.range
         self.start = (lo + hi) / 2
         self.found: dict[str, Any] = {}
         self.before: dict[str, Any] = {}
@@ -83,7 +83,7 @@ class Live:
             return self._stopped
 
         make, key = self._stages()[stage]
-        profile = self.desk.profile
+        profile = self.session.profile
         try:
             if make is None:
                 self.found.pop(name, None)
@@ -93,8 +93,8 @@ class Live:
                 patient = stage in ("release", "paths")
                 found = await asyncio.to_thread(make, profile, stopped if patient else stale)
                 if stage != "paths" and self._keys.get(name) != key:
-                    own = found if profile == self.desk.opened else None
-                    first = own or await asyncio.to_thread(make, self.desk.opened, stopped)
+                    own = found if profile == self.session.opened else None
+                    first = own or await asyncio.to_thread(make, self.session.opened, stopped)
                     self.before[name], self._keys[name] = first, key
                 self.found[name] = found
             self.failed.pop(name, None)
@@ -105,21 +105,25 @@ class Live:
             self.failed[name] = str(error)
         self._told(name)
 
-    def _stages(self) -> dict[str, tuple[Stage | None, Any]]:
+    def _stages(self) -> dict[str, tuple[SceneRenderer | None, Any]]:
         """What makes each stage, and what it depends on besides the profile."""
-        desk, start, runs = self.desk, self.start, self.desk.runs
+        session, start, runs = self.session, self.start, self.session.runs
 
         def release(profile: Profile, stale: Stale) -> Motion:
-            return simulated(desk.written(profile), desk.joint, stale, release=start)
+            return simulated(session.written(profile), session.joint, stale, release=start)
 
         def hand(profile: Profile, stale: Stale) -> Motion:
-            return simulated(desk.written(profile), desk.joint, stale, hand=True)
+            return simulated(session.written(profile), session.joint, stale, hand=True)
 
         def paths(profile: Profile, stale: Stale) -> Replayed:
-            return replayed(desk.written(profile), desk.joint, runs, False, desk.passive, stale)
+            return replayed(
+                session.written(profile), session.joint, runs, False, session.passive, stale
+            )
 
         def replay(profile: Profile, stale: Stale) -> Replayed:
-            return replayed(desk.written(profile), desk.joint, runs, True, desk.passive, stale)
+            return replayed(
+                session.written(profile), session.joint, runs, True, session.passive, stale
+            )
 
         return {
             "release": (release, start),

@@ -7,9 +7,9 @@ from pathlib import Path
 from nicegui import app, background_tasks, ui
 from starlette.responses import Response
 
+from joda.commands.studio.diagnosis_panel import DiagnosisPanel
 from joda.commands.studio.editors import Editors
 from joda.commands.studio.guard import HOST, Guard
-from joda.commands.studio.lacks import Lacks
 from joda.commands.studio.shared import Shared, say, told
 from joda.commands.studio.solids import Shape, shape
 from joda.commands.studio.trajectories import Trajectories
@@ -52,7 +52,7 @@ class Page:
             with ui.element("main"):
                 with ui.element("div").classes("column"):
                     self._view = ui.element("div").classes("viewing")
-                    Lacks(shared)
+                    DiagnosisPanel(shared)
                 with ui.element("div").classes("column"):
                     editors = Editors(shared)
                 with ui.element("div").classes("column"):
@@ -65,12 +65,12 @@ class Page:
         self._heard("profile")
 
     def _header(self) -> None:
-        desk = self._shared.desk
-        joint = desk.opened.joint
+        session = self._shared.session
+        joint = session.opened.joint
         lo, hi = joint.range
         with ui.element("header").classes("top"):
             ui.label("joda studio").classes("brand")
-            ui.label(plain(desk.scene.name)).classes("file").tooltip(plain(str(desk.scene)))
+            ui.label(plain(session.scene.name)).classes("file").tooltip(plain(str(session.scene)))
             ui.label(
                 f"{plain(joint.name)} · {joint.type} · {lo:.4g} to {hi:.4g} {joint.unit}".replace(
                     "-", "\N{MINUS SIGN}"
@@ -94,11 +94,11 @@ class Page:
     def _heard(self, what: str) -> None:
         if what != "profile":
             return
-        desk = self._shared.desk
-        self._undo.set_enabled(bool(desk.timeline.past))
-        self._redo.set_enabled(bool(desk.timeline.future))
-        self._state.set_text("unsaved changes" if desk.unsaved else "")
-        ui.run_javascript(f"window.unsaved = {str(desk.unsaved).lower()}")
+        session = self._shared.session
+        self._undo.set_enabled(bool(session.timeline.past))
+        self._redo.set_enabled(bool(session.timeline.future))
+        self._state.set_text("unsaved changes" if session.unsaved else "")
+        ui.run_javascript(f"window.unsaved = {str(session.unsaved).lower()}")
 
 
 class _SaveDialog:
@@ -109,7 +109,7 @@ class _SaveDialog:
         with ui.dialog() as self._dialog, ui.card().classes("asking"):
             ui.label("Save as").classes("title")
             self._name = ui.input(
-                "Scene, in the project folder", value=f"{shared.desk.scene.stem}_studio.xml"
+                "Scene, in the project folder", value=f"{shared.session.scene.stem}_studio.xml"
             )
             self._name.props("dense outlined autofocus").classes("save-name")
             self._name.on("keydown.enter", self._write).on_value_change(lambda: self._ask(False))
@@ -135,11 +135,11 @@ class _SaveDialog:
 
     @told
     def _write(self) -> None:
-        name, desk = self._name.value, self._shared.desk
-        if not self._replace and desk.taken(name):
+        name, session = self._name.value, self._shared.session
+        if not self._replace and session.taken(name):
             self._ask(True)
             return
-        notes = desk.save(name, force=self._replace)
+        notes = session.save(name, force=self._replace)
         self._dialog.close()
         self._shared.news.emit("profile")
         say(" ".join([f"Saved {name}.", *notes]), "positive")
@@ -155,7 +155,7 @@ def serve(shared: Shared, port: int, browser: bool, ready: Callable[[str], None]
         ready: told the page's address, with its token, when it answers.
     """
     guard = Guard(port)
-    solid = shape(shared.desk.model, shared.desk.number)
+    solid = shape(shared.session.model, shared.session.number)
     files = [one.stl() for one in solid.solids]
 
     @app.get("/solids/{number}.stl")
@@ -191,7 +191,7 @@ def serve(shared: Shared, port: int, browser: bool, ready: Callable[[str], None]
             root=lambda: Page(shared, solid) and None,
             host=HOST,
             port=port,
-            title=f"{plain(shared.desk.scene.name)} · joda studio",
+            title=f"{plain(shared.session.scene.name)} · joda studio",
             show=browser and guard.address.removeprefix(f"http://{HOST}:{port}"),
             reload=False,
             show_welcome_message=False,

@@ -7,8 +7,8 @@ from typing import Any
 
 from nicegui import Event, app, ui
 
-from joda.commands.studio.desk import Desk
 from joda.commands.studio.live import Live
+from joda.commands.studio.session import StudioSession
 from joda.commands.studio.work import Stopped, Work
 from joda.errors import JodaError
 from joda.profile import Profile
@@ -29,11 +29,11 @@ class Shared:
         doing: share done (None: not known) and what is being done.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, session: StudioSession) -> None:
         """Args: what is worked on."""
-        self.desk = desk
+        self.session = session
         self.news: Event[[str]] = Event()
-        self.live = Live(desk, self.news.emit)
+        self.live = Live(session, self.news.emit)
         self.work = Work()
         self.diagnosis: dict[str, Any] | None = None
         self.diagnosed: Profile | None = None
@@ -47,12 +47,12 @@ class Shared:
 
     def edit(self, profile: Profile) -> None:
         """Makes this the profile."""
-        self.desk.edit(profile)
+        self.session.edit(profile)
         self.edited()
 
     def step(self, how: str) -> None:
         """`undo` or `redo`."""
-        (self.desk.undo if how == "undo" else self.desk.redo)()
+        (self.session.undo if how == "undo" else self.session.redo)()
         self.edited()
 
     def measured(self) -> None:
@@ -64,39 +64,39 @@ class Shared:
 
     async def diagnose(self) -> None:
         """Diagnoses the profile by the runs; raises JodaError."""
-        desk, profile = self.desk, self.desk.timeline.present
-        runs, path = desk.runs, desk.scratch("diagnosis.json")
+        session, profile = self.session, self.session.timeline.present
+        runs, path = session.runs, session.scratch("diagnosis.json")
         self.diagnosis, self.outcome = None, []
         found = await self._working(
             lambda: self.work.diagnose(
-                desk.written(profile), desk.joint, runs, path, self._told, desk.passive
+                session.written(profile), session.joint, runs, path, self._told, session.passive
             )
         )
-        if found is not None and runs == desk.runs:
+        if found is not None and runs == session.runs:
             self.diagnosis, self.diagnosed = found, profile
         self.news.emit("diagnosis")
 
     async def add(self, effect: str) -> None:
         """Adds an effect that the diagnosis names, as `joda add` does; raises JodaError."""
-        desk, profile = self.desk, self.desk.timeline.present
-        output, diagnosis = desk.scratch("added.xml"), desk.scratch("diagnosis.json")
+        session, profile = self.session, self.session.timeline.present
+        output, diagnosis = session.scratch("added.xml"), session.scratch("diagnosis.json")
         added = await self._working(
             lambda: self.work.add(
-                desk.written(profile),
-                desk.joint,
-                desk.runs,
+                session.written(profile),
+                session.joint,
+                session.runs,
                 diagnosis,
                 effect,
                 output,
                 self._told,
-                desk.passive,
+                session.passive,
             )
         )
         if added is None:
             return
         self.outcome = added["sentences"]
         if added["added"]:
-            if desk.timeline.present != profile:
+            if session.timeline.present != profile:
                 self.outcome.append("What was edited meanwhile is not in it; undo brings it back.")
             self.diagnosis = None
             self.edit(Profile.read(added["composed"]))

@@ -41,7 +41,7 @@ class Trajectories:
 
     def _add_chart(self, name: str) -> None:
         chart = ui.echart(
-            charts.release(None, None, self._shared.desk.opened.joint), renderer="svg"
+            charts.release(None, None, self._shared.session.opened.joint), renderer="svg"
         )
         self._charts[name] = chart.classes(f"drawn {name}")
 
@@ -49,7 +49,7 @@ class Trajectories:
         self._dialog.open()
 
     def _heard(self, what: str) -> None:
-        live, joint = self._shared.live, self._shared.desk.opened.joint
+        live, joint = self._shared.live, self._shared.session.opened.joint
         if what in ("release", "hand"):
             draw = charts.release if what == "release" else charts.hand
             options = draw(live.found.get(what), live.before.get(what), joint)
@@ -58,7 +58,7 @@ class Trajectories:
         elif what == "replay":
             self._show_replay()
         elif what == "runs":
-            self._number = min(self._number, max(len(self._shared.desk.runs) - 1, 0))
+            self._number = min(self._number, max(len(self._shared.session.runs) - 1, 0))
             self._list()
             self._show_replay()
 
@@ -84,20 +84,20 @@ class Trajectories:
         if failed or (now and chosen in timed):
             options = {} if failed or not now else charts.run(now, before, timed.index(chosen))
             self._show("replay", options, failed)
-        self._told.set_text(_numbers(now, before, self._shared.desk.opened.joint.unit))
+        self._told.set_text(_numbers(now, before, self._shared.session.opened.joint.unit))
 
     def _chosen(self) -> str:
-        runs = self._shared.desk.runs
+        runs = self._shared.session.runs
         return runs[self._number].name if runs else ""
 
     def _list(self) -> None:
         self._runs.clear()
         with self._runs:
-            if not self._shared.desk.runs:
+            if not self._shared.session.runs:
                 ui.label(
                     "Add measured runs to see them beside the model, and to ask what it lacks."
                 ).classes("aside")
-            for number, path in enumerate(self._shared.desk.runs):
+            for number, path in enumerate(self._shared.session.runs):
                 chosen = " chosen" if number == self._number else ""
                 with ui.element("span").classes(f"chip run{chosen}"):
                     name = ui.label(plain(path.stem)).tooltip(plain(path.name))
@@ -111,7 +111,7 @@ class Trajectories:
         self._show_replay()
 
     def _drop(self, path: Any) -> None:
-        self._shared.desk.drop_run(path)
+        self._shared.session.drop_run(path)
         self._shared.measured()
 
 
@@ -162,11 +162,11 @@ class _RunDialog:
         self._dialog.open()
 
     def _list(self) -> None:
-        desk = self._shared.desk
+        session = self._shared.session
         self._files.clear()
         with self._files:
-            for name in desk.folder.listed(".csv"):
-                if desk.folder.path / name not in desk.runs:
+            for name in session.folder.listed(".csv"):
+                if session.folder.path / name not in session.runs:
                     file = ui.element("span").classes("chip")
                     with file:
                         ui.label(plain(name)).on("click", lambda n=name: self._add(n))
@@ -174,12 +174,12 @@ class _RunDialog:
     @told
     def _add(self, name: str) -> None:
         if name:
-            self._shared.desk.add_run(name)
+            self._shared.session.add_run(name)
             self._name.set_value("")
             self._list()
             self._shared.measured()
 
     @told
     async def _uploaded(self, event: events.UploadEventArguments) -> None:
-        self._shared.desk.upload(event.file.name, await event.file.read())
+        self._shared.session.upload(event.file.name, await event.file.read())
         self._shared.measured()

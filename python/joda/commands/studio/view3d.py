@@ -47,7 +47,7 @@ class View3D:
         """
         self._shared, self._shape, self._moved = shared, shape, moved
         self._motion: Motion | None = None
-        joint = shared.desk.opened.joint
+        joint = shared.session.opened.joint
         lo, hi = joint.range
         with ui.element("section").classes("card view"):
             self._draw(lo, hi)
@@ -96,7 +96,7 @@ class View3D:
 
     def _at(self, position: float) -> None:
         """Shows the joint at a position, rad or m."""
-        joint = self._shared.desk.opened.joint
+        joint = self._shared.session.opened.joint
         rotation, shift = self._shape.pose(position)
         self._group.rotate_R(rotation.tolist())
         self._group.move(*map(float, shift))
@@ -119,7 +119,7 @@ class View3D:
         if motion is None or self._shown > motion.time[-1]:
             self._timer.deactivate()
             return
-        lo, hi = self._shared.desk.opened.joint.range
+        lo, hi = self._shared.session.opened.joint.range
         position = float(np.interp(self._shown, motion.time, motion.position))
         self._slider.set_value(float(np.clip(position, lo, hi)))
         self._shown += 1 / FRAMES

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.judge import Unknowns
+from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
 
 Array = NDArray[np.float64]
@@ -71,9 +71,9 @@ class Hypothesis:
         magnitude: how large it is, in `unit`.
         unit: of the magnitude.
         ends: how many of the last numbers are ends of its interval.
-        rarity: twice the logarithm of how much rarer it is than others.
-        remains: part of the excess misfit that it may leave where it is the true one: more where
-            only the rough shape of its curve is known.
+        neg_log_prior: twice the logarithm of how much rarer it is than others.
+        misfit_tolerance: part of the excess misfit that it may leave where it is the true one: more
+            where only the rough shape of its curve is known.
         itself: whether it is, with these numbers, what its name says: more than a simpler effect
             would be, and of no size at which forces no longer count.
         kept: how many rough fits are fitted to the end: several where the motion jumps in a number.
@@ -88,8 +88,8 @@ class Hypothesis:
     magnitude: Callable[[Array], float]
     unit: str
     ends: int = 0
-    rarity: float = 0.0
-    remains: float = KNOWN_LAW
+    neg_log_prior: float = 0.0
+    misfit_tolerance: float = KNOWN_LAW
     itself: Callable[[Array], bool] = lambda x: True
     kept: int = 1
 
@@ -121,11 +121,11 @@ def unknowns_of(*rows: Number) -> Unknowns:
     return Unknowns(low, high, step, np.zeros(len(low)), np.full(len(low), np.inf), widest=widest)
 
 
-def known(unknowns: Unknowns, number: int, mean: float, doubt: float) -> Unknowns:
+def known(unknowns: Unknowns, number: int, mean: float, prior_std: float) -> Unknowns:
     """With what one of them is before the data, and by how much that may be off."""
     at = np.arange(len(unknowns.low)) == number
     return replace(
         unknowns,
         mean=np.where(at, mean, unknowns.mean),
-        doubt=np.where(at, doubt, unknowns.doubt),
+        prior_std=np.where(at, prior_std, unknowns.prior_std),
     )

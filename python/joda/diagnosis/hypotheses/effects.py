@@ -51,7 +51,7 @@ VARIED = 0.5
 LEVEL = 0.25
 """By how much it is off its median where it is level, in units of that."""
 KEPT = 3
-"""Rough fits of a load behind a play that are fitted to the end: each knock may be or not."""
+"""Rough fits of a load behind a play that are fitted to the end: each impact may be or not."""
 JAMMED = 1.0
 """Friction per load that no force moves."""
 HEAVY = 300.0
@@ -103,7 +103,7 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
         raised,
         lambda x: unit * float(np.ptp(x)),
         unit_of(units, power),
-        remains=FREE_CURVE,
+        misfit_tolerance=FREE_CURVE,
         itself=lambda x: bool(np.ptp(x) > VARIED * np.mean(x)) and not level(x),
     )
 
@@ -124,7 +124,7 @@ def _effect(
     magnitude: Callable[[Array], float],
     unit: str,
     direction: Direction = "both",
-    remains: float = KNOWN_LAW,
+    misfit_tolerance: float = KNOWN_LAW,
     itself: Callable[[Array], bool] = lambda x: True,
 ) -> Hypothesis:
     """One of the effects beyond the channels."""
@@ -137,7 +137,7 @@ def _effect(
         everywhere,
         magnitude,
         unit,
-        remains=remains,
+        misfit_tolerance=misfit_tolerance,
         itself=itself,
     )
 
@@ -189,7 +189,7 @@ def _resistances(units: Units) -> Iterator[Hypothesis]:
         lambda x: StribeckFriction(y=flat(F * x[0]), velocity=V * float(np.exp(x[1]))),
         lambda x: F * float(x[0]),
         unit_of(units),
-        remains=KNOWN_SHAPE,
+        misfit_tolerance=KNOWN_SHAPE,
     )
     if units.forced or units.weight:
         yield _effect(
@@ -226,7 +226,7 @@ def _presliding(units: Units) -> Hypothesis:
         make,
         lambda x: soft * float(np.exp(x[0])),
         "N·m/rad" if units.hinge else "N/m",
-        remains=KNOWN_SHAPE,
+        misfit_tolerance=KNOWN_SHAPE,
     )
 
 

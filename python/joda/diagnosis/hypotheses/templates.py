@@ -127,8 +127,8 @@ def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
         lambda x: units.force * float(x[0] * np.exp(0.5 * abs(x[3]))),
         unit_of(units),
         len(bounds),
-        rarity=RARE,
-        remains=KNOWN_SHAPE,
+        neg_log_prior=RARE,
+        misfit_tolerance=KNOWN_SHAPE,
     )
 
 
@@ -169,8 +169,8 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         near,
         lambda x: units.force * float(x[0]),
         unit_of(units),
-        rarity=RARE,
-        remains=KNOWN_SHAPE,
+        neg_log_prior=RARE,
+        misfit_tolerance=KNOWN_SHAPE,
     )
 
 
@@ -240,8 +240,8 @@ def _snap(units: Units, name: str) -> Hypothesis:
         lambda x: units.force * float(x[0]) * max(1.0, float(x[1])),
         unit_of(units),
         len(bounds),
-        rarity=RARE,
-        remains=KNOWN_SHAPE,
+        neg_log_prior=RARE,
+        misfit_tolerance=KNOWN_SHAPE,
     )
 
 
@@ -264,7 +264,7 @@ def _bistable(units: Units, name: str) -> Hypothesis:
         everywhere,
         lambda x: units.force * float(x[0]) * max(1.0, float(x[3])),
         unit_of(units),
-        remains=KNOWN_SHAPE,
+        misfit_tolerance=KNOWN_SHAPE,
     )
 
 

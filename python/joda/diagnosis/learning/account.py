@@ -78,13 +78,13 @@ def account(
         train: the joint and runs that were fitted.
         held: the same with runs held out.
         learned: the law.
-        unseen: its error on these, in windows.
+        unseen: its error on these, in segments.
         known: the effect that a diagnosis found likeliest.
     """
     learner, law = Learner(train), learned.law
     x, draws = learner.numbers(learned), drawn(learner, learned)
     remembers = law.terms.memory != "none"
-    h = learned.judge.windows.h
+    h = learned.estimator.segments.h
     gain, time = of_memory(law, x, draws, h) if remembers else (None, None)
     return Account(
         position=over_position(law, x, draws),

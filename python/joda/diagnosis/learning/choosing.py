@@ -1,7 +1,7 @@
 """Which terms a learned law has: those with which runs that no fit has seen are missed by less.
 
 Simple laws first. A term more is taken only if it makes those runs clearly likelier, and the law as
-a whole only by the measure of every other effect (`joda.diagnosis.mending`).
+a whole only by the measure of every other effect (`joda.diagnosis.adding`).
 """
 
 from collections.abc import Callable, Iterator
@@ -10,15 +10,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from joda.diagnosis.better import worse
+from joda.diagnosis.adding import (
+    NO_LESS,
+    NO_MORE,
+    NOTHING_LEFT,
+    AddedEffect,
+    clearly,
+    fallen,
+    replayed,
+)
 from joda.diagnosis.coverage import at_rest
-from joda.diagnosis.judge import BLAS, excess
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import LABEL, Terms
-from joda.diagnosis.mending import NO_LESS, NO_MORE, NOTHING_LEFT, Mended, clearly, fallen, replayed
+from joda.diagnosis.overlap import divided
+from joda.diagnosis.paired_test import worse
 from joda.diagnosis.plausible import Needs, implausible
-from joda.diagnosis.reshaping import Likelihood
-from joda.diagnosis.share import divided
+from joda.diagnosis.shape_refinement import Likelihood
+from joda.estimation.estimator import BLAS, excess
 from joda.measured.reading import Measured
 
 LENGTHS = (0.12, 0.05, 0.025)
@@ -49,14 +57,14 @@ class Tried:
 class Learning:
     """Fits laws to some runs and judges them by others."""
 
-    def __init__(self, train: Measured, held: Measured, told: Callable[[str], None]) -> None:
+    def __init__(self, train: Measured, held: Measured, progress: Callable[[str], None]) -> None:
         """Args: the joint and runs to fit; the same with runs held out; told what is done."""
-        self.learner, self.unseen, self.told = Learner(train), Likelihood(held), told
+        self.learner, self.unseen, self.progress = Learner(train), Likelihood(held), progress
 
     def tried(self, terms: Terms, near: Tried | None = None) -> Tried:
         """A law with these terms, fitted; from one that only lacks the memory, if that is near."""
         law = self.learner.law(terms)
-        self.told(f"learning {law.told()}")
+        self.progress(f"learning {law.told()}")
         begin = None
         if near and terms == replace(near.terms, memory=terms.memory, time=terms.time):
             begin = np.append(near.learned.fit.x, law.unremembering)
@@ -88,7 +96,7 @@ class Learning:
 
     def nothing_left(self, found: Tried) -> bool:
         """Whether what was held out is missed by no more than noise."""
-        return excess(found.unseen, max(self.unseen.judge.samples, 1.0)) < LITTLE
+        return excess(found.unseen, max(self.unseen.estimator.samples, 1.0)) < LITTLE
 
     def _positions(self, terms: Terms) -> Iterator[Terms]:
         for length in LENGTHS:
@@ -129,14 +137,14 @@ def _worth(more: Tried, less: Tried) -> bool:
 
 
 def learn(
-    train: Measured, held: Measured, told: Callable[[str], None] = lambda what: None
-) -> tuple[Mended, Learned | None]:
+    train: Measured, held: Measured, progress: Callable[[str], None] = lambda what: None
+) -> tuple[AddedEffect, Learned | None]:
     """Adds a law of no catalogue, if runs held out are clearly better with it.
 
     Args:
         train: the joint, its profile as it is, and runs to fit.
         held: the same with runs held out.
-        told: what is being done.
+        progress: what is being done.
 
     Returns:
         what came of it; and the law, None if none was added.
@@ -144,15 +152,15 @@ def learn(
     before, replays = replayed(held)
     own = train.profile
 
-    def refused(reason: str) -> tuple[Mended, None]:
-        return Mended(own, None, before, before, reason), None
+    def refused(reason: str) -> tuple[AddedEffect, None]:
+        return AddedEffect(own, None, before, before, reason), None
 
     if reason := at_rest(train):
         return refused(reason)
     loss = Likelihood(held).loss(own)
     anew = divided(own, LABEL)[1]  # of a law that was learned before none is left
     with threadpool_limits(1, BLAS):
-        best = Learning(train.changed(anew), held.changed(anew), told).chosen()
+        best = Learning(train.changed(anew), held.changed(anew), progress).chosen()
     profile = best.learned.profile
     if best.terms == Terms() or not clearly(best.unseen, loss):
         return refused(NOTHING_LEFT if before.window < NO_MORE * held.floor else NO_LESS)
@@ -163,4 +171,4 @@ def learn(
         return refused(NO_LESS)
     if replays and later and (reason := worse(replays, later) or ""):
         return refused(reason)
-    return Mended(profile, LABEL, before, after), best.learned
+    return AddedEffect(profile, LABEL, before, after), best.learned

@@ -1,6 +1,6 @@
-"""How sure a learned law is: what it would be from other windows of the same runs.
+"""How sure a learned law is: what it would be from other segments of the same runs.
 
-Each draw takes windows with replacement (Efron and Tibshirani, An Introduction to the Bootstrap
+Each draw takes segments with replacement (Efron and Tibshirani, An Introduction to the Bootstrap
 (1993)), and draws what was known before the data too (randomised priors: Osband, Aslanides and
 Cassirer, NeurIPS 2018), so that where no data are the draws differ by all that a law may be. The
 model is linear about the fit.
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._core import Solo
+from joda._core import JointSimulator
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import Law
 
@@ -63,27 +63,27 @@ def one_digit(error: float) -> str:
 
 
 def drawn(learner: Learner, learned: Learned, seed: int = 0) -> Array:
-    """Numbers of the law as other windows would have told them, shape (DRAWS, k).
+    """Numbers of the law as other segments would have told them, shape (DRAWS, k).
 
     Args:
         learner: of the joint.
         learned: the fitted law.
         seed: of the draws.
     """
-    law, judge, fit = learned.law, learned.judge, learned.fit
+    law, estimator, fit = learned.law, learned.estimator, learned.fit
     unknowns = learner.unknowns(law)
 
-    def make(x: Array) -> Solo:
-        return learner.solo(law, x, judge.windows.h)
+    def make(x: Array) -> JointSimulator:
+        return learner.simulator(law, x, estimator.segments.h)
 
-    H, slopes = judge.linear(make, unknowns, fit.x, fit.start).normals()
+    H, slopes = estimator.linear(make, unknowns, fit.x, fit.start).normals()
     rng = np.random.default_rng(seed)
-    counted = np.flatnonzero(judge.counts)
-    prior = unknowns.doubt**-2.0
+    counted = np.flatnonzero(estimator.counts)
+    prior = unknowns.prior_std**-2.0
     out = []
     for _ in range(DRAWS):
         times = np.bincount(rng.choice(counted, len(counted)), minlength=len(H))
-        known = unknowns.mean + unknowns.doubt * rng.standard_normal(len(fit.x))
+        known = unknowns.mean + unknowns.prior_std * rng.standard_normal(len(fit.x))
         A = np.tensordot(times, H, 1) + np.diag(prior)
         b = times @ slopes + prior * (fit.x - known)
         out.append(fit.x - np.linalg.solve(A, b))

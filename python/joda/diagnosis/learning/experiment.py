@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._core import Solo
-from joda.diagnosis.judge import Judge
+from joda._core import JointSimulator
+from joda.diagnosis.experiments import Model, means_of, menu, recorded
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import Law
-from joda.diagnosis.probes import Model, means_of, menu, recorded
+from joda.estimation.estimator import SegmentEstimator
 
 Array = NDArray[np.float64]
 
@@ -27,13 +27,13 @@ def narrowing(learner: Learner, learned: Learned) -> str | None:
     if not train.runs:
         return None
     unknowns, fit = learner.unknowns(law), learned.fit
-    means = means_of(train, learned.judge.windows, learned.judge.windows.h)
+    means = means_of(train, learned.estimator.segments, learned.estimator.segments.h)
 
-    def make(x: Array) -> Solo:
-        return learner.solo(law, x, means.h)
+    def make(x: Array) -> JointSimulator:
+        return learner.simulator(law, x, means.h)
 
-    known = np.diag(unknowns.doubt**-2.0)
-    known += learned.judge.linear(make, unknowns, fit.x, fit.start).normal()[0]
+    known = np.diag(unknowns.prior_std**-2.0)
+    known += learned.estimator.linear(make, unknowns, fit.x, fit.start).normal()[0]
     n = learner.base.count
     off = np.eye(len(fit.x))[n:] * unknowns.step[n:, None]
     here = _curves(law, fit.x[n:])
@@ -43,9 +43,9 @@ def narrowing(learner: Learner, learned: Learned) -> str | None:
     now = _width(shapes, known)
     best, told = None, NARROWER
     for motion in menu(means):
-        windows = recorded(motion, Model(make, unknowns, fit.x), means)
-        judge = Judge(windows, windows.count > 0)
-        more = judge.linear(make, unknowns, fit.x, windows.start).normal()[0]
+        segments = recorded(motion, Model(make, unknowns, fit.x), means)
+        estimator = SegmentEstimator(segments, segments.count > 0)
+        more = estimator.linear(make, unknowns, fit.x, segments.start).normal()[0]
         if (left := _width(shapes, known + more) / now) < told:
             best, told = motion, left
     if best is None:

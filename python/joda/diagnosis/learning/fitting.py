@@ -1,7 +1,7 @@
-"""Fits a law to windows of measured runs, together with the strengths of the model's own parts.
+"""Fits a law to segments of measured runs, together with the strengths of the model's own parts.
 
-First in short windows and long steps, as a force's error hardly bends a short motion, then in
-longer windows at the scene's own step.
+First in short segments and long steps, as a force's error hardly bends a short motion, then in
+longer segments at the scene's own step.
 """
 
 from collections.abc import Iterator
@@ -11,13 +11,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from joda._core import Solo
-from joda.diagnosis.baseline import Base, as_it_is, base_of, units_of, usable, windows_for
-from joda.diagnosis.guessing import usual
-from joda.diagnosis.judge import BEND, Fit, Judge, Unknowns
+from joda._core import JointSimulator
+from joda.diagnosis.hypothesis_fits import usual
 from joda.diagnosis.learning.law import Law, Terms
-from joda.diagnosis.reshaping import LONGER, checked
-from joda.joints.least_squares import Inequalities
+from joda.diagnosis.shape_refinement import LONGER, checked
+from joda.diagnosis.units import units_of
+from joda.estimation.base_model import BaseModel, as_it_is, base_of, segments_for, usable
+from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator
+from joda.estimation.least_squares import Inequalities
+from joda.estimation.unknowns import Unknowns
 from joda.measured.reading import Measured
 from joda.measured.runs import QuasiStatic, Run
 from joda.profile import Profile
@@ -25,7 +27,7 @@ from joda.profile import Profile
 Array = NDArray[np.float64]
 
 ROUNDS = 4
-"""Iterations in windows of each length, while windows that are far off count, and after."""
+"""Iterations in segments of each length, while segments that are far off count, and after."""
 AT_END = 0.02
 """Of the range: what was measured as near to its end goes to the end."""
 BEYOND = 0.995
@@ -38,14 +40,14 @@ class Learned:
 
     Attributes:
         law: what was fitted.
-        fit: factors of the model's own strengths, then the law's numbers; and windows' starts.
-        judge: of the windows that it was fitted to.
+        fit: factors of the model's own strengths, then the law's numbers; and segments' starts.
+        estimator: of the segments that it was fitted to.
         profile: the whole one with the law.
     """
 
     law: Law
     fit: Fit
-    judge: Judge
+    estimator: SegmentEstimator
     profile: Profile
 
 
@@ -55,31 +57,31 @@ class Learner:
     def __init__(self, train: Measured) -> None:
         """Args: the joint and runs to fit."""
         self.train = train
-        self.single = as_it_is(train)
-        usual_length = windows_for(train).length
+        self.joint_model = as_it_is(train)
+        usual_length = segments_for(train).length
         lengths = [factor * usual_length for factor in LONGER] if train.runs else [usual_length]
         # at the scene's own step
-        self.windows = [windows_for(train, length, fine=False) for length in lengths]
+        self.segments = [segments_for(train, length, fine=False) for length in lengths]
         if train.runs:
-            self.windows[0] = self.windows[0].coarser()
+            self.segments[0] = self.segments[0].coarser()
 
     @cached_property
-    def base(self) -> Base:
+    def base(self) -> BaseModel:
         """The model's own strengths; an actuator's numbers are not among them."""
-        own = replace(self.single, servo=None) if self.train.runs else self.single
-        return base_of(self.train.profile, own, self.windows[0].h)
+        own = replace(self.joint_model, servo=None) if self.train.runs else self.joint_model
+        return base_of(self.train.profile, own, self.segments[0].h)
 
     def law(self, terms: Terms) -> Law:
         """A law with these terms where the runs have been."""
-        windows, joint = self.windows[0], self.train.profile.joint
-        units = units_of(windows, self.train)
+        segments, joint = self.segments[0], self.train.profile.joint
+        units = units_of(segments, self.train)
         lo, hi = joint.range
         logs: list[Run | QuasiStatic] = [*self.train.runs]
         logs = logs or [one.curve for one in self.train.curves]
         s = (np.concatenate([log.position for log in logs]) - lo) / (hi - lo)
         a, b = float(np.clip(s.min(), 0, 1)), float(np.clip(s.max(), 0, 1))
         interval = a if a > AT_END else 0.0, b if b < 1 - AT_END else 1.0
-        speeds = np.abs(windows.start[:, 1])
+        speeds = np.abs(segments.start[:, 1])
         fastest = float(np.quantile(speeds, BEYOND)) if len(speeds) else 0.0
         return Law(terms, interval, hi - lo, fastest or units.speed, units.force)
 
@@ -106,12 +108,12 @@ class Learner:
         own = np.clip(x[:n], bounds.low, bounds.high)  # constraints hold but nearly
         return law.written(self.base.written(own), x[n:])
 
-    def solo(self, law: Law, x: Array, h: float) -> Solo:
+    def simulator(self, law: Law, x: Array, h: float) -> JointSimulator:
         """The joint with a law."""
-        return self.single.solo(self.written(law, x), h)
+        return self.joint_model.simulator(self.written(law, x), h)
 
     def learned(self, law: Law, near: Array | None = None) -> Iterator[Learned]:
-        """A law fitted in longer and longer windows, after each length.
+        """A law fitted in longer and longer segments, after each length.
 
         Args:
             law: its terms.
@@ -119,18 +121,18 @@ class Learner:
         """
         unknowns = self.unknowns(law)
         x = unknowns.mean if near is None else near
-        for windows in self.windows:
-            judge = Judge(windows, usable(windows))
-            if judge.counts.any():
-                fit = self._fit(judge, law, unknowns, x)
+        for segments in self.segments:
+            estimator = SegmentEstimator(segments, usable(segments))
+            if estimator.counts.any():
+                fit = self._fit(estimator, law, unknowns, x)
                 x = fit.x
-                yield Learned(law, fit, judge, checked(self.written(law, x)))
+                yield Learned(law, fit, estimator, checked(self.written(law, x)))
 
-    def _fit(self, judge: Judge, law: Law, unknowns: Unknowns, x: Array) -> Fit:
-        def make(y: Array) -> Solo:
-            return self.solo(law, y, judge.windows.h)
+    def _fit(self, estimator: SegmentEstimator, law: Law, unknowns: Unknowns, x: Array) -> Fit:
+        def make(y: Array) -> JointSimulator:
+            return self.simulator(law, y, estimator.segments.h)
 
-        fit = judge.fit(make, unknowns, x, iterations=0)
-        for bend in (BEND * usual(judge, fit), BEND):
-            fit = judge.fit(make, unknowns, fit.x, fit.start, ROUNDS, bend)
-        return judge.refit(make, unknowns, fit, ROUNDS)
+        fit = estimator.fit(make, unknowns, x, iterations=0)
+        for cauchy_scale in (CAUCHY_SCALE * usual(estimator, fit), CAUCHY_SCALE):
+            fit = estimator.fit(make, unknowns, fit.x, fit.start, ROUNDS, cauchy_scale)
+        return estimator.refit(make, unknowns, fit, ROUNDS)

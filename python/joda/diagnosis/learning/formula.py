@@ -13,11 +13,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.diagnosis.adding import error
 from joda.diagnosis.learning.ensemble import drawn, one_digit
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import Law
 from joda.diagnosis.learning.library import DRY, Term, of_position, of_speed
-from joda.diagnosis.mending import error
 from joda.measured.reading import Measured
 
 Array = NDArray[np.float64]
@@ -147,7 +147,7 @@ def formula(
         held: the joint with runs held out.
         learned: the law.
         draws: its ensemble, see `drawn`.
-        unseen: its error on what was held out, in windows.
+        unseen: its error on what was held out, in segments.
     """
     law = learned.law
     if law.terms.along or not (law.terms.position or law.terms.speed):

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.component import Component
-from joda.diagnosis.judge import Unknowns
 from joda.diagnosis.learning.smooth import modes_of, nearness
 from joda.effects import LearnedForce
-from joda.joints.least_squares import Inequalities
+from joda.estimation.least_squares import Inequalities
+from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
 
 Array = NDArray[np.float64]

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
-from joda.diagnosis.asking import asked
-from joda.diagnosis.judge import BLAS
-from joda.diagnosis.mending import error, starts
+from joda.diagnosis.adding import error, starts
+from joda.diagnosis.baseline import fit_baseline
+from joda.estimation.estimator import BLAS
 from joda.measured.reading import Measured
 
 
@@ -16,7 +16,7 @@ class Nearest:
 
     Attributes:
         effect: its name.
-        times: its error on what was held out, in windows, in the learned law's.
+        times: its error on what was held out, in segments, in the learned law's.
     """
 
     effect: str
@@ -31,10 +31,10 @@ def nearest(train: Measured, held: Measured, effect: str, unseen: float) -> Near
         train: the joint and runs to fit.
         held: the same with runs held out.
         effect: its name.
-        unseen: the learned law's error on what was held out, in windows.
+        unseen: the learned law's error on what was held out, in segments.
     """
     with threadpool_limits(1, BLAS):
-        profiles = starts(asked(train), effect, None, None)
+        profiles = starts(fit_baseline(train), effect, None, None)
     if not profiles or not unseen:
         return None
     return Nearest(effect, error(held, profiles[0]).window / unseen)

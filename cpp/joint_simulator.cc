@@ -1,0 +1,256 @@
+#include "joint_simulator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "stiffness.h"
+
+namespace joda {
+namespace {
+
+// MuJoCo's mjMINIMP, mjMAXIMP and mjMINVAL.
+constexpr double kLeastImpedance = 0.0001, kMostImpedance = 0.9999, kLeastWidth = 1e-15;
+
+// Runs that are replayed at once.
+constexpr size_t kSideBySide = 2;
+
+// Friction: force = offset - stiff a, within +-bound.
+struct Friction {
+  double offset, stiff, bound;
+};
+
+struct Motion {
+  double acceleration, held;
+};
+
+// Solves mass a = drive + friction(a).
+Motion Solve(double mass, double drive, const Friction& friction) {
+  const double stuck = (drive + friction.offset) / (mass + friction.stiff);
+  const double held = friction.offset - friction.stiff * stuck;
+  if (held > friction.bound) return {(drive + friction.bound) / mass, friction.bound};
+  if (held < -friction.bound) return {(drive - friction.bound) / mass, -friction.bound};
+  return {stuck, held};
+}
+
+bool IsFinite(const JointSimulator::State& state) {
+  return std::isfinite(state.q + state.v + state.held + state.loose.gap + state.loose.velocity +
+                       state.remembered);
+}
+
+}  // namespace
+
+JointSimulator::JointSimulator(const Body& body, const Servo& servo,
+                               const char* const texts[kTexts])
+    : body_(body), servo_(servo), profile_(ParseProfile("", body.range[0], body.range[1], texts)) {
+  if (!(body_.range[0] < body_.range[1])) {
+    throw std::invalid_argument("the range must be two increasing numbers");
+  }
+  const auto [low, high] = servo_.limits;
+  if (!(low < high)) {
+    throw std::invalid_argument("a servo's limits must be two increasing numbers");
+  }
+  if (!(servo_.delay >= 0)) throw std::invalid_argument("a servo's delay must not be negative");
+  if (profile_.effects) body_.inertia += profile_.effects->added_inertia;
+  if (!(body_.inertia > 0)) throw std::invalid_argument("the inertia must be positive");
+  if (!(body_.row_inertia > 0)) body_.row_inertia = body_.inertia;
+  for (const int k : {0, 1, 3}) {
+    body_.solimp[k] = std::clamp(body_.solimp[k], kLeastImpedance, kMostImpedance);
+  }
+}
+
+void JointSimulator::Advance(double h, double force, double command, State* state) const {
+  const Profile& p = profile_;
+  const Effects* effects = p.effects.get();
+  const double q = state->q, v = state->v, s = (q - p.lo) * p.per_range;
+  const double inertia = body_.row_inertia, weight = Weight(q);
+  const double servo = Actuate(command, q, v), load = weight + force - state->servo;
+
+  const double damping = p.damping(s).value, dry = p.friction(s).value;
+  const auto resist = [&](double velocity) {
+    if (!effects) return Resistance{damping, {dry, dry}};
+    return Resistance{damping + ExtraDamping(*effects, s, velocity),
+                      BoundFriction(*effects, dry, s, velocity, load)};
+  };
+  const Resistance own = resist(v);
+  double spring = p.conservative(s).value, pushed = force;
+  if (effects) spring += OffsetForce(effects->gravity, q);
+  double yielding = h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
+  if (effects) {
+    const Push learned = LearnedForce(effects->learned, h, s, v, state->remembered);
+    spring += learned.push;
+    yielding += learned.drag;
+  }
+
+  Passage behind;
+  const bool has_load = effects && effects->backlash.load > 0;
+  if (effects && effects->backlash.handle > 0) {
+    pushed = MoveHandle(effects->backlash, h, force, v, &state->loose);
+  } else if (has_load) {
+    behind = Meet(effects->backlash, h, body_.inertia, spring + weight + force, v, own, yielding,
+                  resist(v + state->loose.velocity), state->loose);
+  }
+  const FrictionBounds bounds = behind.On(own).dry;
+  double drag = behind.On(own).drag + behind.scale * yielding;
+
+  const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
+  const FrictionRow row =
+      StiffenFrictionRow(effects, h, held, bound, v, inertia, behind.resistance);
+  drag += row.damping;
+  Friction friction = {held - row.D * v / h, row.D, bound};
+  if (const auto [per_second, stiff] = body_.friction_row; stiff > 0) {
+    const double D = stiff * inertia;  // MuJoCo's own: no memory of what held before
+    friction = {-D * per_second * v, D, bound};
+  }
+
+  const double mass = body_.inertia + h * drag;
+  const double drive =
+      behind.scale * (spring + weight + pushed) + behind.force + servo + bounds.Shift() - drag * v;
+  Motion motion = Solve(mass, drive, friction);
+  if (q < body_.range[0] || q > body_.range[1]) {
+    const Limit limit = LimitRow(h, q, v);
+    if (limit.sign * motion.acceleration < limit.reference) {
+      motion = Solve(mass + limit.D, drive + limit.D * limit.sign * limit.reference, friction);
+    }
+  }
+  // the engine's implicit integration of an actuator's damping, after all rows
+  const bool free = servo_.limits[0] < servo && servo < servo_.limits[1];
+  const double slowed = free ? body_.inertia / (body_.inertia + h * servo_.damping) : 1;
+  state->v = v + h * slowed * motion.acceleration;
+  state->q = q + h * state->v;
+  state->held = motion.held;
+  state->servo = servo;
+  if (effects && effects->learned.Remembers()) {
+    state->remembered = Remember(effects->learned, h, state->v, state->remembered);
+  }
+  if (has_load) state->loose = Settle(effects->backlash, h, behind, state->v);
+}
+
+void JointSimulator::Restart(const Start& start, bool fresh, State* state) const {
+  if (fresh) *state = {};
+  const Effects* effects = profile_.effects.get();
+  // a load's velocity is beside the part's as it is
+  if (effects && effects->backlash.handle > 0) state->loose.velocity += start.v - state->v;
+  state->q = start.q;
+  state->v = start.v;
+}
+
+// Runs do not depend on one another: side by side, a step of one hides the latency of another's.
+void JointSimulator::Replay(double h, const double* force, const double* command, std::int64_t n,
+                            const std::vector<Start>& starts, double* before, double* after) const {
+  struct Run {
+    size_t start, last;                      // the current one, and the first of the next run
+    std::int64_t k = 0, end = 0, first = 0;  // the latter is that of its fresh start
+    bool lost = true;
+    State state = {};
+  };
+  size_t next = 0;
+  const auto begin = [&] {
+    Run run = {next, next + 1};
+    while (run.last < starts.size() && !starts[run.last].fresh) ++run.last;
+    next = run.last;
+    return run;
+  };
+  const double late = servo_.delay / h;
+  // Commands are means over a step; what is late by a part of one is part of two of them.
+  const auto commanded = [&](const Run& run, std::int64_t k) {
+    const double at = std::max(k - late, static_cast<double>(run.first));
+    const auto i = static_cast<std::int64_t>(std::floor(at));
+    const double part = at - i;
+    return part > 0 ? (1 - part) * command[i] + part * command[i + 1] : command[i];
+  };
+  const auto restart = [&](Run* run) {
+    const Start& start = starts[run->start++];
+    if (start.fresh) run->first = start.step;
+    Restart(start, start.fresh || run->lost, &run->state);
+    run->state.servo = Actuate(commanded(*run, start.step), start.q, start.v);
+    run->lost = false;
+    run->k = start.step;
+    run->end = run->start < starts.size() ? starts[run->start].step : n;
+  };
+  const auto lose = [&](Run* run) {
+    constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+    after[run->k - 1] = kNan;
+    std::fill(before + run->k, before + run->end, kNan);
+    std::fill(after + run->k, after + run->end, kNan);
+    run->lost = true;
+    run->k = run->end;
+  };
+
+  std::vector<Run> runs;
+  while (next < starts.size() && runs.size() < kSideBySide) runs.push_back(begin());
+  while (!runs.empty()) {
+    for (size_t i = 0; i < runs.size(); ++i) {
+      Run& run = runs[i];
+      if (run.k == run.end) {
+        if (run.start == run.last) {
+          if (next < starts.size()) {
+            run = begin();
+          } else {
+            run = runs.back();
+            runs.pop_back();
+            --i;
+            continue;
+          }
+        }
+        restart(&run);
+      }
+      before[run.k] = run.state.q;
+      Advance(h, force[run.k], commanded(run, run.k), &run.state);
+      after[run.k++] = run.state.q;
+      if (!IsFinite(run.state)) lose(&run);
+    }
+  }
+}
+
+double JointSimulator::Weight(double q) const {
+  const auto [first, second] = body_.weight;
+  if (!body_.hinge || (first == 0 && second == 0)) return first;
+  return first * std::cos(q) + second * std::sin(q);
+}
+
+double JointSimulator::Actuate(double command, double q, double v) const {
+  const double wanted = servo_.gain * (command - servo_.stiffness * q) - servo_.damping * v;
+  return std::clamp(wanted, servo_.limits[0], servo_.limits[1]);
+}
+
+// MuJoCo's solver parameters, as in "Solver parameters" of its documentation.
+JointSimulator::Limit JointSimulator::LimitRow(double h, double q, double v) const {
+  const auto [lo, hi] = body_.range;
+  const bool low = q < lo;
+  const double sign = low ? 1 : -1, distance = low ? q - lo : hi - q;
+  if (const Effects* effects = profile_.effects.get()) {
+    if (const auto& own = low ? effects->stops.low : effects->stops.high) {
+      const StopRow stop = MakeStopRow(*own, h, body_.row_inertia);
+      return {sign, stop.D, -stop.damping * sign * v - stop.stiffness * distance};
+    }
+  }
+  const double dmax = body_.solimp[1], impedance = Impedance(-distance);
+  double stiffness = -body_.solref[0], damping = -body_.solref[1];
+  if (body_.solref[0] > 0) {
+    const double constant = std::max(body_.solref[0], 2 * h);  // the engine's "refsafe"
+    const double per_second = 1 / (constant * body_.solref[1]);
+    stiffness = per_second * per_second;
+    damping = 2 / constant;
+  }
+  stiffness /= dmax * dmax;
+  damping /= dmax;
+  return {sign, impedance / (1 - impedance) * body_.row_inertia,
+          -damping * sign * v - stiffness * impedance * distance};
+}
+
+double JointSimulator::Impedance(double depth) const {
+  const auto [dmin, dmax, width, middle, exponent] = body_.solimp;
+  if (dmin == dmax || width <= kLeastWidth) return 0.5 * (dmin + dmax);
+  const double x = std::min(depth / width, 1.0);
+  const double power = std::max(exponent, 1.0);
+  const auto raise = [power](double base) {
+    return power == 2 ? base * base : std::pow(base, power);
+  };
+  const double rise =
+      x < middle ? middle * raise(x / middle) : 1 - (1 - middle) * raise((1 - x) / (1 - middle));
+  return dmin + rise * (dmax - dmin);
+}
+
+}  // namespace joda

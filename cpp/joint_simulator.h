@@ -1,0 +1,92 @@
+// One joint by itself, all others held: the step of MuJoCo with the plugin, in closed form.
+//
+// The step's constraint problem has one unknown then, the acceleration, and at most three rows: dry
+// friction, damping, an end of the range. Its optimality condition is increasing and piecewise
+// linear, so that its solution can be written down.
+#ifndef JODA_JOINT_SIMULATOR_H_
+#define JODA_JOINT_SIMULATOR_H_
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "effects.h"
+#include "profile.h"
+
+namespace joda {
+
+// What of a joint is not in its profile. Units are those of a hinge; for a slide read N, m and kg.
+struct Body {
+  std::array<double, 2> range;   // joint positions at s = 0 and s = 1
+  double inertia;                // without the effects' added inertia (kg m^2)
+  double row_inertia;            // what MuJoCo's rows take for it, <= 0: all of it (kg m^2)
+  std::array<double, 2> weight;  // hinge: cos q and sin q of gravity's torque; slide: force and 0
+  bool hinge;
+  std::array<double, 2> solref;  // of the range's ends
+  std::array<double, 5> solimp;
+  // Of MuJoCo's own friction row: damping (1/s), and stiffness over inertia; 0: the plugin's row.
+  std::array<double, 2> friction_row = {0, 0};
+};
+
+// An actuator on the joint: gain (command - stiffness q) - damping v, within limits.
+struct Servo {
+  double gain = 1;
+  double stiffness = 0, damping = 0;
+  std::array<double, 2> limits = {-HUGE_VAL, HUGE_VAL};
+  double delay = 0;  // of commands (s)
+};
+
+class JointSimulator {
+ public:
+  // What a step begins with.
+  struct State {
+    double q = 0, v = 0;
+    double held = 0;   // friction force of the step before
+    double servo = 0;  // the actuator's
+    Loose loose;
+    double remembered = 0;  // by a learned force
+  };
+
+  // Where a stretch of steps begins, and whether the joint has forgotten what was before.
+  struct Start {
+    std::int64_t step;
+    double q, v;
+    bool fresh;
+  };
+
+  // Throws std::invalid_argument, one sentence; the texts are as in ParseProfile.
+  JointSimulator(const Body& body, const Servo& servo, const char* const texts[kTexts]);
+
+  // One step of h under the applied force and the actuator's command.
+  void Advance(double h, double force, double command, State* state) const;
+
+  // Steps through n forces and as many commands, which come later by the delay; what was before a
+  // fresh start is its first command. before[k] and after[k] are the positions at both ends of step
+  // k. At each start position and velocity are set; unless fresh, friction's memory stays and the
+  // handle or the load as it is beside the part. What follows a number that is not finite is NaN
+  // until the next start, which then is fresh. Starts are in increasing order, the first one at
+  // step 0.
+  void Replay(double h, const double* force, const double* command, std::int64_t n,
+              const std::vector<Start>& starts, double* before, double* after) const;
+
+ private:
+  // The row of the end that is overstepped: direction, D (0: none) and reference acceleration.
+  struct Limit {
+    double sign, D, reference;
+  };
+
+  void Restart(const Start& start, bool fresh, State* state) const;
+  double Weight(double q) const;
+  double Actuate(double command, double q, double v) const;
+  Limit LimitRow(double h, double q, double v) const;
+  double Impedance(double depth) const;
+
+  Body body_;
+  Servo servo_;
+  Profile profile_;
+};
+
+}  // namespace joda
+
+#endif  // JODA_JOINT_SIMULATOR_H_

@@ -1,0 +1,219 @@
+"""Adds an effect to a joint's profile and fits everything together.
+
+First the effect's few numbers with the model's strengths; then every control point, interval and
+number (`joda.diagnosis.shape_refinement`). What is written makes runs that no fit has seen
+likelier.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from joda.diagnosis.baseline import Baseline, fit_baseline
+from joda.diagnosis.coverage import at_rest
+from joda.diagnosis.departures import FAITHFUL, SHARED, Departures, departures, restored
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.overlap import overlap
+from joda.diagnosis.paired_test import FALLEN, worse
+from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
+from joda.diagnosis.shape_refinement import Trials, Tried, checked, likeliest
+from joda.estimation.estimator import BLAS
+from joda.measured.errors import Errors, errors, known
+from joda.measured.misfit import rms
+from joda.measured.reading import Measured
+from joda.profile import Profile
+
+NEARLY = 0.95
+"""Part of the error before, and of the loss, to which an effect must bring runs held out."""
+LIKELIER = 2 * float(np.log(20))
+"""How much less that loss, twice a negative log-likelihood, must be at least: a model that was not
+fitted to data makes them 20 times likelier than the true one does in one of 20 cases at most."""
+NO_LESS = "it does not lower the error on what was held out of the fit"
+OWN = (
+    "the model's own numbers, fitted without it, do as well on what was held out; joda refine fits "
+    "them"
+)
+NO_MORE = 1.1
+"""Error before, in units of the noise, up to which what was held out tells nothing."""
+NOTHING_LEFT = (
+    "what was held out of the fit is missed by no more than the noise even without it, so that it "
+    "cannot tell"
+)
+STRENGTHS = (1.0, 3.0, 10.0)
+"""Of an effect whose place is known: the trials, in units of the usual one."""
+
+
+@dataclass(frozen=True)
+class Error:
+    """How far a model is off.
+
+    Attributes:
+        whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where none can be
+            replayed, as the force at its beginning is unknown, or there are only curves.
+        window: RMS of windows of 0.4 s, rad or m; of curves the force's, N·m or N.
+    """
+
+    whole: float | None
+    window: float
+
+
+@dataclass(frozen=True)
+class AddedEffect:
+    """A profile with an effect more.
+
+    Attributes:
+        profile: the whole one (`joda.scenes.native`).
+        effect: that was added; None if nothing did better than the model as it was.
+        before, after: errors on runs held out of the fit.
+        reason: why nothing was added, a clause; None if something was.
+        departs: by what the profile is not what was given and diagnosed.
+    """
+
+    profile: Profile
+    effect: str | None
+    before: Error
+    after: Error
+    reason: str | None = None
+    departs: Departures = FAITHFUL
+
+
+def error(measured: Measured, profile: Profile | None = None) -> Error:
+    """How far the model, or another profile, is off: of runs, in MuJoCo with the plugin."""
+    return replayed(measured, profile)[0]
+
+
+def replayed(measured: Measured, profile: Profile | None = None) -> tuple[Error, Errors | None]:
+    """The same, and the replays; None where there are only curves."""
+    model = measured if profile is None else measured.changed(profile)
+    if not model.runs:
+        return Error(None, rms(np.concatenate([curve.excess for curve in model.curves]))), None
+    found = errors(model)
+    return Error(known(found.whole), found.window), found
+
+
+def add_effect(
+    train: Measured,
+    held: Measured,
+    effect: str,
+    direction: str | None = None,
+    near: tuple[float, float] | None = None,
+    progress: Callable[[str], None] = lambda what: None,
+    given: Profile | None = None,
+) -> AddedEffect:
+    """Adds an effect, if that is plausible and runs held out are clearly better with it.
+
+    Of what is tried, the likeliest is taken that makes those runs likelier, their error less in
+    windows (a paired test) and not more as a whole, and exerts no force that nothing needs. It may
+    change what the model gave, or act elsewhere than near, only if no other is nearly as good.
+
+    Args:
+        train: the joint, its profile as it is, and runs to fit.
+        held: the same with runs held out.
+        effect: its name.
+        direction: of the effect, if it is known.
+        near: where it is, in normalised position, if that is known.
+        progress: what is being done.
+        given: the profile of the model as it was given; None: the joint's as it is.
+    """
+    before, replays = replayed(held)
+    if reason := at_rest(train) or unseen_place(train, near):
+        return AddedEffect(train.profile, None, before, before, reason)
+    progress("the effect's own numbers")
+    given = given or train.profile
+    trials = Trials(train, held)
+    with threadpool_limits(1, BLAS):
+        baseline = fit_baseline(train)
+        begin = starts(baseline, effect, direction, near)
+        tried = [one for start in begin for one in trials.reshaped(start, effect, progress)]
+        loss = trials.unseen.loss(train.profile)
+
+    needs = Needs(train)
+
+    def best(some: Iterable[Tried]) -> tuple[Tried | None, Error, str]:
+        """The likeliest that may be added, and its error; else why the first may not."""
+        reasons = []
+        for one in sorted(some, key=lambda one: one.score):
+            reason = implausible(needs, one.profile, effect)
+            reason = reason or unseen_shape((train, held), one.profile, effect, train.profile)
+            if not reason and not clearly(one.unseen, loss):
+                reason = NO_LESS
+            if not reason:  # replays take longest
+                after, anew = replayed(held, one.profile)
+                if not fallen(before, after):
+                    reason = NO_LESS
+                elif replays and anew:
+                    reason = worse(replays, anew)
+                if not reason:
+                    return one, after, ""
+            reasons.append(reason)
+        return None, before, reasons[0] if reasons else "these data can tell nothing of it"
+
+    first, after, reason = best(tried)
+    if not first:
+        silent = reason == NO_LESS and before.window < NO_MORE * held.floor
+        return AddedEffect(train.profile, None, before, before, NOTHING_LEFT if silent else reason)
+    departs = departures(given, first.profile, effect, near)
+    if departs.sentences:
+        parts = departs.parts
+        with threadpool_limits(1, BLAS):
+            back = restored(first.profile, given, parts)
+            tried += trials.holding(back, parts, progress) if parts else []
+        count = len(departs.sentences)
+        found = [(one, departures(given, one.profile, effect, near)) for one in tried]
+        other, error_then, _ = best(one for one, own in found if len(own.sentences) < count)
+        if other and _as_good(other, first):
+            first, after = other, error_then
+            departs = departures(given, first.profile, effect, near)
+    if departs.parts:
+        progress("the model's own numbers without the effect")
+        own = checked(baseline.base.written(baseline.fit.x))
+        with threadpool_limits(1, BLAS):
+            without = likeliest(trials.reshaped(own, effect, progress))
+        if _as_good(without, first):
+            return AddedEffect(train.profile, None, before, before, OWN)
+    return AddedEffect(first.profile, effect, before, after, departs=departs)
+
+
+def fallen(before: Error, after: Error) -> bool:
+    """Whether windows are missed by less, or whole runs where windows are too short to show it."""
+    windows = after.window < NEARLY * before.window
+    if before.whole is None or after.whole is None:
+        return windows
+    return windows or (after.whole < FALLEN * before.whole and after.window < before.window)
+
+
+def clearly(loss: float, than: float) -> bool:
+    """Whether a loss is less by enough not to be by chance."""
+    return loss < min(NEARLY * than, than - LIKELIER)
+
+
+def _as_good(other: Tried, first: Tried) -> bool:
+    """Whether a profile is as good as the likeliest, on what was held out and on all runs."""
+    return other.score < first.score + LIKELIER and not clearly(first.unseen, other.unseen)
+
+
+def starts(
+    baseline: Baseline, effect: str, direction: str | None, near: tuple[float, float] | None
+) -> list[Profile]:
+    """The profile with the effect at its most likely place, and if that is elsewhere, near one."""
+    every = [h for h in baseline.hypotheses if h.effect == effect]
+    tried = [h for h in every if direction in (None, h.direction)] or every
+    candidates = [found for h in tried if (found := baseline.fit_hypothesis(h))]
+    candidates += [
+        baseline.refined(baseline.coarse(there)) for h in tried if (there := _placed(h, near))
+    ]
+    candidates.sort(key=lambda found: found.score)
+    close = [g for g in candidates if near and overlap(g.hypothesis.interval(g.x), near) >= SHARED]
+    firsts = candidates[:1] if not close or close[0] is candidates[0] else [candidates[0], close[0]]
+    return [checked(baseline.perturbed(one).written(baseline.base)) for one in firsts]
+
+
+def _placed(hypothesis: Hypothesis, near: tuple[float, float] | None) -> Hypothesis | None:
+    """A hypothesis that begins at an interval, with several strengths; None if it has none."""
+    ends = hypothesis.ends
+    if near is None or not ends:
+        return None
+    own = near if ends == 2 else near[1:] if near[0] <= 0 else near[:1]
+    return hypothesis.placed([own], STRENGTHS)

@@ -1,0 +1,282 @@
+"""Finds which numbers of a joint's body and of its measurement are off, if these explain the runs.
+
+All are set free at once, each with a prior whose width is how far off it usually is, or as told;
+then one after the other is held again, as long as the runs do not miss it. What an effect explains
+as well, with less of a surprise, is left to it.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from joda.diagnosis.applied_corrections import AppliedCorrections, righted
+from joda.diagnosis.baseline import Baseline
+from joda.diagnosis.correction_report import told
+from joda.diagnosis.corrections import ANYTHING, Correction
+from joda.diagnosis.hypothesis_fits import FittedHypothesis
+from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
+from joda.estimation.estimator import BLAS, CAUCHY_SCALE, Fit, SegmentEstimator, excess
+from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of
+from joda.measured.reading import Measured
+
+Array = NDArray[np.float64]
+
+WORTH = 40.0
+"""Gain in loss, less the price of its numbers, from which numbers are worth a word."""
+NEXT = 25.0
+"""Loss that a number must spare to be free beside the others."""
+ALIKE = 9.0
+"""Gain in loss up to which data cannot tell one number from another, nor from an effect."""
+MOST = 0.5
+"""Part of the loss that all numbers together leave at most; of what is beyond noise, where effects
+were looked for too."""
+CALM, PART = 0.05, 0.02
+"""What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
+CLEARLY = 3.0
+"""How many of its errors, by the data alone, a number is off by at the least."""
+SURPRISE = 4.0
+"""How many of its widths a number may be off: a zero that is far off looks like a force beside a
+spring."""
+LONGEST = 1.5
+"""Length of the segments in which numbers are fitted at last, s."""
+BETWEEN = 0.04
+"""Error of a delay, in samples: what the force is between two of them is not known."""
+LEVEL, FIRST = 1e5, 8
+"""Mean square residual from which a segment counts as its logarithm in the first iterations of some
+fits, which then go where all segments are better, and how many these are."""
+HEAVIER = "added_inertia"
+"""An effect that without gravity is a force of another scale but for what else resists: it is named
+where it is any likelier."""
+EQUIVALENT = (
+    *(HEAVIER, "gravity_offset"),
+    *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
+)
+"""Effects that may be the same as one of the numbers."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Numbers that explain runs better than a model as it is.
+
+    Attributes:
+        numbers: those that are off.
+        fit: of the model with them.
+        errors: their standard errors, as they are fitted.
+        loss: with the price of the numbers.
+        alone: whether they leave nothing that an effect would explain better.
+        others: of each number, those that the data cannot tell from it, with their values.
+    """
+
+    numbers: Nuisances
+    fit: Fit
+    errors: Array
+    loss: float
+    alone: bool
+    others: tuple[tuple[tuple[NuisanceName, float], ...], ...]
+
+    @property
+    def names(self) -> tuple[NuisanceName, ...]:
+        """Of the numbers."""
+        return self.numbers.names
+
+    @property
+    def righted(self) -> AppliedCorrections:
+        """What is to be set right."""
+        return righted({str(name): x for name, x in self.numbers.values(self.fit.x).items()})
+
+    def beats(
+        self, baseline: Baseline, candidates: Sequence[FittedHypothesis], clearly: bool
+    ) -> bool:
+        """Whether no effect explains as much, or each clearly less."""
+        least = min((g.fit.loss + g.cost for g in candidates), default=baseline.fit.loss)
+        return self.loss < least + (-ALIKE if clearly else ALIKE)
+
+    def corrections(self, measured: Measured) -> tuple[Correction, ...]:
+        """What is off, for the user.
+
+        Args:
+            measured: the joint as it was given.
+        """
+        values = self.numbers.values(self.fit.x).items()
+        rows = zip(values, self.errors, self.others, self.numbers.little(self.fit.x), strict=True)
+        return tuple(
+            told(measured, name, value, float(error), others)
+            for (name, value), error, others, little in rows
+            if not little
+        )
+
+
+def calibration_of(
+    measured: Measured, baseline: Baseline, beside: bool = False
+) -> Calibration | None:
+    """The numbers that are off; None where none is, or where they explain little.
+
+    Args:
+        measured: the joint and its runs.
+        baseline: the model fitted to them.
+        beside: whether effects were looked for too, so that these can be compared.
+    """
+    every = nuisances_of(measured, baseline.base)
+    if not measured.runs or not every.names:
+        return None
+    with threadpool_limits(1, BLAS):
+        found = _calibrated(baseline, every, beside)
+        if found and all(found.numbers.little(found.fit.x)):
+            return None
+        return _longer(measured, found) if found and found.alone else found
+
+
+def _longer(measured: Measured, found: Calibration) -> Calibration:
+    """The same fitted on in long segments, in which a small error shows; as it was where its
+    numbers are others there."""
+    segments = segments_for(measured, LONGEST)
+    estimator, old = SegmentEstimator(segments, usable(segments)), found.numbers.base
+    joint_model = replace(
+        joint_model_for(measured, segments.h), friction_row=old.joint_model.friction_row
+    )
+    base = base_of(measured.profile, joint_model, segments.h, measured.trust)
+    own = replace(found.numbers, base=base)
+    start = estimator.started(own.make(found.fit.x)).start
+    fit = estimator.fit(own.make, own.unknowns, found.fit.x, start)
+    moved = np.abs(fit.x - found.fit.x)[base.count :]
+    if np.any(moved > CLEARLY * found.errors):
+        return found
+    return replace(found, numbers=own, fit=fit)
+
+
+def _calibrated(baseline: Baseline, every: Nuisances, beside: bool) -> Calibration | None:
+    found = _Search(baseline, every)
+    whole, first = found.fitted(every.names), found.fitted(()).loss
+    count = max(baseline.estimator.samples, 1.0)
+    all_of_it, left = (excess(x, count) * count if beside else x for x in (first, whole.loss))
+    if first - whole.loss < WORTH or left > MOST * max(all_of_it, 0.0):
+        return None
+    names, best = every.names, whole
+    while names:
+        tried = [tuple(one for one in names if one != name) for name in names]
+        fits = [found.near(fewer, (names, best)) for fewer in tried]
+        fit, fewer = min(zip(fits, tried, strict=True), key=lambda pair: pair[0].loss)
+        if fit.loss - best.loss > NEXT:
+            break
+        best, names = fit, fewer
+    if first - best.loss < WORTH + found.price * len(names):
+        return None
+    own = every.only(names)
+    widths = np.abs(best.x[baseline.base.count :]) / own.prior_stds
+    if np.any(widths > SURPRISE):  # it stands in for what is missing
+        surprising = {name for name, off in zip(names, widths, strict=True) if off > SURPRISE}
+        rest = tuple(name for name in every.names if name not in surprising)
+        return _calibrated(baseline, every.only(rest), beside) if rest else None
+    return _concluded(found, names, best, whole)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Fits of numbers to segments, in long steps."""
+
+    baseline: Baseline
+    every: Nuisances
+
+    @property
+    def price(self) -> float:
+        """Of a number, in loss."""
+        return float(np.log(max(self.baseline.estimator.samples, 2.0)))
+
+    def fitted(
+        self, names: Sequence[NuisanceName], near: tuple[Sequence[NuisanceName], Fit] | None = None
+    ) -> Fit:
+        """Some of the numbers, from those of another fit and from the model as it is."""
+        own, base, estimator = self.every.coarser().only(names), self.baseline.base, self._judge
+        none = np.append(base.unknowns.mean, np.zeros(len(names)))
+        fits = [self.near(names, near), self._from(own, none, estimator.segments.start)]
+        return min((estimator.refit(own.make, own.unknowns, one) for one in fits), key=_loss)
+
+    def near(
+        self, names: Sequence[NuisanceName], near: tuple[Sequence[NuisanceName], Fit] | None = None
+    ) -> Fit:
+        """Some of the numbers, from those of another fit."""
+        own = self.every.coarser().only(names)
+        x, start = self.baseline.fit.x, self.baseline.fit.start
+        if near is None:
+            return self._from(own, np.append(x, np.zeros(len(names))), start)
+        return self._from(own, self.every.only(near[0]).taken(near[1].x, names), near[1].start)
+
+    @property
+    def _judge(self) -> SegmentEstimator:
+        return self.baseline.estimator.coarser
+
+    def _from(self, own: Nuisances, x: Array, start: Array) -> Fit:
+        """From numbers and starts: at once, and such that segments that are far off count first."""
+        estimator, fits = self._judge, []
+        for cauchy_scale in (LEVEL, CAUCHY_SCALE):
+            first = estimator.fit(own.make, own.unknowns, x, start, FIRST, cauchy_scale)
+            fits.append(estimator.fit(own.make, own.unknowns, first.x, first.start))
+        return min(fits, key=_loss)
+
+
+def _loss(fit: Fit) -> float:
+    return fit.loss
+
+
+def _concluded(
+    found: _Search, names: tuple[NuisanceName, ...], coarse: Fit, whole: Fit
+) -> Calibration | None:
+    """The numbers in usual steps, with their errors and what the data cannot tell from them."""
+    baseline, estimator, every = found.baseline, found.baseline.estimator, found.every
+    own = every.only(names)
+    fit = estimator.fit(own.make, own.unknowns, coarse.x, coarse.start)
+    fit = estimator.refit(own.make, own.unknowns, fit)
+    sure = np.abs(fit.x[baseline.base.count :]) > CLEARLY * _errors(found, own, fit, every.names)
+    if not sure.all():  # long steps asked for more
+        kept = tuple(name for name, there in zip(names, sure, strict=True) if there)
+        fewer = replace(fit, x=own.taken(fit.x, kept))
+        return _concluded(found, kept, fewer, whole) if kept else None
+    loss = fit.loss + found.price * len(names)
+    samples = max(estimator.samples, 1.0)
+    left, before = excess(fit.loss, samples), excess(baseline.fit.loss, samples)
+    alone = left < max(CALM, PART * before) and not any(
+        one.fit.loss + one.cost < loss - ALIKE * (one.hypothesis.effect != HEAVIER)
+        for one in _equivalent(baseline)
+    )
+    others = []
+    for name in names:
+        rest = tuple(one for one in names if one != name)
+        swapped: list[tuple[NuisanceName, float]] = []
+        for other in every.names:
+            if other in names:
+                continue
+            instead = (*rest, other)
+            tried = found.near(instead, (every.names, whole))
+            if tried.loss < coarse.loss + ALIKE:
+                swapped.append((other, every.only(instead).values(tried.x)[other]))
+        if name == "force_scale" and "mass" not in every.names:  # then all but friction is as well
+            swapped.append(("mass", 1 / own.values(fit.x)["force_scale"]))
+        others.append(tuple(swapped))
+    alike = {name for one in others for name, _ in one}
+    return Calibration(own, fit, _errors(found, own, fit, alike), loss, alone, tuple(others))
+
+
+def _errors(found: _Search, own: Nuisances, fit: Fit, alike: Collection[NuisanceName]) -> Array:
+    """Standard errors of numbers, shape (k,): by the data, and by how far off the others may be
+    that are not set free, but for those that are an alternative to one of these."""
+    estimator, base = found.baseline.estimator, found.baseline.base
+    rest = [name for name in found.every.names if name not in (*own.names, *alike)]
+    wider = found.every.only((*own.names, *rest))
+    there = replace(fit, x=np.append(fit.x, np.zeros(len(rest))))
+    prior_std = wider.unknowns.prior_std
+    prior_std[base.count :][: len(own.names)] = ANYTHING
+    covariance = estimator.covariance(wider.make, wider.unknowns, there, prior_std)
+    errors = np.sqrt(np.diag(covariance))[base.count :][: len(own.names)]
+    late = [name == "time_delay" for name in own.names]
+    return np.hypot(
+        errors, BETWEEN * float(np.median(np.diff(estimator.segments.time))) * np.array(late)
+    )
+
+
+def _equivalent(baseline: Baseline) -> list[FittedHypothesis]:
+    """The effects that may be the same as a number, fitted."""
+    there = [one for one in baseline.hypotheses if one.effect in EQUIVALENT]
+    return [baseline.refined(baseline.coarse(one)) for one in there]

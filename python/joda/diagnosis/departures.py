@@ -1,0 +1,149 @@
+"""What a model gave: which of its numbers a fit has moved, and the profile with those put back."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from joda.component import Component
+from joda.diagnosis.overlap import Interval, overlap, places
+from joda.effects import AnyEffect
+from joda.field import evaluate
+from joda.profile import CHANNELS, Channel, Channels, Joint, Profile
+
+DOUBT = 0.3
+"""How far off (one standard deviation, relative) a number of the model as given may be."""
+SHARED = 0.5
+"""Least overlap (intersection over union) of where an effect acts and where it was diagnosed."""
+GRID = np.linspace(0, 1, 201)
+"""Positions at which curves are compared."""
+EFFECTS = "effects"
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A component or an effect that a model gave, changed by a fit by more than `DOUBT`.
+
+    Attributes:
+        where: its channel, or `EFFECTS`.
+        what: its number in the channel, or its key.
+        told: its name, and its numbers before and after.
+    """
+
+    where: str
+    what: int | str
+    told: str
+
+
+@dataclass(frozen=True)
+class Departures:
+    """By what a fitted profile is not what was given and diagnosed.
+
+    Attributes:
+        parts: of the model as given that it changes by more than `DOUBT`.
+        changed: the same as sentences; None if there are none.
+        elsewhere: that its effect acts elsewhere than diagnosed, a sentence; None if it does not.
+    """
+
+    parts: tuple[Moved, ...] = ()
+    changed: str | None = None
+    elsewhere: str | None = None
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Both."""
+        return tuple(one for one in (self.changed, self.elsewhere) if one)
+
+
+FAITHFUL = Departures()
+"""By nothing."""
+
+
+def departures(
+    given: Profile, profile: Profile, effect: str, near: Interval | None = None
+) -> Departures:
+    """By what a fitted profile is not what was given and diagnosed.
+
+    Args:
+        given: the model as it was.
+        profile: fitted, with an effect more.
+        effect: its name.
+        near: where it was diagnosed, in normalised position, if that is known.
+    """
+    parts = moved(given, profile, effect)
+    changed = elsewhere = None
+    if parts:
+        changed = (
+            f"The fit changes what the model gave by more than {100 * DOUBT:.0f} %: "
+            f"{', '.join(part.told for part in parts)}. With that as given, no fit does as well on "
+            "what was held out."
+        )
+    there = places(profile, effect, given)
+    if near and all(overlap(one, near) < SHARED for one in there):
+        (a, b), (c, d) = there[0], near
+        elsewhere = (
+            f"{effect} acts at s = {a:.2f} to {b:.2f}, diagnosed at s = {c:.2f} to {d:.2f}. No fit "
+            "near that place does as well on what was held out."
+        )
+    return Departures(parts, changed, elsewhere)
+
+
+def moved(given: Profile, profile: Profile, effect: str) -> tuple[Moved, ...]:
+    """What a fit has changed of what a model gave.
+
+    Args:
+        given: the model as it was; its components are the first of the profile's.
+        profile: fitted.
+        effect: that was added: what has its name is not meant to stay as it was given.
+    """
+    out = []
+    for name in CHANNELS:
+        old, new = (getattr(one.channels, name).components for one in (given, profile))
+        for number, pair in enumerate(zip(old, new, strict=False)):
+            if pair[0].label != effect and (told := _curve(*pair, name, given.joint)):
+                out.append(Moved(name, number, told))
+    now = {one.key: one for one in profile.effects}
+    for old in given.effects:
+        new = now[old.key]
+        if old.effect != effect and _differs(old, new):
+            out.append(Moved(EFFECTS, old.key, f"{old.described()} → {new.described()}"))
+    return tuple(out)
+
+
+def restored(profile: Profile, given: Profile, parts: Collection[Moved]) -> Profile:
+    """The profile with some parts as the model gave them."""
+    back = {(part.where, part.what) for part in parts}
+    channels = {}
+    for name in CHANNELS:
+        channel = getattr(profile.channels, name)
+        own = list(channel.components)
+        for number, old in enumerate(getattr(given.channels, name).components):
+            if (name, number) in back:
+                own[number] = old
+        channels[name] = channel.model_copy(update={"components": tuple(own)})
+    old = {one.key: one for one in given.effects if (EFFECTS, one.key) in back}
+    effects = tuple(old.get(one.key, one) for one in profile.effects)
+    return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})
+
+
+def _curve(old: Component, new: Component, channel: str, joint: Joint) -> str | None:
+    """Its value where it changed most, before and after; None if that is within the doubt."""
+    before, after = (evaluate(Channel(components=(one,)), GRID)[0] for one in (old, new))
+    change = np.abs(after - before)
+    if change.max() <= DOUBT * np.abs(before).max():
+        return None
+    unit = joint.unit_of(channel)
+    at = int(np.argmax(change))
+    where = "" if np.ptp(change) <= DOUBT * change.max() else f" at s = {GRID[at]:.2f}"
+    return f"{old.label or channel} {before[at]:.3g} → {after[at]:.3g} {unit}{where}"
+
+
+def _differs(old: AnyEffect, new: AnyEffect) -> bool:
+    """Whether one of its numbers is off by more than the doubt."""
+    for key in (*old.parameters(), "y"):
+        before, after = (getattr(one, key, 0.0) for one in (old, new))
+        if not isinstance(before, str):
+            change = np.abs(np.subtract(after, before)).max()
+            if change > DOUBT * np.abs(before).max():
+                return True
+    return False

@@ -1,0 +1,198 @@
+"""Whole runs of a model with its own strengths fitted: how much they are missed by, and why."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from joda.diagnosis.baseline import Baseline
+from joda.measured.misfit import rms
+from joda.measured.reading import Measured
+from joda.measured.replay import Replayer
+from joda.measured.runs import Run, until_end
+from joda.measured.whiteness import CLEAR, drifts, free_parts
+
+Array = NDArray[np.float64]
+
+BEYOND = 5.0
+"""How many times what errors explain of it a model that is adequate may miss a whole run by."""
+TRAVELLED = 0.3
+"""Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
+FINE, TRIES, SETTLED = 0.05, 10, 1e-3
+"""Strengths fitted to whole free runs: change that tells slopes, most steps, least gain of one."""
+MOST = 0.9
+"""Part of all samples that free runs must hold, before an end, to tell of all."""
+STEP = 0.01
+"""A change of a factor; that of another number is its own step of differences."""
+APART = 5e-3
+"""Part of a strength by which another simulator's may differ."""
+FINER, FEW = 4, 4
+"""Steps for one of the scene's, and most steps of the fit then: what the scene's step makes of a
+motion is no effect that is missing."""
+CHANCE = 1e-4
+"""Probability, for a model that lacks nothing, of a drift of free runs as clear as one that counts:
+strengths are fitted in a few steps only, and two simulators differ a little."""
+DRAWS = 8
+"""Strengths that are drawn, to tell how far their errors move a run."""
+
+
+@dataclass(frozen=True)
+class Worst:
+    """By how many times what errors explain of it the worst whole run is missed.
+
+    Errors of positions, of the start, of the recorded force and of the fitted strengths. A run that
+    is missed by no more than `BEYOND` noises is told in those.
+
+    Attributes:
+        free: of runs up to where the joint meets an end of its range: after that the stop decides
+            too, not only a law of the joint. Of all of them if it meets one soon in every run.
+        whole: of all of the runs.
+    """
+
+    free: float
+    whole: float
+
+
+def worst(measured: Measured, baseline: Baseline) -> Worst:
+    """How far a model is off the whole runs.
+
+    Args:
+        measured: the joint and its runs.
+        baseline: the model fitted to them.
+    """
+
+    @cache  # only a run that is missed by much asks for them
+    def others() -> list[Replayer]:
+        return [_replayer(measured, baseline, x, finest) for x in _drawn(baseline)]
+
+    @cache
+    def fitted(finer: int) -> Replayer:
+        return _replayer(measured, baseline, baseline.fit.x, finer)
+
+    finest = FINER if measured.joint_model.servo else 1
+
+    def times(part: Run, sigma: float) -> float:
+        found = replayed(part, sigma, fitted(finest))
+        if found <= BEYOND or finest == FINER:
+            return found
+        return min(found, replayed(part, sigma, fitted(FINER)))
+
+    def replayed(part: Run, sigma: float, replayer: Replayer) -> float:
+        if not (start := replayer.start(part, sigma)):
+            return 0.0
+        path = replayer.whole(part, start)
+        there = ~np.isnan(path)
+        missed = rms(path[there] - part.position[there]) / sigma
+        if missed <= BEYOND:
+            return missed
+        moved = [other.whole(part, start)[there] - path[there] for other in others()]
+        apart = rms(np.concatenate(moved)) if moved else 0.0
+        spread = [sigma, replayer.scatter(part, start), apart]
+        return missed * sigma / float(np.linalg.norm(spread))
+
+    told, whole = [], 0.0
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        part = until_end(run, measured.profile.joint.range, CLEAR * sigma)
+        found = times(part, sigma)
+        if np.ptp(part.position) >= TRAVELLED * np.ptp(run.position):
+            told.append(found)
+        whole = max(whole, found if len(part.time) == len(run.time) else times(run, sigma))
+    return Worst(max(told, default=whole), whole)
+
+
+@dataclass(frozen=True)
+class FreeRuns:
+    """What free runs as a whole, in which errors add up, say of a model.
+
+    Attributes:
+        denied: by them, as it is.
+        drifting: by them, whatever its strengths.
+        covered: part of all runs' samples that they hold, before they come to an end.
+        numbers, errors: of the model by the whole runs, and their standard errors; shape (k,).
+    """
+
+    denied: bool
+    drifting: bool
+    covered: float
+    numbers: Array
+    errors: Array
+
+    @property
+    def suffice(self) -> bool:
+        """Whether nothing but other strengths, if that, is what the runs ask for."""
+        return self.covered > MOST and not self.drifting
+
+
+def free_runs(measured: Measured, baseline: Baseline) -> FreeRuns | None:
+    """Fits the model's strengths to its free runs, each from the start that suits it best.
+
+    Args:
+        measured: the joint and its runs.
+        baseline: the model fitted to their segments.
+
+    Returns:
+        None if no run is free.
+    """
+    parts, base = free_parts(measured), baseline.base
+    if not parts:
+        return None
+    count, errors = len(baseline.fit.x), np.sqrt(np.diag(baseline.covariance))
+    near: list[Array | None] = [None] * len(parts)
+
+    def left(strengths: Array, finer: int) -> list[Array]:
+        replayer, out = _replayer(measured, baseline, strengths, finer), []
+        for k, (run, sigma) in enumerate(parts):
+            found, near[k] = replayer.followed(run, sigma, near[k])
+            out.append(found / sigma)
+        return out
+
+    first, unit = base.unknowns.mean, base.unknowns.step / STEP
+    x = first
+    drifting = all(drifts(parts, left(x, finer)) < CHANCE for finer in (1, FINER))
+    denied, near = drifting, [None] * len(parts)
+    begin = np.where(np.arange(count) < len(base.places), first, baseline.fit.x)
+    y = 1 + (begin - first) / unit
+    for finer, tries in ((1, TRIES), (FINER, FEW)):
+        if not drifting or not count:
+            break
+        found = least_squares(
+            lambda y, finer=finer: np.concatenate(left(first + unit * (y - 1), finer)),
+            y,
+            bounds=tuple(1 + (b - first) / unit for b in (base.unknowns.low, base.unknowns.high)),
+            diff_step=FINE / finer**2,
+            max_nfev=tries,
+            ftol=SETTLED,
+        )
+        y = found.x
+        x = first + unit * (y - 1)
+        drifting = drifts(parts, left(x, finer)) < CHANCE
+        spread = np.linalg.pinv(found.jac.T @ found.jac) * max(np.mean(found.fun**2), 1.0)
+        errors = unit * np.hypot(np.sqrt(np.diag(spread)), APART)
+    samples = sum(len(run.time) for run in measured.runs)
+    covered = sum(len(run.time) for run, _ in parts) / samples
+    return FreeRuns(denied, drifting, covered, x, errors)
+
+
+def _replayer(measured: Measured, baseline: Baseline, x: Array, finer: int) -> Replayer:
+    """Of the model with other numbers, and the friction row of its fit, in so many times finer
+    steps, which then stand for none."""
+    own, h = baseline.base.own(x), measured.timestep / finer
+    joint_model = replace(measured.joint_model, friction_row=own.friction_row, servo=own.servo)
+    joint_model = joint_model.stepped(h) if finer > 1 else joint_model
+    return (
+        replace(measured, timestep=h)
+        .changed(baseline.base.written(x), joint_model=joint_model)
+        .replayer
+    )
+
+
+def _drawn(baseline: Baseline) -> Array:
+    """Strengths within the errors of the fitted ones, shape (draws, k)."""
+    base, x = baseline.base, baseline.fit.x
+    if not len(x):
+        return np.zeros((0, 0))
+    rng = np.random.default_rng(0)
+    drawn = rng.multivariate_normal(x, baseline.covariance, DRAWS, method="svd")
+    return np.clip(drawn, base.unknowns.low, base.unknowns.high)

@@ -1,0 +1,307 @@
+"""A hypothesis fitted together with the model's own strengths, from where it promises most."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from joda._core import JointSimulator
+from joda.diagnosis.force_balance import balanced
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.hypotheses.base import FREE_CURVE
+from joda.estimation.base_model import BaseModel
+from joda.estimation.estimator import CAUCHY_SCALE, Fit, Linearization, Make, SegmentEstimator
+from joda.estimation.unknowns import Unknowns
+from joda.profile import Profile
+
+Array = NDArray[np.float64]
+
+MOVES = (0.1, 0.04, 0.015)
+"""How far ends of intervals are moved on trial, in normalised position."""
+FAR = 10.0
+"""How far other numbers are moved, in their steps."""
+AS_GOOD = 1.0
+"""How much more loss is as good."""
+WIDE = 2.0
+"""How far a search begins to look, in those."""
+SEARCHED, SETTLING = 15, 4
+"""Models that it tries for each number, and iterations that fit the starts of one."""
+FEW = 4
+"""Iterations after that."""
+ROUGH = 6
+"""Iterations in which segments that are far off count in full."""
+BEST = 3
+"""How many trials of a hypothesis with many are fitted."""
+APART = 0.06
+"""How much these must differ in one of their numbers."""
+OFF = 0.1
+"""How far off a factor of the model's own strengths is that may stand in for what is missing."""
+NOTHING = 0.1
+"""Part of its step below which a strength is none."""
+LOST = 10.0
+"""Mean square residual of segments, in the median, from which a model's fit leads nowhere."""
+MANY = 4000
+"""Samples that count as many: from there on, what was fitted first is hardly in the way."""
+
+
+def joined(base: BaseModel, hypothesis: Hypothesis) -> tuple[Make, Unknowns]:
+    """The model's factors and the hypothesis' numbers as one vector."""
+    n = base.count
+
+    def make(x: Array) -> JointSimulator:
+        return base.with_profile(hypothesis.write(base.written(x), x[n:]), x)
+
+    return make, base.unknowns.and_(hypothesis.unknowns)
+
+
+@dataclass(frozen=True)
+class FittedHypothesis:
+    """A hypothesis, fitted.
+
+    Attributes:
+        hypothesis: what is missing.
+        fit: of the model's factors and the hypothesis' numbers.
+        score: its loss, and what its numbers cost.
+        cost: of its numbers.
+    """
+
+    hypothesis: Hypothesis
+    fit: Fit
+    score: float
+    cost: float
+
+    @property
+    def x(self) -> Array:
+        """The hypothesis' numbers."""
+        return self.fit.x[-len(self.hypothesis.unknowns.low) :]
+
+    @property
+    def vanished(self) -> bool:
+        """Whether it is hardly there, no more than a simpler effect, or beyond the widest of its
+        bounds: something else fits."""
+        unknowns = self.hypothesis.unknowns
+        least = 1.01 * unknowns.low[0] or NOTHING * unknowns.step[0]
+        hardly = self.hypothesis.misfit_tolerance != FREE_CURVE and least > 0 and self.x[0] < least
+        return bool(hardly or unknowns.pressed(self.x) or not self.hypothesis.itself(self.x))
+
+    def written(self, base: BaseModel) -> Profile:
+        """The model's profile with the effect."""
+        return self.hypothesis.write(base.written(self.fit.x), self.x)
+
+
+@dataclass(frozen=True)
+class InitialPoint:
+    """The model without a hypothesis, from where that is fitted.
+
+    Attributes:
+        fit: of the model's factors.
+        cauchy_scale: mean square residual from which a segment counts as its logarithm at first.
+        about: the model there, linear.
+    """
+
+    fit: Fit
+    cauchy_scale: float
+    about: Linearization
+
+
+def initial_points(
+    estimator: SegmentEstimator, base: BaseModel, given: Fit, fit: Fit
+) -> tuple[InitialPoint, ...]:
+    """From the model as it was fitted, and of few samples as it was given, where that is far off.
+
+    A factor that is far off may stand in for what is missing; many samples lead back from there.
+    """
+    far = estimator.samples < MANY and np.any(np.abs(fit.x - given.x) > OFF)
+    fits = [fit, given] if far else [fit]
+    wide = [CAUCHY_SCALE * usual(estimator, one) for one in fits]
+    return tuple(
+        InitialPoint(
+            one,
+            cauchy_scale,
+            estimator.linear(base.simulator, base.unknowns, one.x, one.start, cauchy_scale),
+        )
+        for one, cauchy_scale in zip(fits, wide, strict=True)
+    )
+
+
+def screened(
+    estimator: SegmentEstimator, base: BaseModel, point: InitialPoint, hypothesis: Hypothesis
+) -> list[Array]:
+    """The most promising trials, by the gain that a small strength promises."""
+    if len(hypothesis.trials) == 1:
+        return list(hypothesis.trials)
+    segments, fit, about = estimator.segments, point.fit, point.about
+    profile = base.written(fit.x)
+    H, gradient = about.normal()
+    H = H + np.diag(base.unknowns.prior_std**-2.0)
+    gains, out = [], []
+    for trial in hypothesis.trials:
+        simulator = base.with_profile(hypothesis.write(profile, trial), fit.x)
+        d = (segments.residuals(segments.misfit(simulator, fit.start)) - about.r)[:, :, None]
+        across = about.products(d, about.J)[0]
+        taken = (
+            np.linalg.solve(H, np.stack([gradient, across], axis=1)) if len(H) else np.zeros((0, 2))
+        )
+        slope = (
+            about.products(about.r[:, :, None], d, about.z[:, :, None])[0, 0] - across @ taken[:, 0]
+        )
+        cauchy_scale = about.products(d, d)[0, 0] - across @ taken[:, 1]
+        amount = -slope / max(cauchy_scale, 1e-12)
+        gains.append(slope**2 / max(cauchy_scale, 1e-12) if amount > 0 else 0.0)
+        first = trial.copy()
+        first[0] = np.clip(
+            trial[0] * np.clip(amount, 0.3, 300.0),
+            hypothesis.unknowns.low[0],
+            hypothesis.unknowns.high[0],
+        )
+        out.append(first)
+    if len(out) <= BEST + 1:
+        return out
+    order = np.argsort(gains)[::-1]
+    chosen: list[int] = []
+    for k in order:
+        if len(chosen) == BEST:
+            break
+        apart = [
+            np.abs(hypothesis.trials[k] - hypothesis.trials[c])[1:].max(initial=0.0) for c in chosen
+        ]
+        if min(apart, default=1.0) > APART:
+            chosen.append(int(k))
+    return [out[k] for k in chosen]
+
+
+def coarse(
+    estimator: SegmentEstimator,
+    base: BaseModel,
+    points: Sequence[InitialPoint],
+    hypothesis: Hypothesis,
+) -> tuple[Fit, ...]:
+    """The hypothesis fitted roughly: from each begin, its most promising trials."""
+    make, unknowns = joined(base, hypothesis)
+
+    def best(point: InitialPoint, trials: Sequence[Array], kept: int) -> list[Fit]:
+        starts = (np.concatenate([point.fit.x, x]) for x in trials)
+        fits = [_leaving(estimator, make, unknowns, x, point) for x in starts]
+        near = [
+            replace(fit, loss=estimator.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in fits
+        ]
+        return sorted(near, key=lambda f: f.loss)[:kept]
+
+    found = [
+        fit
+        for point in points
+        for fit in best(point, screened(estimator, base, point, hypothesis), hypothesis.kept)
+    ]
+    segments, first = estimator.segments, points[0]
+    if usual(estimator, first.fit) >= LOST and segments.pushed:
+        given = replace(first.fit, x=base.unknowns.mean, start=segments.start)
+        found += best(replace(first, fit=given), balanced(segments, base, hypothesis), 1)
+    return tuple(found)
+
+
+def _leaving(
+    estimator: SegmentEstimator, make: Make, unknowns: Unknowns, x: Array, point: InitialPoint
+) -> Fit:
+    """A rough fit; where no step from x is better as a whole, each segment's start stays if that is
+    better."""
+    line = make, unknowns, x, point.fit.start, ROUGH, point.cauchy_scale
+    fit = estimator.fit(*line)
+    return replace(estimator, apart=True).fit(*line) if np.array_equal(fit.x, x) else fit
+
+
+def refined(
+    estimator: SegmentEstimator, base: BaseModel, hypothesis: Hypothesis, near: Sequence[Fit]
+) -> FittedHypothesis:
+    """The hypothesis fitted to the end, from rough fits; where it is pressed against a bound that
+    is only usual, within wider ones again."""
+    make, unknowns = joined(base, hypothesis)
+    fits = [
+        estimator.refit(make, unknowns, estimator.fit(make, unknowns, fit.x, fit.start))
+        for fit in near
+    ]
+    found = scored(estimator, hypothesis, min(fits, key=lambda f: f.loss))
+    wider = hypothesis.unknowns.widened()
+    if not hypothesis.unknowns.pressed(found.x) or wider is hypothesis.unknowns:
+        return _free(estimator, base, found)
+    return refined(estimator, base, replace(hypothesis, unknowns=wider), [found.fit])
+
+
+def beside(hypothesis: Hypothesis, found: FittedHypothesis) -> Hypothesis:
+    """One with a place, to be tried where another was found, and twice as far to either side."""
+    low, high = found.x[-2:]
+    wide = high - low
+    longer = (low, min(high + wide, 1.0)), (max(low - wide, 0.0), high)
+    return hypothesis.placed([(low, high), *longer])
+
+
+def perturbed(
+    estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
+) -> FittedHypothesis:
+    """The candidate after its numbers were tried elsewhere: a fit does not see across an edge that
+    few segments cross, nor past a speed at which the joint begins to stick."""
+    make, unknowns = joined(base, found.hypothesis)
+    best = found.fit
+    n = len(best.x)
+    first = base.count
+    places = [(k, by) for by in MOVES for k in range(n - found.hypothesis.ends, n)]
+    shapes = [(k, FAR * unknowns.step[k]) for k in range(first, n - found.hypothesis.ends)]
+    for k, by in places + shapes:
+        for way in (-by, by):
+            x = best.x.copy()
+            x[k] += way
+            trial = estimator.fit(make, unknowns, x, best.start, FEW)
+            if trial.loss < best.loss - 1:
+                best = estimator.fit(make, unknowns, trial.x, trial.start)
+    return _free(
+        estimator, base, scored(estimator, found.hypothesis, estimator.refit(make, unknowns, best))
+    )
+
+
+def _free(
+    estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
+) -> FittedHypothesis:
+    """The candidate off the bounds that its numbers are pressed against, if it is as good there."""
+    hypothesis = found.hypothesis
+    if not hypothesis.unknowns.pressed(found.x):
+        return found
+    make, unknowns = joined(base, replace(hypothesis, unknowns=hypothesis.unknowns.inside()))
+    fit = estimator.fit(make, unknowns, found.fit.x, found.fit.start)
+    return scored(estimator, hypothesis, fit) if fit.loss < found.fit.loss + AS_GOOD else found
+
+
+def simplex_searched(
+    estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
+) -> FittedHypothesis:
+    """The candidate after a search without derivatives (Nelder and Mead 1965), in which every
+    segment's start is fitted anew: where a joint sticks and slips, the loss is jagged."""
+    make, unknowns = joined(base, found.hypothesis)
+    scale, k = FAR * unknowns.step, len(unknowns.step)
+
+    def at(z: Array) -> Array:
+        return np.clip(found.fit.x + scale * z, unknowns.low, unknowns.high)
+
+    def loss(z: Array) -> float:
+        return estimator.started(make(at(z)), SETTLING).loss + unknowns.penalty(at(z))
+
+    simplex = np.vstack([np.zeros(k), WIDE * np.eye(k)])
+    options = {"maxfev": SEARCHED * k, "initial_simplex": simplex}
+    x = at(minimize(loss, np.zeros(k), method="Nelder-Mead", options=options).x)
+    fit = estimator.refit(
+        make, unknowns, estimator.fit(make, unknowns, x, estimator.started(make(x)).start)
+    )
+    return scored(estimator, found.hypothesis, min(found.fit, fit, key=lambda one: one.loss))
+
+
+def scored(estimator: SegmentEstimator, hypothesis: Hypothesis, fit: Fit) -> FittedHypothesis:
+    """A fit of a hypothesis, with what its numbers cost."""
+    samples = estimator.samples
+    cost = hypothesis.neg_log_prior + len(hypothesis.unknowns.low) * np.log(max(samples, 2.0))
+    return FittedHypothesis(hypothesis, fit, fit.loss + cost, cost)
+
+
+def usual(estimator: SegmentEstimator, fit: Fit) -> float:
+    """Mean square residual of the segments, in the median; at least 1."""
+    each = (fit.squares / np.maximum(estimator.segments.count, 1))[estimator.counts]
+    return max(float(np.median(each)), 1.0) if len(each) else 1.0

@@ -1,0 +1,297 @@
+"""How bouncy the ends of the range are: by the segments with impacts, which tell of nothing else.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, scored
+from joda.estimation.base_model import MIN_SAMPLES, BaseModel
+from joda.estimation.estimator import Fit, SegmentEstimator
+from joda.estimation.segments import Segments
+from joda.joints.joint_model import JointModel
+from joda.profile import Channels, Profile
+from joda.scenes.limits import IMPEDANCE, KNOCK_STEPS, rebounding
+
+Array = NDArray[np.float64]
+
+KNOCKS = 2
+"""Fewest impacts at an end whose speeds tell of it."""
+CLEARLY = 0.07
+"""How much more of its speed an end must throw back than the model's."""
+CHANCE, PART = 60.0, 0.1
+"""Least gain in loss of a bouncier end that is more than chance, and least part of the loss."""
+MOST = 24
+"""Segments with impacts at an end from which on only some are looked at."""
+RATIOS = np.linspace(0.2, 0.95, 11)
+"""Restitutions that are tried."""
+FEWEST = 3
+"""Restitutions between which the best one is told, at the least."""
+SHORTEST, TIMES = 6, 8
+"""Steps that a impact lasts at the least without damping, and how many durations are tried."""
+CLEAR = 3.0
+"""How far off an end a joint must be, in noises, not to be at it."""
+AROUND = 5
+"""Samples before and after a impact that tell its speeds."""
+KNOCK_TIME = 0.6
+"""In which a joint goes through its range towards a impact, s."""
+
+
+def restitution_fit(
+    estimator: SegmentEstimator,
+    base: BaseModel,
+    fit: Fit,
+    rebounds: dict[int, "Rebound"],
+    hypothesis: Hypothesis,
+) -> FittedHypothesis | None:
+    """How bouncy an end is, or both, by the segments with impacts there; None if there are none.
+
+    Args:
+        estimator, base, fit: the model and how it was fitted.
+        rebounds: what the impacts at each end tell.
+        hypothesis: bouncy ends.
+    """
+    ends = ends_of(hypothesis)
+    if not (there := [rebounds[side] for side in ends if side in rebounds]):
+        return None
+    whole = Rebound.together(there)
+    ratio = best_ratio(whole, estimator.segments, base, ends)[0]
+    x = np.append(fit.x, np.clip(ratio, hypothesis.unknowns.low, hypothesis.unknowns.high))
+    return scored(estimator, hypothesis, replace(fit, x=x, loss=fit.loss - whole.gain))
+
+
+def best_ratio(
+    whole: "Rebound", segments: Segments, base: BaseModel, ends: Sequence[int]
+) -> tuple[float, float]:
+    """The restitution of one end or of both, and its standard error.
+
+    What suits the impacts best is jagged where stops are hard, and the speeds before and after them
+    are changed by a force: where none acted, the mean of both is nearer.
+    """
+    seen = speed_ratios(segments, base, ends)
+    if len(seen) < KNOCKS:
+        return whole.ratio, whole.error
+    speeds = mean_of(seen)[0]
+    ratio = whole.ratio if segments.pushed else (whole.ratio + speeds) / 2
+    return ratio, float(np.hypot(whole.error, (whole.ratio - speeds) / 2))
+
+
+@dataclass(frozen=True)
+class Rebound:
+    """How well stops of some restitutions suit the impacts at an end.
+
+    Attributes:
+        ratios: of the speed after a impact to that before it, rising, shape (n,).
+        losses: of the segments with each of them, shape (n,).
+        own: loss with the model's own restitution.
+        samples: how many there are.
+    """
+
+    ratios: Array
+    losses: Array
+    own: float
+    samples: float
+
+    @classmethod
+    def together(cls, ends: Sequence["Rebound"]) -> "Rebound":
+        """Of ends that have the same restitution."""
+        ratios = np.unique(np.concatenate([end.ratios for end in ends]))
+        losses = sum(np.interp(ratios, end.ratios, end.losses) for end in ends)
+        own, samples = sum(end.own for end in ends), sum(end.samples for end in ends)
+        return cls(ratios, np.asarray(losses), own, samples)
+
+    @property
+    def gain(self) -> float:
+        """In loss, by the best restitution."""
+        return self.own - float(self.losses.min())
+
+    @property
+    def bouncier(self) -> bool:
+        """Whether a restitution that is larger than the model's is clearly better."""
+        return self.gain > max(CHANCE, PART * self.own)
+
+    def may_be(self, ratio: float) -> bool:
+        """Whether a restitution is not clearly worse than the best one, or the model's."""
+        loss = float(np.interp(ratio, self.ratios, self.losses))
+        least = min(self.own, float(self.losses.min()))
+        return loss - least < max(CHANCE, PART * least)
+
+    @property
+    def ratio(self) -> float:
+        """The best restitution, between those that were tried."""
+        return self._parabola[0]
+
+    @property
+    def error(self) -> float:
+        """Its standard error, with what the best one leaves as noise."""
+        return self._parabola[1]
+
+    @property
+    def _parabola(self) -> tuple[float, float]:
+        """Where the least one through the three losses about the best is, and its error."""
+        k = int(np.clip(np.argmin(self.losses), 1, len(self.ratios) - 2))
+        e, loss = self.ratios[k - 1 : k + 2], self.losses[k - 1 : k + 2]
+        cauchy_scale, slope, _ = np.polyfit(e - e[1], loss, 2)
+        noise = max(float(self.losses.min()) / max(self.samples, 1.0), 1.0)
+        if cauchy_scale <= 0:
+            return float(self.ratios[np.argmin(self.losses)]), float(e[2] - e[0])
+        best = e[1] - slope / cauchy_scale / 2
+        return float(np.clip(best, e[0], e[2])), float(np.sqrt(noise / cauchy_scale))
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """The segments with impacts at an end.
+
+    How long and how deep a impact is tells of the stop's stiffness, which is another matter: every
+    restitution is tried with the stiffness that suits it best.
+
+    Attributes:
+        estimator: of these segments alone.
+        given: the joint with the model's own ends.
+        own: the model's restitution there.
+        times: that impacts may last without damping, s.
+        ratios: restitutions that are tried.
+    """
+
+    estimator: SegmentEstimator
+    given: JointModel
+    own: float
+    times: Array
+    ratios: Array
+
+    def rebound(self, profile: Profile) -> Rebound:
+        """How well restitutions suit the impacts of a joint with a profile."""
+        own = min(self._loss(self.given, profile), self._best(self.own, profile))
+        losses = np.array([self._best(ratio, profile) for ratio in self.ratios])
+        return Rebound(self.ratios, losses, own, self.estimator.samples)
+
+    def _best(self, ratio: float, profile: Profile) -> float:
+        """Loss with a restitution, and the stiffness that suits it best."""
+        return min(self._loss(stopped(self.given, ratio, t), profile) for t in self.times)
+
+    def _loss(self, joint_model: JointModel, profile: Profile) -> float:
+        return self.estimator.started(
+            joint_model.simulator(profile, self.estimator.segments.h)
+        ).loss
+
+
+def impacts_at(segments: Segments, base: BaseModel, given: JointModel) -> dict[int, Impacts]:
+    """Of each end that has impacts, -1 low and 1 high, some of them, evenly spread.
+
+    None of ends that throw back so much in the model that hardly more can be tried, nor of such
+    that the speeds around impacts tell to be no bouncier: what else is wrong, or falls between two
+    samples, makes a bouncier end fit better all the same.
+    """
+    sides, own, shortest = knocked(segments, base), rebound(base, given), SHORTEST * base.h
+    times = np.geomspace(shortest, max(2 * segments.length, 2 * shortest), TIMES)
+    out = {}
+    for side in (-1, 1):
+        numbers = np.flatnonzero(sides == side)
+        if not len(numbers):
+            continue
+        kept = np.isin(np.arange(len(sides)), numbers[:: len(numbers) // MOST + 1])
+        ratios = RATIOS
+        if len(seen := speed_ratios(segments, base, [side])):
+            mean, error = mean_of(seen)
+            if mean + error < own + CLEARLY:
+                continue
+            ratios = np.append(RATIOS, mean)
+        tried = np.unique(ratios[(ratios > own + CLEARLY) & (ratios <= RATIOS[-1])])
+        if len(tried) < FEWEST:
+            continue
+        estimator = SegmentEstimator(segments.only(kept), np.ones(int(kept.sum()), bool))
+        out[side] = Impacts(estimator, given, own, times, tried)
+    return out
+
+
+def stopped(joint_model: JointModel, ratio: float, time: float) -> JointModel:
+    """The joint with ends of a restitution, at which a impact without damping lasts a time (s)."""
+    solimp = IMPEDANCE, IMPEDANCE, *joint_model.solimp[2:]
+    return replace(joint_model, solref=rebounding(ratio, time / KNOCK_STEPS), solimp=solimp)
+
+
+def ends_of(hypothesis: Hypothesis) -> list[int]:
+    """Which ends it is of: -1 the low one, 1 the high one."""
+    first, last = hypothesis.interval(hypothesis.trials[0])
+    return [side for side, there in ((-1, first <= 0.0), (1, last >= 1.0)) if there]
+
+
+def knocked(segments: Segments, base: BaseModel) -> NDArray[np.intp]:
+    """At which end each segment has a impact: -1 low, 1 high, 0 none; shape (m,)."""
+    middle = float(np.mean(base.profile.joint.range))
+    told = segments.impacts & (segments.count >= MIN_SAMPLES)
+    out = np.zeros(len(told), np.intp)
+    for k in np.flatnonzero(told):
+        row = segments.rows[k]
+        position = segments.position[row[row >= 0]] - middle
+        out[k] = np.sign(position[np.argmax(np.abs(position))])
+    return out
+
+
+def mean_of(measured: Array) -> tuple[float, float]:
+    """Mean restitution of impacts and its standard error, by their errors or their scatter."""
+    ratio, error = measured.T
+    weight = error**-2.0
+    mean = float(weight @ ratio / weight.sum())
+    free = max(len(ratio) - 1, 1)
+    scatter = float(np.sqrt(weight @ (ratio - mean) ** 2 / weight.sum() / free))
+    return mean, max(scatter, float(weight.sum() ** -0.5))
+
+
+def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Array:
+    """Of the first impact in each segment: speed after per speed before, and its standard error.
+
+    The speeds are those of lines through the samples before the joint is at the end, and after it
+    has left it.
+
+    Returns:
+        shape (impacts, 2); impacts without enough samples before or after tell none.
+    """
+    lo, hi = base.profile.joint.range
+    out = []
+    sides = knocked(segments, base)
+    for k in np.flatnonzero(np.isin(sides, ends)):
+        row = segments.rows[k]
+        own = row[row >= 0]
+        near = max(own[0] - AROUND, 0), min(own[-1] + 1 + 2 * AROUND, len(segments.time))
+        t, y = segments.time[slice(*near)], segments.position[slice(*near)]
+        noise = 1 / float(segments.sharpness[k, 0])
+        away = hi - y if sides[k] > 0 else y - lo
+        inside = away > CLEAR * noise
+        if inside.all():  # the impact is between two samples
+            inside[np.argmin(away)] = False
+        first = int(np.argmin(inside))  # at the end
+        back = first + int(np.argmax(inside[first:]))  # off it again
+        parts = slice(first - AROUND, first), slice(back, back + AROUND)
+        if first < AROUND or back == first or back + AROUND > len(t):
+            continue
+        if not inside[parts[1]].all() or (np.diff(t[parts[0].start : parts[1].stop]) <= 0).any():
+            continue  # it hops there, or another run begins
+        (before, off), (after, off_after) = (_slope(t[part], y[part]) for part in parts)
+        if before * sides[k] > 0:
+            ratio = -after / before
+            out.append((ratio, noise * np.hypot(off_after, ratio * off) / abs(before)))
+    return np.array(out).reshape(-1, 2)
+
+
+def _slope(t: Array, y: Array) -> tuple[float, float]:
+    """Of a line through samples, and its standard error for noise of 1."""
+    t = t - t.mean()
+    square = float(t @ t)
+    return float(t @ y) / square, square**-0.5
+
+
+def rebound(base: BaseModel, given: JointModel) -> float:
+    """Speed after a impact, per speed before, of the model with its own ends."""
+    profile = base.profile.model_copy(update={"channels": Channels()})
+    lo, hi = profile.joint.range
+    steps, speed = round(KNOCK_TIME / base.h), (hi - lo) / KNOCK_TIME
+    start = np.array([[hi - 0.2 * (hi - lo), speed]])
+    begin = np.zeros(1, np.int64)
+    simulator = replace(given, weight=(0.0, 0.0), servo=None).simulator(profile, base.h)
+    before, after = simulator.replay(np.zeros(steps), begin, start, np.ones(1, bool), base.h)
+    return float((before[-1] - after[-1]) / base.h / speed)

@@ -1,0 +1,283 @@
+"""What may be missing, ranked: from a fit of every hypothesis to the best ones of each effect."""
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from os import cpu_count
+from typing import TypeVar
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from joda.diagnosis.baseline import RESTITUTION, Baseline, CoarseFit
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, beside, joined
+from joda.estimation.estimator import BLAS, Fit, SegmentEstimator
+from joda.profile import Profile
+
+PERTURBED, NEAR = 4, 3.0
+"""Of how many effects the numbers are tried elsewhere, and up to which part of the least loss."""
+QUICK = 1200
+"""Samples up to which they are tried whatever their loss; of more, up to that part of the own."""
+SEARCHED, FEW = 2, 8
+"""Of how many effects they are searched without derivatives, and of how many numbers at most."""
+ENOUGH, FAR = 1.5, 5.0
+"""Loss per sample at which nothing more can be found, and from how many times the least a rough fit
+is then left as it is."""
+NARROWED = 6
+"""How many effects are looked at again in longer segments, where the first is not sure."""
+WELLS = {"detent_internal", "bistable_mechanism_internal"}
+"""Effects of which one may stand in for the other where no run went all the way."""
+TELLS, TELLS_EACH = 60.0, 0.1
+"""Gain in loss from which segments without impacts tell of an effect; the same, per sample."""
+QUIET = 0.3
+"""Part of the segments, the better ones, that tell the noise."""
+WORST = 1.5
+"""Mean square residual that noise may make."""
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What may be missing from a model.
+
+    Attributes:
+        baseline: the model and its runs.
+        candidates: the best one of each effect, the most likely first.
+        level: mean square residual that counts as noise, 1 at least.
+        n_effective: how many samples count.
+        restitution: whether impacts tell of bouncier ends than the model's, and that is not tried.
+    """
+
+    baseline: Baseline
+    candidates: tuple[FittedHypothesis, ...]
+    level: float
+    n_effective: float
+    restitution: bool
+
+
+Progress = Callable[[int, int, str], None]
+A = TypeVar("A", Hypothesis, CoarseFit, FittedHypothesis)
+T = TypeVar("T", CoarseFit, FittedHypothesis)
+
+
+def rank(
+    baseline: Baseline,
+    exclude: Collection[str] = (),
+    progress: Progress = lambda done, total, what: None,
+    roughly: bool = False,
+    possible: Callable[[Profile, str], bool] = lambda profile, effect: True,
+) -> Ranking:
+    """Fits every hypothesis to measured runs.
+
+    Args:
+        baseline: the model and its runs.
+        exclude: effects that are not tried.
+        progress: told how many hypotheses are done, of how many, and the last one's name.
+        roughly: whether only the most promising ones are fitted to the end.
+        possible: whether a profile with an effect can be meant.
+    """
+    tried = [h for h in baseline.hypotheses if h.effect not in {*exclude, RESTITUTION}]
+    restitution = [h for h in baseline.hypotheses if h.effect == RESTITUTION]
+    silent = RESTITUTION in exclude
+    with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
+        work = _Work(pool, progress, 2 * len(tried) + PERTURBED)
+        candidates = _fitted(baseline, tried, work, roughly)
+        if not roughly:
+            candidates += _beside(baseline, tried, candidates, work)
+            candidates += _perturbed(baseline, candidates, work)
+            candidates += _simplex_searched(baseline, candidates, work)
+        baseline = _restarted(baseline, candidates)
+        others = [one.written(baseline.base) for one in _best(candidates)[:1]]
+        ends = baseline.restitution(restitution, others)
+        if not silent and not _shown_without_impacts(baseline, candidates):
+            candidates += ends
+    there = [
+        one
+        for one in candidates
+        if not one.vanished and possible(one.written(baseline.base), one.hypothesis.effect)
+    ]
+    return Ranking(baseline, *_scored(baseline.estimator, there), restitution=silent and bool(ends))
+
+
+def narrowed(
+    baseline: Baseline,
+    before: Ranking,
+    progress: Progress = lambda done, total, what: None,
+) -> Ranking:
+    """The best effects of a ranking again, fitted to longer segments from where they were found.
+
+    Where one that left only noise of shorter segments leaves more of these, its numbers are tried
+    elsewhere too: what goes over a barrier in one segment and not in another is no way for a fit.
+
+    Args:
+        baseline: the model and its runs in longer segments.
+        before: the ranking.
+        progress: told how many hypotheses are done, of how many, and the last one's name.
+    """
+    estimator = baseline.estimator
+    tried = [g for g in before.candidates if g.hypothesis.effect != RESTITUTION][:NARROWED]
+
+    def again(found: FittedHypothesis) -> FittedHypothesis:
+        make, _ = joined(baseline.base, found.hypothesis)
+        start = estimator.started(make(found.fit.x)).start
+        candidate = baseline.refined(
+            CoarseFit(found.hypothesis, (replace(found.fit, start=start),))
+        )
+        stuck = _only_noise(found, before.baseline.estimator) and not _only_noise(
+            candidate, estimator
+        )
+        return baseline.perturbed(candidate) if stuck else candidate
+
+    with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
+        candidates = _Work(pool, progress, len(tried)).all(again, tried)
+        baseline = _restarted(baseline, candidates)
+    there = [one for one in candidates if not one.vanished]
+    return Ranking(baseline, *_scored(estimator, there), restitution=before.restitution)
+
+
+@dataclass
+class _Work:
+    """Threads, and how much they have done."""
+
+    pool: ThreadPoolExecutor
+    progress: Progress
+    total: int
+    done: int = 0
+
+    def all(self, make: Callable[[A], T], each: Iterable[A]) -> list[T]:
+        """What is made of each."""
+        out = []
+        for one in self.pool.map(make, each):
+            self.done += 1
+            self.progress(self.done, max(self.total, self.done), one.hypothesis.effect)
+            out.append(one)
+        return out
+
+
+def _fitted(
+    baseline: Baseline, tried: Sequence[Hypothesis], work: _Work, roughly: bool
+) -> list[FittedHypothesis]:
+    """All hypotheses fitted; where one leaves only noise, those that are far off, roughly."""
+    coarse_fits = sorted(work.all(baseline.coarse, tried), key=lambda one: one.best.loss)
+    candidates = work.all(baseline.refined, coarse_fits[:PERTURBED])
+    if roughly:
+        return candidates + work.all(baseline.coarse_scored, coarse_fits[PERTURBED:])
+    least = min((one.fit.loss for one in candidates), default=0.0)
+    most = FAR * least if least < ENOUGH * baseline.estimator.samples else np.inf
+    near = [one for one in coarse_fits[PERTURBED:] if one.best.loss < most]
+    far = [one for one in coarse_fits[PERTURBED:] if one.best.loss >= most]
+    return candidates + work.all(baseline.refined, near) + work.all(baseline.coarse_scored, far)
+
+
+def _beside(
+    baseline: Baseline,
+    tried: Sequence[Hypothesis],
+    candidates: Sequence[FittedHypothesis],
+    work: _Work,
+) -> list[FittedHypothesis]:
+    """Those that may be where the best one was found."""
+    alike = [
+        beside(h, best)
+        for best in _best(candidates)[:1]
+        for h in tried
+        if {h.effect, best.hypothesis.effect} == WELLS
+    ]
+    return work.all(baseline.refined, work.all(baseline.coarse, alike))
+
+
+def _perturbed(
+    baseline: Baseline, candidates: Sequence[FittedHypothesis], work: _Work
+) -> list[FittedHypothesis]:
+    """The best effects, in every variant that is near, with their numbers tried elsewhere."""
+    best = _best(candidates)[:PERTURBED]
+    names = {one.hypothesis.effect for one in best}
+    others = [one for one in candidates if one.hypothesis.effect in names and one is not best[0]]
+    perturbed = work.all(baseline.perturbed, best[:1])
+    least = min((one.fit.loss for one in (*candidates, *perturbed)), default=0.0)
+    part = min(QUICK / max(baseline.estimator.samples, 1.0), 1.0)
+    most = max(NEAR * least, part * baseline.fit.loss)
+    near = [one for one in others if one.fit.loss < most]
+    work.total = work.done + len(near)
+    return perturbed + work.all(baseline.perturbed, near)
+
+
+def _simplex_searched(
+    baseline: Baseline, candidates: Sequence[FittedHypothesis], work: _Work
+) -> list[FittedHypothesis]:
+    """The best effects where they leave more than noise, searched without derivatives."""
+    best = _best(candidates)[:SEARCHED]
+    least = min((one.fit.loss for one in best), default=0.0)
+    if least < ENOUGH * baseline.estimator.samples:
+        return []
+    near = [one for one in best if one.fit.loss < NEAR * least and len(one.fit.x) <= FEW]
+    return work.all(baseline.simplex_searched, near)
+
+
+def _shown_without_impacts(baseline: Baseline, candidates: Sequence[FittedHypothesis]) -> bool:
+    """Whether segments without impacts tell of an effect, with which only noise is left of them:
+    then how bouncy the ends are is asked once that is added."""
+    samples = baseline.estimator.samples
+    best = min(candidates, key=lambda one: one.score, default=None)
+    if best is None or best.fit.loss > ENOUGH * samples:
+        return False
+    return baseline.fit.loss - best.fit.loss - best.cost > max(TELLS, TELLS_EACH * samples)
+
+
+def _only_noise(candidate: FittedHypothesis, estimator: SegmentEstimator) -> bool:
+    """Whether a candidate leaves no more than noise of some segments."""
+    return candidate.fit.loss < ENOUGH * estimator.samples
+
+
+def _restarted(baseline: Baseline, candidates: Sequence[FittedHypothesis]) -> Baseline:
+    """The model as it is, fitted from where the best candidate is too: it may do as well from
+    there."""
+    estimator, base = baseline.estimator, baseline.base
+    if not candidates:
+        return baseline
+    best = min(candidates, key=lambda one: one.fit.loss).fit
+    fit = estimator.fit(base.simulator, base.unknowns, best.x[: base.count], best.start)
+    fit = estimator.refit(base.simulator, base.unknowns, fit)
+    return replace(baseline, fit=min(baseline.fit, fit, key=lambda one: one.loss))
+
+
+def _best(candidates: Iterable[FittedHypothesis]) -> list[FittedHypothesis]:
+    """The best candidate of each effect, the lowest score first."""
+    best: dict[str, FittedHypothesis] = {}
+    for one in sorted(candidates, key=lambda g: g.score):
+        best.setdefault(one.hypothesis.effect, one)
+    return list(best.values())
+
+
+def rescaled(estimator: SegmentEstimator, fit: Fit, level: float) -> float:
+    """A fit's loss, with what its numbers lose by being off (and impacts), where noise is more."""
+    beside = fit.loss - estimator.loss(fit.squares)
+    return estimator.loss(fit.squares, level=level) + beside / level
+
+
+def _scored(
+    estimator: SegmentEstimator, candidates: Sequence[FittedHypothesis]
+) -> tuple[tuple[FittedHypothesis, ...], float, float]:
+    """The best candidates, scored by what the best of them leaves in its better segments.
+
+    Recorded noise is often less than all that a simulation cannot follow: clocks, forces, whatever
+    else is a little wrong. Such a misfit is all of one piece within a segment, which then counts as
+    one sample.
+
+    Returns:
+        the best one of each effect, the most likely first; the mean square residual that is
+        noise; how many samples count.
+    """
+    samples = estimator.samples
+    if not candidates or not samples:
+        return (), 1.0, samples
+    best = min(candidates, key=lambda g: g.fit.loss + g.cost).fit.squares
+    each = (best / np.maximum(estimator.segments.count, 1))[estimator.counts]
+    level = max(float(np.quantile(each, QUIET)), 1.0)
+    n_effective = float(estimator.counts.sum()) if level > WORST else samples
+
+    def scored(one: FittedHypothesis) -> FittedHypothesis:
+        loss = rescaled(estimator, one.fit, level) * n_effective / samples
+        cost = one.hypothesis.neg_log_prior + len(one.x) * np.log(max(n_effective, 2.0))
+        return replace(one, score=loss + cost)
+
+    return tuple(_best(map(scored, candidates))), level, n_effective

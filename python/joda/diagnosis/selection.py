@@ -1,0 +1,253 @@
+"""From a ranking to a verdict: is anything missing, how likely is each effect, is one enough.
+
+What the fits leave is the `Evidence`, every number that decides on it is one of the `Settings`, and
+`decide` is a function of these two alone.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from joda.diagnosis.baseline import Baseline
+from joda.diagnosis.hypotheses.base import KNOWN_LAW
+from joda.diagnosis.search import WORST, Ranking, rescaled
+from joda.estimation.estimator import SegmentEstimator, excess
+
+Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Every number that decides on evidence; excesses are per sample, beyond what noise makes.
+
+    Calibrated on simulated joints that hide an effect, and judged on families of these that were
+    left out (tests/benchmarks/calibrate.py; docs/diagnose.md).
+
+    Attributes:
+        sharpness: how fast an effect's probability falls with the excess that it leaves.
+        least_gain: least gain in loss of an effect that is more than chance.
+        noticeable: the same, per sample.
+        crude: part of the model's excess that any true effect may leave where more than noise is
+            left of all.
+        weak: part of the model's excess that any true effect may leave, up to `left`.
+        left: see `weak`; noise is not known better.
+        apart: part of what the next best effect leaves that a true one may leave, if that is less:
+            where two are nearly as good, and neither leaves only noise, both only resemble what is
+            missing.
+        little: excess that is never worth a word.
+        chance: so many standard deviations the noise may be more than it was taken for, or any
+            amount less.
+        hardly: probability of the first effect below which a small excess is nothing that an effect
+            explains.
+        much: excess that is, even if no effect lowers it.
+        strictly: factor of what a true effect may leave in a second look.
+        noticed: excess of the model in a second look from which that tells of effects.
+    """
+
+    sharpness: float = 3.0
+    least_gain: float = 60.0
+    noticeable: float = 0.02
+    crude: float = 0.1
+    weak: float = 0.12
+    left: float = 0.12
+    apart: float = 0.5
+    little: float = 0.05
+    chance: float = 2.0
+    hardly: float = 0.1
+    much: float = 0.5
+    strictly: float = 0.7
+    noticed: float = 0.1
+
+
+SETTINGS = Settings()
+EVEN, SURE = 0.5, 0.9
+"""Probabilities above which an answer is more likely than not, and sure: then neither a closer look
+is taken nor a further experiment proposed."""
+LITTLE, LEFT, MUCH = SETTINGS.little, SETTINGS.left, SETTINGS.much
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the fits of a ranking leave; excesses are per sample, beyond what noise makes.
+
+    Attributes:
+        samples: how many there are.
+        n_effective: how many count.
+        noisy: whether more than noise is left of all.
+        restitution: whether impacts tell of bouncier ends than the model's, and that is not tried.
+        model: excess of the model with its own strengths as fitted.
+        tolerant: the same, where noise may be as much as the best of all leaves, within bounds.
+        own: the same, where noise is as much as the best of all leaves.
+        gain: in loss, by the first effect, less the price of its numbers.
+        misfit_tolerance: part of the model's excess that the first effect may leave if it is the
+            true one.
+        effects: names, the likeliest first.
+        left: excess that each leaves, with its price, where noise is as for `own`.
+    """
+
+    samples: float
+    n_effective: float
+    noisy: bool
+    restitution: bool
+    model: float
+    tolerant: float
+    own: float
+    gain: float
+    misfit_tolerance: float
+    effects: tuple[str, ...]
+    left: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A ranking with its probabilities.
+
+    Attributes:
+        verdict: on the model.
+        probabilities: of the candidates, in their order.
+        excess: per sample, of the model as it is and of each candidate.
+        effects: the candidates' names.
+    """
+
+    verdict: Verdict
+    probabilities: tuple[float, ...]
+    excess: tuple[float, tuple[float, ...]]
+    effects: tuple[str, ...] = ()
+
+    @property
+    def named(self) -> tuple[tuple[str, float], ...]:
+        """Effects and their probabilities."""
+        return tuple(zip(self.effects, self.probabilities, strict=True))
+
+    @property
+    def unknown(self) -> float | None:
+        """Probability that it is none of these; None where nothing was weighed."""
+        return max(1.0 - sum(self.probabilities), 0.0) if self.probabilities else None
+
+    @property
+    def likely(self) -> bool:
+        """Whether an effect is missing, and one of those named is more likely than not."""
+        return self.verdict == "missing_effect" and sum(self.probabilities) > EVEN
+
+    @property
+    def share(self) -> float:
+        """Part of the model's excess that the first candidate leaves; all where that is too little
+        to be told from what every candidate leaves."""
+        own, left = self.excess
+        return left[0] / own if left and own > LITTLE else 1.0
+
+
+def excess_of(baseline: Baseline) -> float:
+    """Of the model as it is, per sample, beyond what noise makes."""
+    return excess(baseline.fit.loss, max(baseline.estimator.samples, 1.0))
+
+
+def evidence(ranking: Ranking) -> Evidence:
+    """What the fits of a ranking leave."""
+    estimator, fit, candidates = (
+        ranking.baseline.estimator,
+        ranking.baseline.fit,
+        ranking.candidates,
+    )
+    samples = max(estimator.samples, 1.0)
+    first = candidates[0] if candidates else None
+    tolerant = estimator.loss(fit.squares, level=min(ranking.level, WORST))
+    return Evidence(
+        samples=estimator.samples,
+        n_effective=ranking.n_effective,
+        noisy=ranking.level > WORST,
+        restitution=ranking.restitution,
+        model=excess_of(ranking.baseline),
+        tolerant=excess(tolerant, samples),
+        own=excess(rescaled(estimator, fit, ranking.level), samples),
+        gain=fit.loss - first.fit.loss - first.cost if first else 0.0,
+        misfit_tolerance=first.hypothesis.misfit_tolerance if first else KNOWN_LAW,
+        effects=tuple(candidate.hypothesis.effect for candidate in candidates),
+        left=tuple(
+            excess(candidate.score, max(ranking.n_effective, 1.0)) for candidate in candidates
+        ),
+    )
+
+
+def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Selection:
+    """`decide` on a ranking's evidence."""
+    return decide(evidence(ranking), strictness, wholly)
+
+
+def decide(
+    found: Evidence,
+    strictness: float = 1.0,
+    wholly: bool = False,
+    settings: Settings = SETTINGS,
+) -> Selection:
+    """The verdict, and how likely each effect is the missing one.
+
+    Args:
+        found: what the fits leave.
+        strictness: factor of what the true effect may leave.
+        wholly: whether it is unexplained where more than noise is left of all.
+        settings: every number that decides.
+    """
+    if not found.samples:
+        return Selection("adequate", (), (0.0, ()))
+    tolerant = found.tolerant < settings.much and not found.restitution
+    without: Verdict = "adequate" if tolerant else "unexplained"
+    if not found.left:
+        return Selection(without, (), (found.model, ()))
+    left = np.array(found.left)
+    noise = min(
+        left.min(), settings.chance * float(np.sqrt(2 / found.n_effective))
+    )  # not known better
+    own, left = max(found.own - noise, 0.0), left - noise
+    part = settings.crude if found.noisy else found.misfit_tolerance
+    least = max(KNOWN_LAW * own, min(settings.weak * own, settings.left))
+    beside = settings.apart * left[1:].min(initial=np.inf)
+    unknown = strictness * max(min(part * own, beside), least)
+    if wholly and found.noisy:  # then an unknown one is as likely as the first
+        unknown = min(unknown, float(left[0]))
+    weights = (left + settings.little) ** -settings.sharpness
+    novelty_weight = (unknown + settings.little) ** -settings.sharpness
+    likely = weights / (weights.sum() + novelty_weight)
+    doubtful = likely[0] < settings.hardly or found.restitution
+    chance = max(settings.least_gain, settings.noticeable * found.samples)
+    if found.gain < chance or (own < settings.much and doubtful):
+        said = without
+    elif weights[0] <= novelty_weight:
+        said = "unexplained"
+    else:
+        said = "missing_effect"
+    excess = own, tuple(map(float, left))
+    return Selection(said, tuple(map(float, likely)), excess, found.effects)
+
+
+def shows(first: Ranking, longer: Baseline, settings: Settings = SETTINGS) -> bool:
+    """Whether more than noise is left of longer segments, be noise what was taken for it or what
+    the best candidate left of a first ranking's segments, for each degree of freedom."""
+    if excess_of(longer) > settings.noticed:
+        return True
+    best = min(
+        (candidate.fit.loss for candidate in first.candidates), default=first.baseline.fit.loss
+    )
+    own, its = _freedom(longer.estimator), _freedom(first.baseline.estimator)
+    return longer.fit.loss - best * own / its > settings.least_gain
+
+
+def _freedom(estimator: SegmentEstimator) -> float:
+    """Samples that count, less the two numbers of each segment's start."""
+    return max(estimator.samples - 2 * float(estimator.counts.sum()), 1.0)
+
+
+def closer_counts(before: Selection, closer: Selection) -> bool:
+    """Whether a look at the best effects in longer segments tells more: one is still missing, and
+    what the first leaves is no larger a part."""
+    return closer.verdict == "missing_effect" and closer.share <= before.share
+
+
+def second_counts(first: Selection, second: Selection, settings: Settings = SETTINGS) -> bool:
+    """Whether a second look, at longer segments, tells more than the first that left a question."""
+    if second.excess[0] <= settings.noticed:  # nothing shows there to be explained
+        return False
+    if first.verdict == "adequate":
+        return second.verdict != "adequate"
+    return second.verdict == "missing_effect" or second.share < first.share

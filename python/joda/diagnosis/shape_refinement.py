@@ -1,0 +1,301 @@
+"""Fits all numbers of a profile, with as many control points of an effect as the data support.
+
+First it has those of its template; then control points are added halfway between. What rises keeps
+rising, what falls falling, so that a magnet stays a magnet. Segments of the runs grow longer, as
+what is right in short ones is a good start for longer ones.
+"""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._core import JointSimulator
+from joda.component import Component
+from joda.diagnosis.departures import DOUBT, EFFECTS, Moved
+from joda.diagnosis.hypothesis_fits import usual
+from joda.effects import EndStopRestitution
+from joda.estimation.base_model import MIN_SAMPLES, as_it_is, segments_for, usable
+from joda.estimation.estimator import CAUCHY_SCALE, SegmentEstimator
+from joda.estimation.profile_parameters import DOUBT as USUAL
+from joda.estimation.profile_parameters import NARROWEST, Kind, Parameters
+from joda.estimation.unknowns import Unknowns
+from joda.field import evaluate
+from joda.measured.reading import Measured
+from joda.measured.visited import unvisited
+from joda.profile import CHANNELS, Channel, Channels, Profile
+
+Array = NDArray[np.float64]
+
+LONGER = (1 / 3, 1.0, 3.0)
+"""Lengths of segments, in units of the diagnosis' own."""
+LAST, LONGEST = (3.0, 9.0, 27.0), 1.5
+"""Those of the last fits, of the likeliest profile; and the longest, in which profiles are compared
+too, s."""
+FINER = 2
+"""How often control points are doubled."""
+FACTORS, LEAPS, CLEARLY = (0.5, 0.7, 1.4, 2.0), 3, 10.0
+"""By what one size is changed at a time, how often at most, and the least gain in score."""
+ROUNDS = 6
+"""Iterations with each length, while segments that are far off count, and after."""
+NUDGE = 0.004
+"""Step of a number for differences, in its own unit."""
+HELD = 1e-3
+"""Part of a number's usual doubt that is left to one that is held."""
+PRICE = 2.0
+"""What a control point must gain, of twice the log-likelihood (Akaike 1974)."""
+
+
+class Likelihood:
+    """Of measured runs, as MuJoCo would move the joint at the scene's own step, or of curves."""
+
+    def __init__(self, measured: Measured) -> None:
+        """Cuts the runs into segments."""
+        self.joint_model, self.segments = (
+            as_it_is(measured),
+            segments_for(measured, LONGEST, fine=False),
+        )
+        self.estimator = SegmentEstimator(self.segments, self.segments.count >= MIN_SAMPLES)
+        self.given = measured.profile
+        self.own = replace(self.joint_model, friction_row=measured.joint_model.friction_row)
+
+    def loss(self, profile: Profile) -> float:
+        """Twice the negative log-likelihood, robustly: a segment that is missed altogether, as the
+        joint goes over a barrier or just not, counts little."""
+        joint_model = self.own if profile is self.given else self.joint_model
+        return self.estimator.started(joint_model.simulator(profile, self.segments.h)).loss
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A profile that was tried.
+
+    Attributes:
+        profile: the whole one (`joda.scenes.native`).
+        unseen: its loss on runs held out of the fit.
+        score: its loss on all runs, and the price of its control points.
+    """
+
+    profile: Profile
+    unseen: float
+    score: float
+
+
+class Trials:
+    """Scores profiles of a joint."""
+
+    def __init__(self, train: Measured, held: Measured) -> None:
+        """Args: the joint and runs to fit; the same with runs held out."""
+        self.train = train
+        self.seen, self.unseen = Likelihood(train), Likelihood(held)
+        longer = LONGER if train.runs else (1.0,)  # curves' segments are all alike
+        usual_length = segments_for(train).length
+        self.lengths = [factor * usual_length for factor in longer]
+        most = max(LONGEST, self.lengths[-1])
+        self.last = sorted({min(factor * usual_length, most) for factor in LAST if train.runs})
+
+    def tried(self, profile: Profile) -> Tried:
+        """A profile, scored."""
+        loss = self.unseen.loss(profile)
+        price = PRICE * sum(len(part.x) for part in _parts(profile))
+        return Tried(profile, loss, self.seen.loss(profile) + loss + price)
+
+    def reshaped(
+        self, profile: Profile, effect: str, progress: Callable[[str], None]
+    ) -> list[Tried]:
+        """A profile, and what fits of all its numbers make of it.
+
+        Args:
+            profile: to be fitted.
+            effect: label of the components that may get more control points.
+            progress: what is being done.
+        """
+        found = self._leaps(self.tried(profile), progress)
+        profile = found[-1].profile
+        for finer in range(FINER + 1):
+            profile = resolved(profile, effect) if finer else profile
+            points = sum(len(part.x) for part in _parts(profile) if part.label == effect)
+            if finer and not points:
+                break
+            what = f"all numbers, {points} control points of the effect"
+            found += self._fits(profile, self.lengths, progress, what)
+            profile = found[-1].profile
+        found += self._leaps(likeliest(found), progress)
+        what = "all numbers once more"
+        return found + self._fits(likeliest(found).profile, self.last, progress, what)
+
+    def holding(
+        self, profile: Profile, parts: Collection[Moved], progress: Callable[[str], None]
+    ) -> list[Tried]:
+        """What fits of all other numbers make of a profile, while some parts stay as they are.
+
+        Args:
+            profile: to be fitted.
+            parts: that stay.
+            progress: what is being done.
+        """
+        return self._fits(
+            profile, self.lengths, progress, "the same, nearer to what was given", parts
+        )
+
+    def _fits(
+        self,
+        profile: Profile,
+        lengths: Sequence[float],
+        progress: Callable[[str], None],
+        what: str,
+        parts: Collection[Moved] = (),
+    ) -> list[Tried]:
+        """Fits in longer and longer segments, each from what the one before found."""
+        found = []
+        for length in lengths:
+            progress(what + (f", windows of {length:.2g} s" if self.train.runs else ""))
+            profile = refitted(self.train, profile, length, parts)
+            found.append(self.tried(profile))
+        return found
+
+    def _leaps(self, best: Tried, progress: Callable[[str], None]) -> list[Tried]:
+        """A profile, and better and better ones, each with one size much more or less: where runs
+        go over a barrier, or up to a stop, or just not, no fit gets there step by step."""
+        found = [best]
+        for _ in range(LEAPS):
+            progress("sizes that fits do not reach")
+            leapt = likeliest([found[-1], *map(self.tried, self._resized(found[-1].profile))])
+            if leapt.score > found[-1].score - CLEARLY:
+                break
+            found.append(leapt)
+        return found
+
+    def _resized(self, profile: Profile) -> Iterator[Profile]:
+        """The profile with one size much more or less."""
+        kinds: tuple[Kind, ...] = ("sizes", "effects")
+        parameters = Parameters(checked(profile), kinds, inertia=self.train.joint_model.inertia)
+        must = parameters.constraints
+        for k, slot in enumerate(parameters.slots):
+            for factor in FACTORS:
+                theta = parameters.start.copy()
+                theta[k] = np.log(factor) if slot.kind == "sizes" else factor * theta[k]
+                if np.all(must.G @ theta >= must.h):
+                    yield parameters.written(theta)
+
+
+def likeliest(found: Sequence[Tried]) -> Tried:
+    """The one with the least score."""
+    return min(found, key=lambda one: one.score)
+
+
+def _parts(profile: Profile) -> list[Component]:
+    channels = (getattr(profile.channels, name) for name in CHANNELS)
+    return [part for channel in channels for part in channel.components]
+
+
+def resolved(profile: Profile, effect: str | None = None) -> Profile:
+    """The same curves, nearly, of an effect or of all, with a control point halfway between each
+    two that are not close."""
+    channels = {}
+    for name in CHANNELS:
+        channel = getattr(profile.channels, name)
+        parts = tuple(
+            _finer(part) if effect in (None, part.label) else part for part in channel.components
+        )
+        channels[name] = channel.model_copy(update={"components": parts})
+    return profile.model_copy(update={"channels": Channels(**channels)})
+
+
+def _finer(part: Component) -> Component:
+    """Where control points are close, as in a steep edge, runs tell none between them."""
+    x, (a, b) = np.array(part.x), part.interval
+    wide = np.diff(x) * (b - a) >= 2 * NARROWEST
+    halves = ((x[1:] + x[:-1]) / 2)[wide]
+    between = evaluate(Channel(components=(part,)), a + (b - a) * halves)[0]
+    order = np.argsort(at := np.append(x, halves))
+    y = np.append(part.y, between)[order]
+    return part.model_copy(update={"x": tuple(map(float, at[order])), "y": tuple(map(float, y))})
+
+
+def checked(profile: Profile) -> Profile:
+    """The profile, validated as one from a file."""
+    return Profile.model_validate(profile.model_dump(exclude={"schema_version"}))
+
+
+def refitted(
+    train: Measured,
+    profile: Profile,
+    length: float,
+    parts: Collection[Moved] = (),
+) -> Profile:
+    """All numbers of a profile fitted, near where they were.
+
+    Args:
+        train: measured.
+        profile: its shapes are kept.
+        length: of segments, s.
+        parts: whose numbers stay as they are.
+    """
+    segments = segments_for(train, length, fine=False)  # at the scene's own step
+    bounces = any(isinstance(effect, EndStopRestitution) for effect in profile.effects)
+    estimator = SegmentEstimator(
+        segments, segments.count >= MIN_SAMPLES if bounces else usable(segments)
+    )
+    if not estimator.counts.any():
+        return profile
+    kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
+    inertia = train.joint_model.inertia
+    away = unvisited(train)
+    parameters = Parameters(checked(profile), kinds, inertia=inertia, away=away)
+    n = len(parameters.start)
+    if not n:
+        return profile
+    unbounded = np.full(n, np.inf)
+    mean, prior_std = _known(parameters, train.profile)
+    held = _held(parameters, parts)
+    mean, prior_std = np.where(held, parameters.start, mean), np.where(held, HELD, 1.0) * prior_std
+    unknowns = Unknowns(
+        -unbounded, unbounded, np.full(n, NUDGE), mean, prior_std, parameters.constraints
+    )
+    joint_model, h = as_it_is(train), segments.h
+
+    def make(theta: Array) -> JointSimulator:
+        return joint_model.simulator(parameters.written(theta, exact=True), h)
+
+    fit = estimator.fit(make, unknowns, parameters.start, iterations=0)
+    for cauchy_scale in (CAUCHY_SCALE * usual(estimator, fit), CAUCHY_SCALE):
+        fit = estimator.fit(make, unknowns, fit.x, fit.start, ROUNDS, cauchy_scale)
+    return parameters.written(estimator.refit(make, unknowns, fit, ROUNDS).x)
+
+
+def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:
+    """What is known of the numbers before the data, and how well.
+
+    Control points of the model as it was given are near what they are there, however often all is
+    fitted: else its friction and damping stand in for what is still missing.
+    """
+    mean, prior_std = parameters.start.copy(), parameters.prior_std.copy()
+    for k, (slot, scale) in enumerate(zip(parameters.slots, parameters.scales, strict=True)):
+        if slot.kind != "values":
+            continue
+        own, there = (
+            getattr(profile.channels, slot.channel).components
+            for profile in (parameters.profile, given)
+        )
+        if slot.component >= len(there):
+            continue
+        y = np.array(there[slot.component].y)
+        if y.any() and len(y) == len(own[slot.component].y):
+            mean[k] = y[slot.index] / scale
+            prior_std[k] *= DOUBT * np.abs(y).max() / scale / USUAL["values"]
+    return mean, prior_std
+
+
+def _held(parameters: Parameters, parts: Collection[Moved]) -> NDArray[np.bool_]:
+    """Which numbers are of some parts of the profile, shape (n,)."""
+    there = {(part.where, part.what) for part in parts}
+    keys = [one.key for one in parameters.profile.effects]
+    own = [
+        (EFFECTS, keys[slot.component])
+        if slot.kind == "effects"
+        else (slot.channel, slot.component)
+        for slot in parameters.slots
+    ]
+    return np.array([one in there for one in own], bool)

@@ -1,0 +1,1 @@
+"""Fits a joint's unknown numbers to segments of measured runs."""

@@ -1,0 +1,345 @@
+"""Fits a model with unknown numbers to segments of measured runs, and says how well it can.
+
+Gauss-Newton over the numbers and every segment's start, which is eliminated segment by segment. A
+segment's misfit counts in proportion while it is near the noise and only as its logarithm when it
+is far off, so that one bad segment, or a slightly wrong law, decides nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from joda.estimation.least_squares import bounded_step
+from joda.estimation.segments import Segments, Simulator
+from joda.estimation.unknowns import EMPTY, NOTHING, Unknowns
+
+Array = NDArray[np.float64]
+Make = Callable[[Array], Simulator]
+"""A joint, or a scene, with its numbers."""
+
+BLAS = "blas"
+"""Fits' matrices are small: threads of their own would only be in the way of ours."""
+CAUCHY_SCALE = 20.0
+"""Mean square residual at which the Cauchy loss of a segment bends into a logarithm."""
+BACKTRACKS = 6
+"""Step lengths that an iteration tries, each shorter than the last."""
+LOSS_TOLERANCE = 0.5
+"""Decrease of the loss below which a fit has converged."""
+STATE_STEP = 0.01
+"""Finite-difference step, in prior standard deviations of the initial state."""
+ROWS = ((0, 1), (0, 1))
+"""Axes of segments and samples, over which products are summed."""
+
+
+def excess(loss: float, count: float) -> float:
+    """A loss per sample, beyond what noise makes of it."""
+    return loss / count - CAUCHY_SCALE * float(np.log1p(1 / CAUCHY_SCALE))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model.
+
+    Attributes:
+        x: its numbers, shape (k,).
+        start: of the segments, shape (m, d).
+        squares: sum of squared residuals of each segment, shape (m,).
+        loss: robust, with the numbers' penalty; twice a negative log-likelihood.
+    """
+
+    x: Array
+    start: Array
+    squares: Array
+    loss: float
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """A model about one point: residuals and their derivatives, weighted.
+
+    Attributes:
+        r: shape (m, n).
+        J: by the numbers, shape (m, n, k).
+        S: by the starts' doubts, shape (m, n, d).
+        z: how far the starts are from the measured ones, in doubts, shape (m, d).
+        weight: of each segment, shape (m,).
+    """
+
+    r: Array
+    J: Array
+    S: Array
+    z: Array
+    weight: Array
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Of the starts' own normal matrices, shape (m, d, d)."""
+        A = np.einsum("mni,mnj->mij", self.S, self.S) + np.eye(self.S.shape[2])
+        return np.asarray(np.linalg.inv(A))
+
+    def products(self, a: Array, b: Array, za: Array | None = None) -> Array:
+        """Weighted inner products of what of a and b no start can take up.
+
+        Args:
+            a, b: shapes (m, n, p) and (m, n, q).
+            za: a's part on the starts' own rows, shape (m, d, p); None: zero.
+        """
+        across = self.S.transpose(0, 2, 1)
+        Sa, Sb = across @ a, across @ b
+        if za is not None:
+            Sa = Sa + za
+        w = self.weight[:, None, None]
+        own, taken = np.tensordot(w * a, b, ROWS), np.tensordot(w * Sa, self.inverse @ Sb, ROWS)
+        return np.asarray(own - taken)
+
+    def normal(self) -> tuple[Array, Array]:
+        """The normal equations of the numbers: matrix and gradient."""
+        gradient = self.products(self.r[:, :, None], self.J, self.z[:, :, None])[0]
+        return self.products(self.J, self.J), gradient
+
+    def normals(self) -> tuple[Array, Array]:
+        """Each segment's part of the normal equations: shapes (m, k, k) and (m, k)."""
+        w = self.weight[:, None, None]
+        across = self.S.transpose(0, 2, 1)
+        SJ, Jt = across @ self.J, self.J.transpose(0, 2, 1)
+        Sr = across @ self.r[:, :, None] + self.z[:, :, None]
+        H = Jt @ self.J - SJ.transpose(0, 2, 1) @ self.inverse @ SJ
+        g = Jt @ self.r[:, :, None] - SJ.transpose(0, 2, 1) @ self.inverse @ Sr
+        return np.asarray(w * H), np.asarray((w * g)[:, :, 0])
+
+    def follow(self, move: Array) -> Array:
+        """How the starts move, in doubts, when the numbers do; shape (m, d)."""
+        g = np.einsum("mni,mn->mi", self.S, self.r + self.J @ move) + self.z
+        return np.asarray(-np.einsum("mij,mj->mi", self.inverse, g))
+
+
+@dataclass(frozen=True)
+class SegmentEstimator:
+    """Fits models to segments.
+
+    Attributes:
+        segments: of the runs.
+        counts: which segments count, shape (m,).
+        apart: whether a segment's start follows the numbers only where that helps the segment, so
+            that one in which the joint sticks keeps no other from moving.
+    """
+
+    segments: Segments
+    counts: NDArray[np.bool_]
+    apart: bool = False
+
+    @property
+    def samples(self) -> float:
+        """How many samples count."""
+        return float(self.segments.count[self.counts].sum())
+
+    @cached_property
+    def coarser(self) -> "SegmentEstimator":
+        """The same in longer steps, see `Segments.coarser`."""
+        return replace(self, segments=self.segments.coarser())
+
+    def squares(self, simulator: Simulator, start: Array) -> tuple[Array, Array]:
+        """Residuals, and with the starts' prior their sum of squares by segment."""
+        segments = self.segments
+        r = segments.residuals(segments.misfit(simulator, start))
+        z = (start - segments.start) / segments.prior_std
+        return r, (r**2).sum(axis=1) + (z**2).sum(axis=1)
+
+    def loss(self, squares: Array, cauchy_scale: float = CAUCHY_SCALE, level: float = 1.0) -> float:
+        """Robust sum over the segments that count, where noise makes squares of `level`."""
+        room = cauchy_scale * np.maximum(self.segments.count, 1)
+        return float(np.sum((room * np.log1p(squares / level / room))[self.counts]))
+
+    def overdispersion(self, squares: Array) -> float:
+        """Robust mean square residual, 1 at least."""
+        each = self.loss(squares) / max(self.samples, 1.0)
+        return max(each / (CAUCHY_SCALE * float(np.log1p(1 / CAUCHY_SCALE))), 1.0)
+
+    def covariance(self, make: Make, unknowns: Unknowns, fit: Fit, prior_std: Array) -> Array:
+        """Of a fit's numbers, with what is left over as noise, if they were known so well before.
+
+        Args:
+            make, unknowns, fit: the model, its numbers, and how they were fitted.
+            prior_std: their standard deviations before the data, shape (k,).
+
+        Returns:
+            shape (k, k).
+        """
+        H = self.linear(make, unknowns, fit.x, fit.start).normal()[0]
+        return np.asarray(
+            self.overdispersion(fit.squares) * np.linalg.inv(H + np.diag(prior_std**-2.0))
+        )
+
+    def linear(
+        self,
+        make: Make,
+        unknowns: Unknowns,
+        x: Array,
+        start: Array,
+        cauchy_scale: float = CAUCHY_SCALE,
+        central: bool = True,
+    ) -> Linearization:
+        """The model about a point; `central` or one-sided, where slopes are differences."""
+        segments, simulator = self.segments, make(x)
+        r, squares = self.squares(simulator, start)
+        J, S = self.slopes(make, simulator, unknowns, x, start, r, central)
+        room = cauchy_scale * np.maximum(segments.count, 1)
+        weight = np.where(self.counts, 1 / (1 + squares / room), 0.0)
+        z = (start - segments.start) / segments.prior_std
+        return Linearization(r, J, S, z, weight)
+
+    def slopes(
+        self,
+        make: Make,
+        simulator: Simulator,
+        unknowns: Unknowns,
+        x: Array,
+        start: Array,
+        r: Array,
+        central: bool,
+    ) -> tuple[Array, Array]:
+        """Derivatives of the residuals, by central differences or by one-sided ones.
+
+        Args:
+            make, simulator: the model, and with the numbers x.
+            unknowns: the numbers.
+            x, start: the point.
+            r: the residuals there.
+            central: see above.
+
+        Returns:
+            by the numbers and by the starts' doubts, as in `Linearization`.
+        """
+        segments, k = self.segments, len(x)
+        off = np.diag(unknowns.step)
+        up, down = np.minimum(x + off, unknowns.high), np.maximum(x - off, unknowns.low)
+        if not central:
+            up = np.where((np.diag(up) > x)[:, None], up, down)
+        tried = (*up, *down) if central else tuple(up)
+        misfits = [segments.misfit(make(y), start) for y in tried]
+        ways = np.eye(start.shape[1])
+        misfits += [
+            segments.misfit(simulator, start + STATE_STEP * segments.prior_std * way) for way in ways
+        ]
+        found = segments.residuals(np.stack(misfits, axis=1))
+        base = found[:, :, k : 2 * k] if central else r[:, :, None]
+        J = (found[:, :, :k] - base) / (np.diag(up - down) if central else np.diag(up) - x)
+        S = (found[:, :, len(tried) :] - r[:, :, None]) / STATE_STEP
+        return J, S
+
+    def started(self, simulator: Simulator, iterations: int = 8) -> Fit:
+        """Starts fitted to a joint, each segment by itself: where one is stuck, others go on."""
+        segments = self.segments
+        start = segments.start
+        squares = self.squares(simulator, start)[1]
+        damping, unit = np.full(len(start), 1e-3), np.eye(start.shape[1])
+        for _ in range(iterations):
+            about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
+            A = np.einsum("mni,mnj->mij", about.S, about.S) + unit
+            A = A * (1 + damping[:, None, None] * unit)
+            g = np.einsum("mni,mn->mi", about.S, about.r) + about.z
+            moved = start - segments.prior_std * np.linalg.solve(A, g[:, :, None])[:, :, 0]
+            trial = self.squares(simulator, moved)[1]
+            better = trial < squares
+            start = np.where(better[:, None], moved, start)
+            squares = np.where(better, trial, squares)
+            damping = np.where(better, np.maximum(damping / 10, 1e-9), 10 * damping)
+        return Fit(EMPTY, start, squares, self.loss(squares))
+
+    def refit(self, make: Make, unknowns: Unknowns, found: Fit, iterations: int = 12) -> Fit:
+        """A fit that goes on where some segments do better from a start that is sought anew."""
+        anew = self.started(simulator := make(found.x))
+        better = (anew.squares < found.squares)[:, None]
+        start = np.where(better, anew.start, found.start)
+        loss = self.loss(self.squares(simulator, start)[1]) + unknowns.penalty(found.x)
+        if loss > found.loss - LOSS_TOLERANCE:
+            return found
+        return self.fit(make, unknowns, found.x, start, iterations)
+
+    def fit(
+        self,
+        make: Make,
+        unknowns: Unknowns,
+        x: Array,
+        start: Array | None = None,
+        iterations: int = 12,
+        cauchy_scale: float = CAUCHY_SCALE,
+        told: Callable[[Fit], None] = lambda fit: None,
+    ) -> Fit:
+        """The numbers and starts with the least loss.
+
+        Args:
+            make: the joint with its numbers.
+            unknowns: the numbers.
+            x: where to begin, within the bounds, shape (k,).
+            start: of the segments, shape (m, d); None: as measured.
+            iterations: at most so many.
+            cauchy_scale: mean square residual from which a segment counts as its logarithm.
+            told: after each iteration, the best so far.
+        """
+        segments = self.segments
+        start = segments.start if start is None else start
+        x = np.clip(x, unknowns.low, unknowns.high)
+        squares = self.squares(make(x), start)[1]
+        loss = self.loss(squares, cauchy_scale) + unknowns.penalty(x)
+        damping, central = 1e-3, False
+        for _ in range(iterations):
+            about = self.linear(make, unknowns, x, start, cauchy_scale, central)
+            H, gradient = about.normal()
+            H = H + np.diag(unknowns.prior_std**-2.0)
+            gradient = gradient + (x - unknowns.mean) / unknowns.prior_std**2
+            before = loss
+            for _ in range(BACKTRACKS):
+                move = _step(H, gradient, damping, unknowns, x)
+                simulator, moved = make(x + move), start + segments.prior_std * about.follow(move)
+                trial = self.squares(simulator, moved)[1]
+                if self.apart:
+                    stayed = self.squares(simulator, start)[1]
+                    moved = np.where((trial < stayed)[:, None], moved, start)
+                    trial = np.minimum(trial, stayed)
+                new = self.loss(trial, cauchy_scale) + unknowns.penalty(x + move)
+                if new < loss:
+                    x, start, squares, loss = x + move, moved, trial, new
+                    damping = max(damping / 10, 1e-6)
+                    break
+                damping *= 10
+            told(Fit(x, start, squares, loss))
+            if before - loss < LOSS_TOLERANCE:
+                if central:
+                    break
+                damping, central = 1e-3, True  # one-sided differences are cheap, but biased
+        return Fit(x, start, squares, loss)
+
+
+def _step(H: Array, gradient: Array, damping: float, unknowns: Unknowns, x: Array) -> Array:
+    """The damped Newton step from x within the bounds and constraints."""
+    if (must := unknowns.constraints) is None:
+        return _bounded(H, gradient, damping, unknowns.low - x, unknowns.high - x)
+    scale = np.maximum(np.diag(H), 1e-12)
+    R = np.asarray(np.linalg.cholesky(H + np.diag(damping * scale + 1e-12 * scale.max())).T)
+    target = solve_triangular(R, -gradient, trans="T")
+    return bounded_step(R, target, must.G, must.h - must.G @ x)
+
+
+def _bounded(H: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
+    """The damped Newton step within bounds; numbers that would leave them stop there."""
+    scale = np.maximum(np.diag(H), 1e-12)
+    A = H + damping * np.diag(scale)
+    free = np.ones(len(gradient), bool)
+    move = np.zeros(len(gradient))
+    for _ in range(len(gradient)):
+        if not free.any():
+            break
+        fixed = ~free
+        target = -gradient[free] - A[np.ix_(free, fixed)] @ move[fixed]
+        step = np.linalg.lstsq(A[np.ix_(free, free)], target, rcond=None)[0]
+        out = (step < low[free] - 1e-12) | (step > high[free] + 1e-12)
+        move[free] = np.clip(step, low[free], high[free])
+        if not out.any():
+            break
+        free[np.flatnonzero(free)[out]] = False
+    return move

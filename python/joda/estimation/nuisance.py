@@ -1,0 +1,218 @@
+"""Numbers of a joint's body and of its measurement that may be off, as numbers to be fitted."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda._core import JointSimulator
+from joda.estimation.base_model import BaseModel
+from joda.estimation.estimator import Make
+from joda.estimation.unknowns import Unknowns
+from joda.joints.joint_model import JointModel
+from joda.measured.reading import Measured
+from joda.measured.sensing import Sensing
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.intp]
+NuisanceName = Literal[
+    "mass",
+    "inertia",
+    "gravity",
+    "center_of_mass",
+    "force_scale",
+    "force_offset",
+    "time_delay",
+    "position_offset",
+]
+
+FACTORS: tuple[NuisanceName, ...] = ("mass", "inertia", "gravity", "force_scale")
+"""Those that are factors, whose logarithms are fitted."""
+USUAL: dict[NuisanceName, float] = {
+    "mass": 0.3,
+    "inertia": 0.03,
+    "gravity": 0.03,
+    "center_of_mass": 0.0,
+    "force_scale": 0.3,
+    "force_offset": 0.05,
+    "time_delay": 0.02,
+    "position_offset": 0.02,
+}
+"""How far off they usually are (one standard deviation): factors relatively, an offset of the force
+in units of its root mean square, a delay in s, a position's zero in ranges, the direction of the
+centre of mass as seen from the hinge in rad: an encoder's zero stands in for it unless told."""
+MOST = {"factor": 7.0, "time_delay": 0.1}
+"""Largest logarithm of a factor, and longest delay (s)."""
+FAR = 20.0
+"""The same of offsets, in what they usually are."""
+STEPS = {"factor": 0.01, "time_delay": 2e-4, "other": 0.05}
+"""Of differences: of a logarithm, of a delay (s), of others in what they usually are."""
+
+LEAST, TENTH = {"factor": 0.02, "time_delay": 1e-3}, 0.1
+"""By how much a logarithm or a delay (s) must be off to be worth a word; others by this part of
+what they usually are."""
+
+
+def _kind(name: NuisanceName) -> str:
+    """What it is in tables of bounds."""
+    return "factor" if name in FACTORS else name
+
+
+class MeasuredSimulator:
+    """A joint as its measurement sees it: stepped under the true force, told as it is logged."""
+
+    def __init__(self, simulator: JointSimulator, sensing: Sensing) -> None:
+        """Args: the joint, and what is wrong with its measurement."""
+        self.simulator, self.sensing = simulator, sensing
+
+    def replay(
+        self,
+        force: Array,
+        at: Integers,
+        start: Array,
+        fresh: NDArray[np.bool_],
+        h: float,
+        command: Array | None = None,
+    ) -> tuple[Array, Array]:
+        """As `JointSimulator.replay`, of logged forces and positions."""
+        own, zero = self.sensing, self.sensing.position_offset
+        late = own.time_delay / h
+        if late:
+            begins = at[fresh]
+            run = np.searchsorted(begins, np.arange(len(force)), side="right") - 1
+            first, last = begins[run], np.append(begins[1:], len(force))[run] - 1
+            where = np.clip(np.arange(len(force)) - late, first, last)
+            force = np.interp(where, np.arange(len(force)), force)
+        force = own.force_scale * force + own.force_offset
+        before, after = self.simulator.replay(force, at, start - (zero, 0.0), fresh, h, command)
+        return before + zero, after + zero
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """Numbers that are fitted besides a model's strengths.
+
+    Attributes:
+        base: the model.
+        names: of the numbers.
+        prior_stds: standard deviation of each, as it is fitted.
+    """
+
+    base: BaseModel
+    names: tuple[NuisanceName, ...]
+    prior_stds: tuple[float, ...]
+
+    @property
+    def unknowns(self) -> Unknowns:
+        """The strengths and these numbers."""
+        prior_std = np.array(self.prior_stds)
+        most, step = [], []
+        for name, width in zip(self.names, self.prior_stds, strict=True):
+            kind = _kind(name)
+            most.append(MOST.get(kind, FAR * width))
+            step.append(STEPS.get(kind, STEPS["other"] * width))
+        high = np.array(most)
+        none = np.zeros(len(prior_std))
+        return self.base.unknowns.and_(Unknowns(-high, high, np.array(step), none, prior_std))
+
+    @property
+    def make(self) -> Make:
+        """The joint as it is seen, by the strengths and these numbers."""
+
+        def made(x: Array) -> JointSimulator:
+            base, h = self.base, self.base.h
+            own = self.body(base.own(x), x).stepped(h)
+            return MeasuredSimulator(own.simulator(base.written(x), h), self.sensing(x))  # type: ignore[return-value]
+
+        return made
+
+    def values(self, x: Array) -> dict[NuisanceName, float]:
+        """Factors, and the other numbers in their units."""
+        own = zip(self.names, map(float, x[self.base.count :]), strict=True)
+        return {name: float(np.exp(v)) if name in FACTORS else v for name, v in own}
+
+    def little(self, x: Array) -> list[bool]:
+        """Which of them are off by too little to be worth a word."""
+        own = zip(self.names, self.prior_stds, x[self.base.count :], strict=True)
+        least = (LEAST.get(_kind(name), TENTH * width) - abs(value) for name, width, value in own)
+        return [float(left) > 0 for left in least]
+
+    def body(self, joint_model: JointModel, x: Array) -> JointModel:
+        """The joint with the numbers of its body."""
+        found = self.values(x)
+        mass = found.get("mass", 1.0)
+        inertia, gravity = mass * found.get("inertia", 1.0), mass * found.get("gravity", 1.0)
+        return joint_model.heavier(inertia, gravity, found.get("center_of_mass", 0.0))
+
+    def sensing(self, x: Array) -> Sensing:
+        """What is wrong with the measurement."""
+        found = self.values(x)
+        own = {name: value for name, value in found.items() if hasattr(Sensing, name)}
+        return Sensing(**own)
+
+    def taken(self, x: Array, names: Sequence[NuisanceName]) -> Array:
+        """Strengths and other of the numbers where these are x.
+
+        What the runs cannot tell apart goes over from those that are left out: all forces and
+        masses by one factor are none, and a mass is an inertia and its weight.
+        """
+        n = self.base.count
+        own = dict.fromkeys(USUAL, 0.0) | dict(zip(self.names, x[n:], strict=True))
+        gone = set(self.names) - set(names)
+        if "mass" in names and gone & {"inertia", "gravity"}:
+            more = own["inertia" if "inertia" in gone else "gravity"]
+            own["mass"] += more
+            own["inertia"] -= more
+            own["gravity"] -= more
+        strengths = np.array(x[:n])
+        if gone & {"mass", "force_scale"} and not {"mass", "force_scale"} <= gone:
+            less = own["mass" if "mass" in gone else "force_scale"]
+            own["mass"] -= less
+            own["force_scale"] -= less
+            own["force_offset"] *= float(np.exp(-less))
+            strengths *= np.exp(-less)
+        unknowns = self.base.unknowns
+        strengths = np.clip(strengths, unknowns.low, unknowns.high)
+        return np.append(strengths, [own[name] for name in names])
+
+    def only(self, names: Sequence[NuisanceName]) -> "Nuisances":
+        """Some of them."""
+        widths = dict(zip(self.names, self.prior_stds, strict=True))
+        return replace(self, names=tuple(names), prior_stds=tuple(widths[name] for name in names))
+
+    def coarser(self) -> "Nuisances":
+        """The same in longer steps, see `BaseModel.coarser`."""
+        return replace(self, base=self.base.coarser())
+
+
+def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:
+    """The numbers of a joint and its runs that may be off, and that runs can tell.
+
+    Those of a force only where one was recorded, those of gravity where there is some. None of
+    joints among others that move, nor of those that an actuator drives: there the actuator's gain
+    and delay are the base's own.
+    """
+    joint = measured.profile.joint
+    usual = dict(USUAL)
+    force = np.concatenate([run.force for run in measured.runs if run.forced] or [np.zeros(1)])
+    usual["force_offset"] *= float(np.sqrt(np.nanmean(force**2)))
+    usual["position_offset"] *= float(np.ptp(joint.range))
+    weight = max(map(abs, measured.context.gravity_force))
+    shaped = any(len(set(part.y)) > 1 for part in measured.profile.channels.conservative.components)
+    told: dict[NuisanceName, bool] = {
+        "mass": bool(force.any()) and weight > 0,
+        "inertia": True,
+        "gravity": weight > 0,
+        "center_of_mass": weight > 0 and joint.type == "hinge",
+        "force_scale": bool(force.any()),
+        "force_offset": bool(force.any()),
+        "time_delay": bool(force.any()),
+        "position_offset": (weight > 0 and joint.type == "hinge") or shaped,
+    }
+    if measured.joint_model.servo or any(run.among for run in measured.runs):
+        told = dict.fromkeys(told, False)
+    widths = {name: measured.trust.width(name, usual[name]) for name in told}
+    names = tuple(name for name, there in told.items() if there and widths[name] > 0)
+    return Nuisances(base, names, tuple(widths[name] for name in names))

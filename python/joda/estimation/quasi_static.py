@@ -1,0 +1,94 @@
+"""Quasi-static curves as segments: what a model misses is force, and nothing moves."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.errors import JodaError
+from joda.estimation.segments import Array, Segments, rows_of
+from joda.joints.joint_model import JointModel
+from joda.measured.quasi_static import gravity, held_force
+from joda.measured.reading import Measured
+from joda.profile import Profile
+
+SAMPLES = 12
+"""Of a segment."""
+
+
+@dataclass(frozen=True)
+class CurveWindows(Segments):
+    """Pieces of curves; `position` is the measured force, N·m or N.
+
+    Attributes:
+        model: the force that slowly moves a joint with a profile, at each sample.
+    """
+
+    model: Callable[[Profile], Array]
+
+    def coarser(self) -> "CurveWindows":
+        """Themselves: nothing moves."""
+        return self
+
+    def misfit(self, simulator: Any, start: Array) -> Array:
+        """The model's minus the measured force; `simulator` is the profile."""
+        return np.asarray(self.model(simulator) - self.position)
+
+
+@dataclass(frozen=True)
+class QuasiStaticJoint(JointModel):
+    """A joint that is not simulated: its profile says all."""
+
+    def simulator(self, profile: Profile, h: float) -> Any:
+        """The profile."""
+        return profile
+
+
+def curve_segments(measured: Measured) -> CurveWindows:
+    """The curves in pieces; samples whose direction of travel is not known are left out."""
+    parts: list[tuple[NDArray[Any], ...]] = []
+    count = 0
+    for number, gauged in enumerate(measured.curves):
+        known = np.flatnonzero(gauged.direction)
+        pieces = max(len(known) // SAMPLES, 1)
+        window = np.minimum(np.arange(len(known)) // SAMPLES, pieces - 1) + count
+        curve = gauged.curve.position[known], gauged.curve.force[known]
+        own = np.full(len(known), number)
+        parts.append((*curve, gauged.direction[known], gauged.cautious, window, own))
+        count += pieces
+    at, force, direction, prior_std, window, run = (
+        np.concatenate(x) for x in zip(*parts, strict=True)
+    )
+    rows = rows_of(window, count)
+    n = len(force)
+    weight = gravity(measured.context, at)
+
+    def model(profile: Profile) -> Array:
+        """The force that slowly moves the joint; NaN where friction holds against any force."""
+        try:
+            return held_force(profile, weight, at, direction)
+        except JodaError:
+            return np.full(n, np.nan)
+
+    spread = np.where(rows >= 0, prior_std[rows], np.inf)
+    return CurveWindows(
+        h=measured.timestep,
+        force=force,
+        at=np.arange(count),
+        fresh=np.ones(count, bool),
+        start=np.zeros((count, 2)),
+        prior_std=np.ones((count, 2)),
+        step=np.arange(n),
+        share=np.zeros(n),
+        position=force,
+        time=np.arange(float(n)),
+        run=run[rows[:, 0]],
+        rows=rows,
+        sharpness=1 / spread,
+        shared=np.zeros((*rows.shape, 0)),
+        impacts=np.zeros(count, bool),
+        rests=np.zeros(count, bool),
+        model=model,
+    )

@@ -1,0 +1,326 @@
+"""Cuts measured runs into segments, and weighs their samples by what noise they have."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.estimation.segments import GRID, LOOSE, Array, Integers, Segments, rows_of
+from joda.measured import smoothing
+from joda.measured.failing import STOP
+from joda.measured.runs import Run, held, known
+
+SHORTEST, LONGEST = 0.1, 0.5
+"""Of segments, s, unless the joint goes through its range in less than `QUICK` of the shortest."""
+QUICK = 2.0
+SPEEDS = 10_000
+"""Most speeds of a run that are looked at."""
+TRAVEL = 0.15
+"""What part of the range a segment goes through at the usual speed."""
+FEWEST = 12
+"""Samples that a segment has at least."""
+MOST, RESTING, SELDOM = 160, 4, 8
+"""Samples of a stretch of usual length that count at most; of more, every second or third does. Of
+one in which the joint rests so few do, of a longer rest only in every so many stretches: they are
+all the same sample."""
+STILL, CREEPS = 6.0, 3.0
+"""Range of the positions in a segment, in noises, up to which the joint may rest there; and how
+much its two halves may differ, in standard errors."""
+STEPS, DRIVEN_STEPS = 300, 200
+"""Steps that a segment has at least; and where an actuator acts, whose commands come in their
+own steps."""
+HOP = 0.25
+"""How far a joint must fall back to an end to impact there, in units of that."""
+APPROACH = 8
+"""Samples before a impact that belong to it."""
+SURE = 0.1
+"""Of the error of a velocity at first, where the joint rests."""
+SHARED = 1e-3
+"""Variance, in units of a sample's own, above which a segment's samples share it."""
+CLEAR = 1.5
+"""How much larger the noise of fast samples must be to count as such."""
+
+
+def segments_of(
+    runs: Sequence[Run],
+    sigmas: Sequence[float],
+    span: float,
+    lo: float,
+    inertia: float,
+    timestep: float,
+    length: float | None = None,
+    fine: bool = True,
+) -> Segments:
+    """Cuts runs into segments; parts where the force is not known are left out.
+
+    Args:
+        runs: measured.
+        sigmas: noise of each run's position, rad or m.
+        span, lo: of the joint's range, rad or m.
+        inertia: kg·m² or kg: how far the force's noise moves the joint.
+        timestep: the scene's, s.
+        length: of the segments, s; None: by the joint's pace.
+        fine: whether steps are as short as the segments ask for, so that the laws act and not their
+            steps; else they are the scene's.
+    """
+    usual = _length(runs, sigmas, span)
+    length = length or usual
+    driven = any(run.command is not None for run in runs)
+    h = _step(timestep, length, usual, DRIVEN_STEPS if driven else STEPS) if fine else timestep
+    chunk = max(round(usual / h), 1)
+    parts: list[tuple[NDArray[Any], ...]] = []
+    samples: list[tuple[NDArray[Any], ...]] = []
+    step, count = 0, 0
+    for number, (run, sigma) in enumerate(zip(runs, sigmas, strict=True)):
+        for piece in known(run):
+            time, position = run.time[piece], run.position[piece]
+            steps = int(np.ceil((time[-1] - time[0]) / h - 1e-9)) + 1
+            steps = GRID * -(-steps // GRID)
+            each = max(round(length / h), 1)
+            many = max(round(steps / each), 1)
+            begins = GRID * np.round(np.arange(many) * steps / many / GRID).astype(int)
+            place = (time - time[0]) / h
+            index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
+            spread = _spread(time, position, sigma)
+            begins, hits = _before_knocks(begins, index, (position - lo) / span, spread / span)
+            many = len(begins)
+            window = np.searchsorted(begins, index, side="right") - 1
+            enough = np.bincount(window, minlength=many) >= smoothing.LEAST
+            start, prior_std = starts(time, position, time[0] + h * begins, sigma)
+            force = np.interp(time[0] + h * np.arange(steps), time, run.force[piece])
+            fresh = np.arange(many) == 0
+            same = np.full(many, number)
+            edges = time[0] + h * np.arange(steps + 1)
+            given = np.zeros(len(time)) if run.command is None else run.command[piece]
+            command = held(time, given, edges)
+            parts.append((force, command, step + begins, fresh, start, prior_std, same))
+            acted = run.command is not None or bool(np.any(run.force[piece]))
+            window = np.where(
+                enough[window] & _thinned(index // chunk, position / spread, not acted),
+                window + count,
+                -1,
+            )
+            noise = spread, run.part(piece).force_error()
+            samples.append((step + index, place - index, position, time, window, hits, *noise))
+            step, count = step + steps, count + many
+    force, command, at, fresh, start, prior_stds, run_of = (
+        np.concatenate(x) for x in zip(*parts, strict=True)
+    )
+    index, share, position, time, window, hits, spread, push = (
+        np.concatenate(x) for x in zip(*samples, strict=True)
+    )
+    rows = rows_of(window, count)
+    return Segments(
+        h=h,
+        force=force,
+        at=at,
+        fresh=fresh,
+        start=start,
+        prior_std=prior_stds,
+        step=index,
+        share=share,
+        position=position,
+        time=time,
+        run=run_of,
+        rows=rows,
+        sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
+        shared=_shared(rows, time, spread, push / inertia),
+        impacts=_knocks(rows, (position - lo) / span, spread / span, hits),
+        rests=_rests(rows, (position - lo) / span, spread / span),
+        command=command if driven else None,
+    )
+
+
+def starts(time: Array, position: Array, at: Array, sigma: float) -> tuple[Array, Array]:
+    """States from which segments begin, and how far the true ones may be from them.
+
+    Args:
+        time, position: of a run's samples, s and rad or m; shape (n,).
+        at: when the segments begin, s, the first with the run; shape (m,).
+        sigma: noise of the position, rad or m.
+
+    Returns:
+        positions and velocities, and their doubts; shape (m, 2) each.
+    """
+    begun = smoothing.smooth(time, position, at, sigma)
+    start = np.stack([begun.position, begun.velocity], axis=1)
+    prior_std = LOOSE * np.stack([begun.position_error, begun.velocity_error], axis=1)
+    if smoothing.begins_at_rest(time, position, sigma):
+        start[0, 1], prior_std[0, 1] = 0.0, SURE * begun.velocity_error[0]
+    return start, prior_std
+
+
+def _step(timestep: float, length: float, usual: float, steps: int) -> float:
+    """A part or a multiple of the scene's timestep (s) that is short for segments of some length.
+
+    Args:
+        timestep: the scene's, s.
+        length: of the segments, s.
+        usual: length of segments by the joint's pace, s; only for its sake are steps longer.
+        steps: that a segment has at least.
+    """
+    wanted = min(length / steps, max(timestep, usual / steps))
+    if wanted < timestep:
+        return float(timestep / np.ceil(timestep / wanted))
+    return float(timestep * np.floor(wanted / timestep + 1e-9))
+
+
+def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
+    """Of the segments, by the joint's usual speed and the sampling, s."""
+    pairs = list(zip(runs, sigmas, strict=True))
+    speeds = np.concatenate([_speeds(run, sigma, SHORTEST / 2) for run, sigma in pairs])
+    shortest = SHORTEST
+    fastest = min(smoothing.pace(run.time, run.position, sigma) for run, sigma in pairs)
+    if fastest < QUICK * SHORTEST:
+        shortest = fastest / QUICK
+        speeds = np.concatenate([_speeds(run, sigma, shortest / 2) for run, sigma in pairs])
+    usual = float(np.median(speeds)) if len(speeds) else 0.0
+    length = TRAVEL * span / usual if usual else LONGEST
+    gaps = np.concatenate([np.diff(run.time) for run in runs])
+    return max(min(max(length, shortest), LONGEST), FEWEST * float(np.median(gaps)))
+
+
+def _speeds(run: Run, sigma: float, apart: float) -> Array:
+    """Over times that are so far apart (s), where they are clearly more than the noise makes."""
+    count = min(int(np.ptp(run.time) / apart) + 1, SPEEDS)
+    path = np.interp(run.time[0] + apart * np.arange(count), run.time, run.position)
+    speed = np.abs(np.diff(path)) / apart
+    return np.asarray(speed[speed > 4 * sigma / apart])
+
+
+def _thinned(chunk: Integers, noises: Array, free: bool) -> NDArray[np.bool_]:
+    """Which samples are kept: at most `MOST` of a chunk of usual length, evenly; where the joint
+    rests, few, and of few chunks, if no force tells how much holds it.
+
+    Args:
+        chunk: of each sample, increasing.
+        noises: positions in units of their noise.
+        free: whether no force acts.
+    """
+    _, first, count = np.unique(chunk, return_index=True, return_counts=True)
+    kept = np.zeros(len(chunk), bool)
+    rested = 0
+    for begin, many in zip(first, count, strict=True):
+        own = slice(begin, begin + many)
+        rested = rested + 1 if free and _rest(noises[own]) else 0
+        if rested == 0 or rested % SELDOM == 1:
+            kept[begin : begin + many : -(-many // (RESTING if rested else MOST))] = True
+    return kept
+
+
+def _rest(noises: Array) -> bool:
+    """Whether a joint rests, by its positions in units of their noise."""
+    half = len(noises) // 2
+    if not half or np.ptp(noises) > STILL:
+        return False
+    return bool(abs(noises[:half].mean() - noises[half:].mean()) < CREEPS * 2 / len(noises) ** 0.5)
+
+
+def _spread(time: Array, position: Array, sigma: float) -> Array:
+    """Standard deviations of the samples: the encoder's, and what uneven clocks make at speed."""
+    slope = np.abs(np.gradient(position, time))
+    smooth = np.convolve(slope, np.full(9, 1 / 9), mode="same")
+    fast = smooth > np.quantile(smooth, 0.7)
+    fast[[0, 1, -2, -1]] = False
+    if len(time) < 5 or fast.sum() < FEWEST:
+        return np.full(len(time), sigma)
+    own = smoothing.deviation(smoothing.departures(time, position)[fast[2:-2]])
+    late = np.sqrt(max(own**2 - (CLEAR * sigma) ** 2, 0.0)) / np.median(smooth[fast])
+    return np.asarray(np.hypot(sigma, late * smooth))
+
+
+def _shared(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
+    """What of the noise a segment's samples share, see `Segments`.
+
+    Besides the position's noise there is that of the force: an error of acceleration `push`, from
+    one sample to the next, moves a free joint by that time, and on at the speed that it got. In
+    units of the position's noise the covariance is 1 + sum of l u uᵀ over few directions u, and its
+    inverse root 1 - sum of (1 - 1 / sqrt(1 + l)) u uᵀ.
+    """
+    found = []
+    for row in rows:
+        own = row[row >= 0]
+        if not push[own].any():
+            found.append(np.zeros((len(own), 0)))
+            continue
+        t = time[own] - time[own[0]]
+        gaps = np.diff(t, append=t[-1])
+        moved = np.maximum(t[:, None] - t - 0.5 * gaps, 0.0) * (gaps * push[own])
+        moved /= sigma[own][:, None]
+        size, way = np.linalg.eigh(moved @ moved.T)
+        much = size > SHARED
+        found.append(way[:, much] * np.sqrt(1 - 1 / np.sqrt(1 + size[much])))
+    out = np.zeros((*rows.shape, max((one.shape[1] for one in found), default=0)))
+    for ways, one in zip(out, found, strict=True):
+        ways[: len(one), : one.shape[1]] = one
+    return out
+
+
+def _before_knocks(
+    begins: Integers, index: Integers, s: Array, noise: Array
+) -> tuple[Integers, NDArray[np.bool_]]:
+    """Where segments begin, also just before a impact: what is before it tells of the joint; and
+    which samples are impacts."""
+    rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
+    impacts = _each_knock(rows, s, noise)
+    many = (rows >= 0).sum(axis=1)
+    more, fewer, hits = [], [], np.zeros(len(s), bool)
+    for k, impact in enumerate(impacts):
+        if impact is None:
+            continue
+        hit = rows[k][impact]
+        hits[hit] = True
+        before = impact - APPROACH
+        joined = k > 0 and impacts[k - 1] is None and many[k - 1] + before >= 2 * FEWEST
+        if before >= FEWEST:
+            more.append(hit - APPROACH)
+        elif joined:  # the segment before ends there
+            more.append(hit - APPROACH)
+            fewer.append(begins[k])
+        elif impact >= smoothing.LEAST:  # a short stroke: up to the impact itself
+            more.append(hit)
+    kept = np.setdiff1d(begins, np.array(fewer, int))
+    return np.union1d(kept, index[np.array(more, int)] // GRID * GRID), hits
+
+
+def _knocks(rows: Integers, s: Array, noise: Array, hits: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether the joint comes to an end of its range in a segment, at some speed: as segments show
+    it, or these cut anew before a impact, where what is before it is no longer in the same one."""
+    found = _each_knock(rows, s, noise)
+    return np.array(
+        [
+            hits[row[row >= 0]].any() or impact is not None
+            for row, impact in zip(rows, found, strict=True)
+        ],
+        bool,
+    )
+
+
+def _rests(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
+    """Whether all of a segment's samples are at an end of the range."""
+    reach = STOP + 3 * noise
+    low, high = s < reach, s > 1 - reach
+    return np.array([low[own].all() or high[own].all() for own in (r[r >= 0] for r in rows)], bool)
+
+
+def _each_knock(rows: Integers, s: Array, noise: Array) -> list[int | None]:
+    """Of each segment, see `_knock`."""
+    return [_knock(s[own], noise[own]) for own in (row[row >= 0] for row in rows)]
+
+
+def _knock(s: Array, noise: Array) -> int | None:
+    """The first of a segment's samples at which the joint is at an end that it came to."""
+    if len(s) < 3:
+        return None
+    travel = np.abs(np.diff(s))
+    travel = np.maximum(np.append(travel, 0.0), np.append(0.0, travel))
+    near = STOP + 3 * noise
+    reach = near + np.where(travel > near, travel, 0.0)  # a impact may be between two samples
+    touches = (s < reach) | (s > 1 - reach)
+    if touches[0] and 2 * travel[0] > near[0] and np.ptp(s) > STOP + 6 * noise[0]:
+        return 0  # thrown back
+    away = np.minimum(s, 1 - s)
+    fall = np.maximum.accumulate(away) - away  # hops at an end stay within `reach`
+    back = np.flatnonzero(touches & (fall > HOP * STOP + 6 * noise))
+    return int(back[0]) if len(back) else None

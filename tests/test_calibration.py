@@ -1,0 +1,203 @@
+"""Numbers of a joint and of its measurement that are off are found, and are no effects."""
+
+import mujoco
+import numpy as np
+import pytest
+from hidden_cases import read
+
+import joda
+from joda import JodaError
+from joda.diagnosis.baseline import fit_baseline
+from joda.diagnosis.calibration import calibration_of
+from joda.estimation.nuisance import doubted
+from joda.hidden import draw
+from joda.measured.reading import read_measured
+from joda.measured.runs import Run, write_run
+from joda.measured.trust import read_trust, trusting
+
+ARM = """<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.001" integrator="implicitfast"/>
+  <worldbody><body>
+    <joint name="arm" type="hinge" axis="0 1 0" limited="true" range="-4 4" damping="0.1"
+           frictionloss="0.15" solreffriction="0.002 1" solimpfriction="0.99 0.9999 0.001 0.5 2"/>
+    <inertial pos="0.3 0 0" mass="{mass}" diaginertia="{own} {own} {own}"/>
+  </body></worldbody>
+</mujoco>
+"""
+SIGMA = 5e-4
+
+
+def arm(mass=1.0):
+    """The arm, all of whose mass and inertia is so many times as large."""
+    return ARM.format(mass=0.5 * mass, own=0.02 * mass)
+
+
+def logged(
+    folder, rng, scale=1.0, offset=0.0, delay=0.0, zero=0.0, extra=lambda q: 0.0, noise=SIGMA
+):
+    """Four runs of 2 s of the arm in MuJoCo at 200 Hz, with what is wrong of what is logged."""
+    model = mujoco.MjModel.from_xml_string(arm())
+    ahead, names = round(delay / model.opt.timestep), []
+    for k in range(4):
+        data, rows = mujoco.MjData(model), []
+        data.qpos[0] = rng.uniform(-1.5, 1.5)
+        rates, phases = rng.uniform(2, 7, 3), rng.uniform(0, 6, 3)
+        sizes = rng.uniform(0.5, 1.2, 3)
+        held, stiff = data.qpos[0], 1.5
+        for _ in range(2000 + ahead):
+            push = float(sizes @ np.sin(rates * data.time + phases))
+            force = push - stiff * (data.qpos[0] - held)
+            rows.append((data.time, data.qpos[0], force))
+            data.qfrc_applied[0] = force + extra(data.qpos[0])
+            mujoco.mj_step(model, data)
+        time, position, force = np.array(rows).T
+        later = force[ahead:][:2000:5]
+        at = np.arange(0, 2000, 5)
+        seen = position[at] + zero + noise * rng.standard_normal(len(at))
+        names.append(folder / f"run{k}.csv")
+        write_run(
+            names[-1], Run(f"run{k}.csv", time[at], seen, None, (later - offset) / scale, True)
+        )
+    return names
+
+
+def found_of(folder, rng, trust=None, mass=1.0, beside=False, **wrong):
+    """What is found of runs, with a model whose mass is off by a factor."""
+    runs = logged(folder, rng, **wrong)
+    (folder / "arm.xml").write_text(arm(1 / mass))
+    measured = read_measured(folder / "arm.xml", "arm", runs)
+    measured = measured.trusting(trusting(trust or {}))
+    return measured, calibration_of(measured, fit_baseline(measured), beside)
+
+
+def check(measured, found, name, right):
+    """That this number is found, within its errors, or told as an alternative of what is."""
+    assert found is not None and found.alone
+    told = {one.parameter: one for one in found.corrections(measured)}
+    others = {other: x for one in found.others for other, x in one}
+    if name in told:
+        one = told.pop(name)
+        value = one.value if one.factor is None else one.factor
+        assert abs(value - right) < 4 * one.error + 0.01 * abs(right)
+    else:
+        assert others[name] == pytest.approx(right, rel=0.05)
+        told.popitem()
+    assert not told
+
+
+def test_a_mass_that_is_off_is_told(tmp_path, rng):
+    factor = float(rng.choice([rng.uniform(0.5, 0.75), rng.uniform(1.3, 1.6)]))
+    check(*found_of(tmp_path, rng, mass=factor), "mass", factor)
+
+
+def test_a_force_of_another_scale_is_told(tmp_path, rng):
+    factor = float(rng.choice([rng.uniform(0.6, 0.8), rng.uniform(1.25, 1.5)]))
+    check(*found_of(tmp_path, rng, scale=factor), "force_scale", factor)
+
+
+def test_a_late_log_is_told(tmp_path, rng):
+    late = round(float(rng.uniform(0.005, 0.04)), 3)
+    check(*found_of(tmp_path, rng, delay=late), "time_delay", late)
+
+
+def test_what_is_smaller_than_the_noise_is_told_too(tmp_path, rng):
+    late = round(float(rng.uniform(0.010, 0.014)), 3)
+    measured, found = found_of(tmp_path, rng, beside=True, delay=late, noise=20 * SIGMA)
+    assert found is not None and found.names == ("time_delay",)
+    (told,) = found.corrections(measured)
+    assert abs(told.value - late) < 4 * told.error
+    assert fit_baseline(measured).fit.loss < 1.8 * found.loss  # most of what is missed is noise
+
+
+def test_an_encoders_zero_is_told(tmp_path, rng):
+    zero = float(rng.choice([-1, 1]) * rng.uniform(0.04, 0.15))
+    check(*found_of(tmp_path, rng, zero=zero), "position_offset", zero)
+
+
+def test_an_offset_of_the_force_is_told(tmp_path, rng):
+    offset = float(rng.choice([-1, 1]) * rng.uniform(0.05, 0.12))
+    check(*found_of(tmp_path, rng, offset=offset), "force_offset", offset)
+
+
+def test_of_runs_of_which_nothing_is_wrong_nothing_is_told(tmp_path, rng):
+    assert found_of(tmp_path, rng)[1] is None
+
+
+def test_a_force_along_the_way_is_not_explained_by_numbers(tmp_path, rng):
+    place = rng.uniform(-0.5, 0.5)
+    _, found = found_of(
+        tmp_path, rng, extra=lambda q: 0.5 * np.sin(6 * (q - place)) * (abs(q - place) < 0.5)
+    )
+    assert found is None or not found.alone
+
+
+def test_a_number_that_is_trusted_fully_stays(tmp_path, rng):
+    trust = {"mass": 0.0, "force_scale": 0.0}
+    measured, found = found_of(tmp_path, rng, trust, mass=1.4)
+    every = doubted(measured, fit_baseline(measured).base)
+    assert not {"mass", "force_scale"} & set(every.names)
+    assert found is None or not {"mass", "force_scale"} & set(found.names)
+
+
+def test_widths_are_those_told(tmp_path, rng):
+    trust = {"mass": 0.05, "center_of_mass": 0.2, "frictionloss": 0.01, "damping": 0.0}
+    measured, _ = found_of(tmp_path, rng, trust)
+    base = fit_baseline(measured).base
+    every = doubted(measured, base)
+    widths = dict(zip(every.names, every.doubts, strict=True))
+    assert (widths["mass"], widths["center_of_mass"]) == (0.05, 0.2)
+    strengths = dict(zip((name for name, _ in base.places), base.unknowns.prior_std, strict=False))
+    assert strengths["friction"] == 0.01 and strengths["damping"] < 1e-5
+
+
+@pytest.mark.long
+def test_a_joint_of_the_field_with_wrong_numbers_lacks_no_effect():
+    rng = np.random.default_rng()
+    while not (case := draw(int(rng.integers(2**31)), None, family="field")).seal.get("wrong"):
+        pass
+    print(case.seed, case.seal["wrong"])  # shown where the test fails
+    measured, _ = read(case)
+    found = calibration_of(measured, fit_baseline(measured))
+    assert found is None or found.alone
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["ghost=1"], "trust: no number 'ghost'; there are mass, inertia"),
+        (["mass=-1"], "trust: mass=-1 is no width; give a standard deviation"),
+        (["mass=inf"], "trust: mass=inf is no width"),
+        (["mass"], "--trust 'mass': give NAME=WIDTH, as in mass=0.05"),
+        (["mass=much"], "--trust 'mass=much': give NAME=WIDTH"),
+    ],
+)
+def test_trust_that_says_nothing_is_named(words, said):
+    with pytest.raises(JodaError) as raised:
+        trusting(read_trust(words))
+    assert said in str(raised.value)
+
+
+def test_trust_is_an_option_of_what_finds_and_mends(tmp_path, rng):
+    run = logged(tmp_path, rng)[0]
+    (tmp_path / "arm.xml").write_text(arm())
+    with pytest.raises(JodaError, match="no number 'ghost'"):
+        joda.diagnose(tmp_path / "arm.xml", "arm", [run], trust={"ghost": 1.0})
+    with pytest.raises(JodaError, match="no number 'ghost'"):
+        joda.improve(tmp_path / "arm.xml", "arm", [run], tmp_path / "new.xml", trust={"ghost": 1.0})
+
+
+@pytest.mark.long
+def test_improve_writes_what_is_wrong_and_compare_reads_it(tmp_path, rng):
+    runs = logged(tmp_path, rng, offset=0.1, delay=0.02, zero=0.08)
+    (tmp_path / "arm.xml").write_text(arm(1 / 1.4))
+    *learnt, unseen = runs
+    new = tmp_path / "new.xml"
+    done = joda.improve(tmp_path / "arm.xml", "arm", learnt, new)
+    assert done.corrections == tmp_path / "new.corrections.json"
+    assert not any(step.effect for step in done.steps)
+    heavier = mujoco.MjModel.from_xml_path(str(new)).body_mass[1]
+    assert heavier == pytest.approx(0.5, rel=0.03)
+    before = joda.compare(tmp_path / "arm.xml", "arm", [unseen]).rmse_window
+    after = joda.compare(new, "arm", [unseen], corrections=done.corrections).rmse_window
+    assert after < 2 * SIGMA < 0.2 * before

@@ -1,0 +1,200 @@
+"""How measured runs are cut into segments, and what simulates the joint in them."""
+
+import numpy as np
+import pytest
+
+from joda.diagnosis.units import units_of
+from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
+from joda.estimation.estimator import Fit, SegmentEstimator
+from joda.estimation.segmentation import STEPS, _step, segments_of
+from joda.estimation.unknowns import EMPTY, NOTHING
+from joda.measured import smoothing
+from joda.measured.reading import read_measured
+from joda.measured.runs import Run, write_run
+
+SIGMA = 2e-4
+"""Noise of the encoder, m; the range is 1 m."""
+STEP = 1e-3
+SLIDE = """<mujoco>
+  <worldbody>
+    <body>
+      <joint name="slide" type="slide" axis="1 0 0" range="0 1" damping="1" {more}/>
+      <geom type="box" size=".1 .1 .1" mass="1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def run_of(position, seed=0, step=STEP):
+    """A run without a recorded force."""
+    rng = np.random.default_rng(seed)
+    time = step * np.arange(len(position))
+    noisy = position + SIGMA * rng.standard_normal(len(position))
+    return Run("run.csv", time, noisy, None, np.zeros(len(time)), False)
+
+
+def cut(*positions):
+    """Their segments of 0.2 s."""
+    runs = [run_of(q, seed) for seed, q in enumerate(positions)]
+    return segments_of(runs, [SIGMA] * len(runs), 1.0, 0.0, 1.0, STEP, 0.2)
+
+
+# --- impacts
+def hops(height, hold=0.0):
+    """A joint that falls to the low end again and again, each time in 0.1 s, for 0.2 s."""
+    t = STEP * np.arange(200) % 0.1
+    return hold + height * 4 * (t / 0.1) * (1 - t / 0.1)
+
+
+@pytest.mark.parametrize("height", [0.003, 0.03, 0.3])
+@pytest.mark.parametrize("low", [True, False])
+def test_hops_at_an_end_are_knocks(height, low):
+    segments = cut(hops(height) if low else 1 - hops(height))
+    assert segments.impacts[-1]
+    for row in segments.rows[~segments.impacts]:  # the flight before the first one
+        assert segments.time[row[row >= 0]].max() < 0.1
+
+
+def test_what_is_before_a_knock_is_kept():
+    """A joint that falls to its end in 0.15 s and stays there, in segments of 0.2 s."""
+    t = STEP * np.arange(400)
+    segments = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0))
+    first, impact, *rest = (segments.time[row[row >= 0]] for row in segments.rows)
+    assert list(segments.impacts) == [False, True] + [False] * len(rest)
+    assert 0.13 < first.max() < impact.min() < 0.15 < impact.max()
+
+
+def test_hops_elsewhere_are_none():
+    assert not cut(hops(0.03, 0.5), 1 - hops(0.3, 0.2)).impacts.any()
+
+
+def test_what_rests_at_an_end_or_leaves_it_does_not_knock():
+    t = STEP * np.arange(200)
+    assert not cut(0 * t, 1 + 0 * t, t**2, 1 - 2 * t**2).impacts.any()
+
+
+# --- starts
+@pytest.mark.parametrize("step", [1e-3, 4e-3])
+def test_what_is_let_go_begins_at_rest_and_what_is_flicked_does_not(step):
+    t = step * np.arange(round(0.4 / step))
+    motions = {
+        "held": 0 * t + 0.5,
+        "let go": 0.5 + t**2,
+        "flicked": 0.5 + 0.1 * (1 - np.exp(-8 * t)),
+    }
+    rests = {
+        name: np.mean(
+            [
+                smoothing.begins_at_rest(run.time, run.position, SIGMA)
+                for run in (run_of(motion, seed, step) for seed in range(40))
+            ]
+        )
+        for name, motion in motions.items()
+    }
+    assert rests["held"] > 0.9
+    assert rests["let go"] > 0.6  # of the others the start is fitted, as of any segment
+    assert rests["flicked"] < 0.05
+
+
+# --- ends of the range
+def measured(folder, position, more=""):
+    (folder / "model.xml").write_text(SLIDE.format(more=more))
+    write_run(folder / "run.csv", run_of(position))
+    return read_measured(folder / "model.xml", "slide", [folder / "run.csv"])
+
+
+AT_THE_END = np.minimum(0.5 + STEP * np.arange(1000), 1.0)
+
+
+def test_ends_that_nobody_chose_are_hard(tmp_path):
+    found = measured(tmp_path, AT_THE_END)
+    assert found.joint_model.solref == (0.02, 1.0)
+    assert joint_model_for(found, 1e-4).solref == (2e-4, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("more", "beyond"), [('solreflimit="0.05 1"', 0.0), ("", 20 * SIGMA)], ids=["chosen", "soft"]
+)
+def test_ends_that_somebody_chose_or_that_yield_are_as_they_are(tmp_path, more, beyond):
+    found = measured(tmp_path, AT_THE_END + beyond * (AT_THE_END == 1.0), more)
+    assert joint_model_for(found, 1e-4).solref == found.joint_model.solref
+
+
+# --- starts that are stuck
+def test_where_only_knocks_have_been_nothing_was_measured(tmp_path):
+    """No segment with a impact counts, and so nothing tells of a curve there."""
+    swing = 0.5 + 0.2 * np.sin(2 * STEP * np.arange(2000))
+    thrown = np.abs(1 - swing[-1] - 3 * STEP * np.arange(220))  # 3 m/s, thrown back at the end
+    found = measured(tmp_path, np.append(swing, 1 - thrown))
+    segments = segments_for(found)
+    impact = segments.rows[segments.impacts]
+    assert segments.position[impact[impact >= 0]].max() > 0.98
+    first, last = units_of(segments, found).visited
+    assert first == pytest.approx(0.5 + 0.2 * np.sin(2 * STEP * 2000), abs=0.01)
+    assert last < 0.98
+
+
+def test_a_fit_takes_a_windows_start_anew_where_that_is_better():
+    """Over an edge between two sides a start does not come back by small steps."""
+    segments = cut(0.5 + 0.2 * np.sin(3 * STEP * np.arange(2000)))
+    estimator = SegmentEstimator(segments, np.ones(len(segments.count), bool))
+
+    class Edge:
+        """Moves as measured from where it was measured; beyond an edge to and fro, whose best start
+        is there too."""
+
+        def replay(self, force, at, start, fresh, h, command):
+            path = np.interp(h * np.arange(len(force) + 1), segments.time, segments.position)
+            far = np.abs(start[:, 0] - segments.start[:, 0]) > 5 * segments.prior_std[:, 0]
+            window = np.searchsorted(at, np.arange(len(force) + 1), side="right") - 1
+            fro = 0.1 * np.sin(0.3 * np.arange(len(path))) + 100 * (start - there)[window, 0]
+            moved = path + np.where(far[window], fro, 0.0)
+            return moved[:-1], moved[1:]
+
+    there = segments.start.copy()
+    there[3] += 20 * segments.prior_std[3]
+    squares = estimator.squares(Edge(), there)[1]
+    stuck = Fit(EMPTY, there, squares, estimator.loss(squares))
+    assert estimator.fit(lambda x: Edge(), NOTHING, EMPTY, there).loss > 0.9 * stuck.loss
+    freed = estimator.refit(lambda x: Edge(), NOTHING, stuck)
+    assert freed.loss < 0.1 * stuck.loss
+    assert freed.start[3] == pytest.approx(segments.start[3], abs=5 * segments.prior_std[3].max())
+
+
+def test_a_good_fit_stays_as_it_is(tmp_path):
+    found = measured(tmp_path, 0.2 + 0.5 * (1 - np.exp(-STEP * np.arange(1000))))
+    base = base_of(found.profile, joint_model_for(found, STEP), STEP)
+    segments = segments_of(found.runs, found.sigma, 1.0, 0.0, 1.0, STEP, 0.2)
+    estimator = SegmentEstimator(segments, np.ones(len(segments.count), bool))
+    fit = estimator.fit(base.simulator, base.unknowns, np.ones(len(base.places)))
+    assert estimator.refit(base.simulator, base.unknowns, fit) is fit
+
+
+# --- rest and pace
+def test_rest_at_an_end_does_not_count_and_rest_elsewhere_does_by_few_samples():
+    t = STEP * np.arange(1000)
+    segments = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0), 0.4 + 0 * t)
+    told = usable(segments)
+    assert segments.rests[segments.run == 0].sum() == 4
+    assert not told[segments.run == 0][2:].any()
+    assert told[segments.run == 1][0] and 4 <= segments.count[segments.run == 1].sum() <= 16
+
+
+def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
+    """Full stroke in 20 ms, at 1 kHz, and then rest at the end."""
+    t = STEP * np.arange(300)
+    run = run_of(np.minimum(0.05 + (t / 0.02) ** 2, 1.0))
+    segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP)
+    assert segments.length < 0.03
+    told = np.flatnonzero(usable(segments))
+    assert len(told) >= 1
+    assert segments.time[segments.rows[told[-1]].max()] > 0.015
+
+
+@pytest.mark.parametrize(
+    ("timestep", "length", "usual", "step"),
+    [(2e-3, 0.1, 0.1, 1 / 3000), (5e-4, 0.45, 0.45, 1.5e-3), (5e-4, 1.5, 0.45, 1.5e-3)],
+)
+def test_steps_are_short_for_the_windows(timestep, length, usual, step):
+    assert _step(timestep, length, usual, STEPS) == pytest.approx(step)

@@ -1,0 +1,33 @@
+"""Whole runs of an adequate model: missed by no more than errors explain, up to an end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_cases import read
+
+from joda.diagnosis.baseline import fit_baseline
+from joda.diagnosis.free_runs import BEYOND, worst
+from joda.hidden import draw
+from joda.measured.runs import Run, until_end
+
+
+def test_a_run_counts_up_to_where_the_joint_comes_to_an_end():
+    position = np.array([0.0, 0.001, 0.2, 0.9, 0.999, 0.7, 0.5])
+    run = Run("a.csv", np.arange(7.0), position, None, np.zeros(7), False)
+    assert len(until_end(run, (0.0, 1.0), 3e-3).time) == 4
+    assert len(until_end(run, (0.0, 1.0), 3e-5).time) == 7
+    assert len(until_end(run, (0.0, 1.0), 3.0).time) == 7
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("forced", [True, False])
+def test_errors_explain_the_runs_of_a_right_model_and_not_those_of_a_wrong_one(forced):
+    seed = int(np.random.default_rng().integers(2**31))
+    print(seed)
+    train, _ = read(draw(seed, None, forced))
+    baseline = fit_baseline(train)
+    assert worst(train, baseline).free < BEYOND
+    assert len(baseline.fit.x)
+    wrong = replace(baseline, fit=replace(baseline.fit, x=3.0 * baseline.fit.x))
+    assert worst(train, wrong).free > worst(train, baseline).free
