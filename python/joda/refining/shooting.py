@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.estimation.estimator import Fit as Found
-from joda.estimation.estimator import SegmentEstimator, Unknowns
+from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.profile_parameters import Parameters
 from joda.estimation.segments import Simulator
+from joda.estimation.unknowns import Unknowns
 from joda.refining.engine import Engine
 
 Array = NDArray[np.float64]
