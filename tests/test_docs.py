@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import mujoco
@@ -17,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 from test_prompts import answers
 from test_readme import shell
 
+from joda.diagnosis.selection import SETTINGS
 from joda.measured.runs import read_run
 from joda.profile import ATTRIBUTES
 from joda.propose.expected import Expectations
@@ -220,6 +222,18 @@ def test_the_plugin_has_the_attributes_of_the_reference():
     code = (ROOT / "cpp" / "profile.h").read_text()
     texts = re.search(r"kTextNames[^{]*\{(.*?)\}", code, re.DOTALL)[1]
     assert ("range", *re.findall(r'"(\w+)"', texts)) == ATTRIBUTES
+
+
+def test_the_table_of_what_decides_has_every_setting():
+    text = (DOCS / "diagnose.md").read_text()
+    table = text.partition("| setting | value |")[2].partition("\n\n")[0]
+    rows = [row.split("|")[1:3] for row in table.splitlines() if row.startswith("| `")]
+    told = {
+        name: float(value)
+        for names, values in rows
+        for name, value in zip(re.findall(r"`(\w+)`", names), values.split(","), strict=True)
+    }
+    assert told == asdict(SETTINGS)
 
 
 def test_the_site_is_built_without_a_warning(tmp_path):

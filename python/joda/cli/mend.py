@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from joda.cli.options import (
+    Effects,
     Force,
     Joint,
     Joints,
@@ -41,6 +42,7 @@ def diagnose(
     ] = None,
     passive: Passive = False,
     trust: Trust = None,
+    templates: Effects = None,
     force: Force = False,
 ) -> None:
     """Tell which effect a model lacks, where, and how much of it.
@@ -60,7 +62,8 @@ def diagnose(
         with progress_bar() as bar:
             every = diagnose_all(
                 model, runs, joint or (), exclude=exclude or (), passive=passive,
-                trust=read_trust(trust or ()), json=as_json, force=force, progress=bar,
+                trust=read_trust(trust or ()), templates=templates or (), json=as_json,
+                force=force, progress=bar,
             )  # fmt: skip
         for name, one in every.items():
             say(f"{name}:")
@@ -73,7 +76,8 @@ def diagnose(
     with progress_bar() as bar:
         found = run(
             model, joint[0], runs, exclude=exclude or (), json=as_json, report=report,
-            picture=output, passive=passive, trust=read_trust(trust or ()), force=force,
+            picture=output, passive=passive, trust=read_trust(trust or ()),
+            templates=templates or (), force=force,
             progress=bar,
         )  # fmt: skip
     for sentence in sentences(found):
@@ -95,6 +99,7 @@ def add(
     ] = None,
     passive: Passive = False,
     trust: Trust = None,
+    templates: Effects = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -113,7 +118,8 @@ def add(
     with spinner("add") as progress:
         added = run(
             model, joint, diagnosis, runs, output, effect=effect, passive=passive,
-            trust=read_trust(trust or ()), force=force, progress=progress,
+            trust=read_trust(trust or ()), templates=templates or (), force=force,
+            progress=progress,
         )  # fmt: skip
     if as_json:
         print_json(added.as_json())
@@ -132,6 +138,7 @@ def improve(
     report: Report = None,
     passive: Passive = False,
     trust: Trust = None,
+    templates: Effects = None,
     force: Force = False,
 ) -> None:
     """Diagnose and add until the data support nothing more.
@@ -152,7 +159,8 @@ def improve(
 
         with spinner("improve") as progress:
             every = improve_all(
-                model, runs, output, joint or (), passive=passive, trust=read_trust(trust or ()),
+                model, runs, output, joint or (), passive=passive,
+                trust=read_trust(trust or ()), templates=templates or (),
                 force=force, progress=progress,
             )  # fmt: skip
         for name, one in every.items():
@@ -166,7 +174,8 @@ def improve(
     with spinner("improve") as progress:
         result = run(
             model, joint[0], runs, output, report=report, passive=passive,
-            trust=read_trust(trust or ()), force=force, progress=progress,
+            trust=read_trust(trust or ()), templates=templates or (), force=force,
+            progress=progress,
         )  # fmt: skip
     for sentence in sentences(result):
         say(sentence)

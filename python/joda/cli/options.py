@@ -59,6 +59,12 @@ Templates = Annotated[
         "--templates", help="Further folders of templates (*.json) and of archetypes (*.toml)."
     ),
 ]
+Effects = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--templates", help="Further folders of templates (*.json) of effects that may be missing."
+    ),
+]
 Key = Annotated[
     str, typer.Option("--key", help="Another key draws other numbers for the same words.")
 ]

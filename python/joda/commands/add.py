@@ -97,6 +97,7 @@ def add(
     effect: str | None = None,
     passive: bool = False,
     trust: Mapping[str, float] = NO_TRUST,
+    templates: Sequence[str | Path] = (),
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Added:
@@ -117,6 +118,7 @@ def add(
         effect: which one; None: the diagnosis' first.
         passive: whether the actuators on the joint, if there are any, were off.
         trust: how far off numbers may be, as in `joda.diagnose`.
+        templates: further folders of effect templates, as there.
         force: overwrite what exists.
         progress: told what is being done.
 
@@ -131,7 +133,8 @@ def add(
     composed, picture = beside(target, force, [*runs, diagnosis])
     told = read_diagnosis(Path(diagnosis))
     name, direction, near = _chosen(told, Path(diagnosis), effect)
-    measured = read_runs(model, joint, runs, passive, trust)
+    measured = read_runs(model, joint, runs, passive, trust, templates)
+    check_effect(name, measured.templates)
     driven = measured.joint_model.servo is not None
     if right := as_told(told.get("corrections", ()), driven):
         measured = right.of(measured)
@@ -218,7 +221,6 @@ def _chosen(
                 f"({LABEL} learns a law from the runs)."
             )
         effect = told["effects"][0]["effect"]
-    check_effect(effect)
     said = found.get(effect, {})
     return effect, said.get("direction"), _interval(said.get("interval"), path)
 

@@ -29,6 +29,7 @@ def diagnose(
     exclude: Collection[str] = (),
     passive: bool = False,
     trust: Mapping[str, float] = NO_TRUST,
+    templates: Sequence[str | Path] = (),
     json: str | Path | None = None,
     report: str | Path | None = None,
     picture: str | Path | None = None,
@@ -46,6 +47,7 @@ def diagnose(
         trust: how far off numbers of the model and of the measurement may be, by name: standard
             deviations, relative ones but for center_of_mass (rad), force_offset (N·m or N),
             time_delay (s) and position_offset (rad or m); 0 trusts a number fully.
+        templates: further folders of effect templates, which may be missing too.
         json, report, picture: files to write: all numbers, an HTML page that needs nothing else,
             a PNG.
         force: overwrite them.
@@ -60,9 +62,9 @@ def diagnose(
     """
     targets = [Path(path) for path in (json, report, picture) if path]
     check_targets(targets, force, [model, *runs])
+    measured = read_runs(model, joint, runs, passive, trust, templates)
     for name in exclude:
-        check_effect(name)
-    measured = read_runs(model, joint, runs, passive, trust)
+        check_effect(name, measured.templates)
     found = diagnosed(measured, exclude, progress)
     diagnosis, profile = found.diagnosis, found.profile
     files: dict[Path, bytes | str] = {}
@@ -78,10 +80,11 @@ def diagnose(
     return diagnosis
 
 
-def check_effect(name: str) -> None:
-    """Raises JodaError if there is no effect of that name."""
-    if name not in NAMES:
-        raise JodaError(f"no effect '{name}'; there are {', '.join(NAMES)}.")
+def check_effect(name: str, templates: Collection[str] = ()) -> None:
+    """Raises JodaError if there is no effect of that name, nor a template."""
+    every = dict.fromkeys((*NAMES, *templates))
+    if name not in every:
+        raise JodaError(f"no effect '{name}'; there are {', '.join(every)}.")
 
 
 def sentences(diagnosis: Diagnosis) -> list[str]:

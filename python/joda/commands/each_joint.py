@@ -105,6 +105,7 @@ def diagnose_all(
     exclude: Collection[str] = (),
     passive: bool = False,
     trust: Mapping[str, float] = NO_TRUST,
+    templates: Sequence[str | Path] = (),
     json: str | Path | None = None,
     force: bool = False,
     progress: Callable[[int, int, str], None] = lambda done, total, what: None,
@@ -114,7 +115,7 @@ def diagnose_all(
     Args:
         model, runs, joints, passive, json, force: as in `compare_all`.
         exclude: effects that are not considered.
-        trust: as in `joda.diagnose`, of every joint.
+        trust, templates: as in `joda.diagnose`, of every joint.
         progress: told how much is done, of how much, and what.
 
     Returns:
@@ -132,7 +133,14 @@ def diagnose_all(
             progress(number * total + done, len(names) * total, f"{name}: {what}")
 
         found[name] = diagnose(
-            model, name, runs, exclude=exclude, passive=passive, trust=trust, progress=told
+            model,
+            name,
+            runs,
+            exclude=exclude,
+            passive=passive,
+            trust=trust,
+            templates=templates,
+            progress=told,
         )
         if json:  # what is done stays, whatever ends the rest
             own = {joint: loads(one.to_json()) for joint, one in found.items()}
@@ -148,6 +156,7 @@ def improve_all(
     *,
     passive: bool = False,
     trust: Mapping[str, float] = NO_TRUST,
+    templates: Sequence[str | Path] = (),
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> dict[str, Improved]:
@@ -157,7 +166,7 @@ def improve_all(
         model, runs, joints, passive: as in `compare_all`.
         output: scene to write; beside it, with its name and each joint's, go .composed.json and
             .png. What is done is written joint by joint, and stays if the rest is interrupted.
-        trust: as in `joda.diagnose`, of every joint.
+        trust, templates: as in `joda.diagnose`, of every joint.
         force: overwrite what exists.
         progress: told what is being done.
 
@@ -183,7 +192,7 @@ def improve_all(
             progress(f"{name}: {what}")
 
         done = improve(
-            current, name, runs, target, passive=passive, trust=trust,
+            current, name, runs, target, passive=passive, trust=trust, templates=templates,
             force=force or bool(found), progress=told,
         )  # fmt: skip
         if done.scene and done.composed and done.picture:

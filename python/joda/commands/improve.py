@@ -80,6 +80,7 @@ def improve(
     report: str | Path | None = None,
     passive: bool = False,
     trust: Mapping[str, float] = NO_TRUST,
+    templates: Sequence[str | Path] = (),
     force: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Improved:
@@ -96,6 +97,7 @@ def improve(
         report: an HTML page to write that needs nothing else.
         passive: whether the actuators on the joint, if there are any, were off.
         trust: how far off numbers may be, as in `joda.diagnose`.
+        templates: further folders of effect templates, as there.
         force: overwrite what exists.
         progress: told what is being done.
 
@@ -107,7 +109,7 @@ def improve(
     """
     target = Path(output)
     composed, picture = beside(target, force, runs, report)
-    measured = read_runs(model, joint, runs, passive, trust)
+    measured = read_runs(model, joint, runs, passive, trust, templates)
     steps, why = improved(measured, progress)
     progress("drawing")
     last, right, (_, held) = steps[-1].profile, steps[-1].right, parted(measured)

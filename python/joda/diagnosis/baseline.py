@@ -26,7 +26,6 @@ from joda.estimation.estimator import Fit, SegmentEstimator, excess
 from joda.joints.joint_model import JointModel
 from joda.measured.reading import Measured
 from joda.profile import Profile
-from joda.template import read_templates
 
 Array = NDArray[np.float64]
 
@@ -181,6 +180,6 @@ def fit_baseline(
         )  # else something else is missing
         if explained and fit_so.loss < fit.loss - CLEARLY:
             base, fit, given = yielding, fit_so, given_so
-    every = hypotheses(units_of(segments, measured), read_templates(), measured.profile)
+    every = hypotheses(units_of(segments, measured), measured.templates, measured.profile)
     begun = initial_points(estimator.coarser, base.coarser(), given, fit)
     return Baseline(estimator, base, measured.joint_model, fit, begun, tuple(every))

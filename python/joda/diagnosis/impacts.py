@@ -1,5 +1,4 @@
-"""How bouncy the ends of the range are: by the segments with impacts, which tell of nothing else.
-"""
+"""How bouncy the ends of the range are, by the segments with impacts: no others tell of it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

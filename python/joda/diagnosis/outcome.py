@@ -25,6 +25,7 @@ from joda.pictures.style import house_style
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.attaching import attached
+from joda.template import read_templates
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -41,17 +42,18 @@ def read_runs(
     runs: Sequence[str | Path],
     passive: bool = False,
     trust: Mapping[str, float] = NO_TRUST,
+    templates: Sequence[str | Path] = (),
 ) -> Measured:
     """As `joda.measured.reading.read_measured`, but of long runs only parts.
 
     It is noted where that is so, and that curves beside runs say nothing. `trust`: how far off
-    numbers may be (`joda.measured.trust`).
+    numbers may be (`joda.measured.trust`); `templates`: further folders of effect templates.
 
     Raises:
-        JodaError: a file cannot be read, or what it holds cannot be of this joint; or no such
-            number may be off.
+        JodaError: a file cannot be read, or what it holds cannot be of this joint; no such
+            number may be off; or a folder holds no templates.
     """
-    told = trusting(trust)
+    told, effects = trusting(trust), read_templates(templates)
     measured = read_measured(model, joint, runs, passive).trusting(told)
     check_known(measured.runs)
     ignored = tuple(
@@ -60,7 +62,9 @@ def read_runs(
         if measured.runs
     )
     parts, of, cut = excerpts(measured.runs)
-    return replace(measured.with_runs(parts, of), notes=(*measured.notes, *ignored, *cut))
+    return replace(
+        measured.with_runs(parts, of), notes=(*measured.notes, *ignored, *cut), templates=effects
+    )
 
 
 def beside(

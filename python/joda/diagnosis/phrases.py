@@ -50,6 +50,8 @@ SHOWS = {
     "position_dependent_damping": "a resistance missing that grows with speed, and differs with "
     "position",
 }
+SHAPE = "what is missing there has the shape of the template's curves"
+"""What shows a template of one's own."""
 WAYS = {"positive": "towards +q", "negative": "towards \N{MINUS SIGN}q"}
 
 assert set(NAMES) >= {*EFFECTS, *CHANNEL_EFFECTS}
@@ -65,8 +67,8 @@ SUREST = 0.99
 
 
 def named(effect: str) -> str:
-    """The effect in a few words."""
-    return NAMES[effect]
+    """The effect in a few words: a template of one's own by its file's name."""
+    return NAMES.get(effect, effect.replace("_", " "))
 
 
 def percent(probability: float) -> str:
@@ -109,7 +111,7 @@ def explained(
     value, doubt, unit = size
     way = f", {WAYS[direction]}" if direction in WAYS else ""
     of = "" if unit == "1" else f" {unit}"
-    shows = SHOWS[effect] if effect in SHOWS else _lower(EFFECTS[effect].SHOWS)
+    shows = SHOWS.get(effect) or (_lower(EFFECTS[effect].SHOWS) if effect in EFFECTS else SHAPE)
     before, after, noise = errors
     name = named(effect)
     return (

@@ -170,8 +170,7 @@ def _of_servo(servo: Servo, trust: Trust) -> Unknowns:
 
 
 def segments_for(measured: Measured, length: float | None = None, fine: bool = True) -> Segments:
-    """The runs in segments of some length (s), see `segments_of`; curves where there are no runs.
-    """
+    """Runs in segments of some length (s), see `segments_of`; curves where there are no runs."""
     if not measured.runs:
         return curve_segments(measured)
     lo, hi = measured.profile.joint.range

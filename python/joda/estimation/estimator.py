@@ -223,7 +223,8 @@ class SegmentEstimator:
         misfits = [segments.misfit(make(y), start) for y in tried]
         ways = np.eye(start.shape[1])
         misfits += [
-            segments.misfit(simulator, start + STATE_STEP * segments.prior_std * way) for way in ways
+            segments.misfit(simulator, start + STATE_STEP * segments.prior_std * way)
+            for way in ways
         ]
         found = segments.residuals(np.stack(misfits, axis=1))
         base = found[:, :, k : 2 * k] if central else r[:, :, None]

@@ -1,5 +1,4 @@
-"""Numbers that are fitted: their bounds, steps of differences, and what is known before the data.
-"""
+"""Numbers that are fitted: bounds, steps of differences, and what is known before the data."""
 
 from dataclasses import dataclass, replace
 
@@ -77,4 +76,4 @@ NOTHING = Unknowns(EMPTY, EMPTY, EMPTY, EMPTY, EMPTY)
 
 
 def _parts(unknowns: Unknowns) -> tuple[Array, ...]:
-    return tuple(getattr(unknowns, name) for name in ("low", "high", "step", "mean", "doubt"))
+    return tuple(getattr(unknowns, name) for name in ("low", "high", "step", "mean", "prior_std"))

@@ -1,7 +1,7 @@
 """A joint of a model with what was measured of it, read from files and checked."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
@@ -31,6 +31,7 @@ from joda.scenes.context import Context, context
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
 from joda.scenes.native import Row, own_friction_row, whole_profile
 from joda.scenes.scene import profiles_of
+from joda.template import Template, read_templates
 
 Array = NDArray[np.float64]
 
@@ -73,6 +74,7 @@ class Measured:
         whole: whether all that acts on the joint there is replayed, and all of the runs.
         barred: the note on where the scene would not have let the joint; empty if there is none.
         trust: how far off its numbers, and those of the measurement, may be.
+        templates: of effects that may be missing, by name.
     """
 
     context: Context
@@ -89,6 +91,7 @@ class Measured:
     whole: bool
     barred: str
     trust: Trust = USUAL
+    templates: Mapping[str, Template] = field(default_factory=read_templates)
 
     def trusting(self, trust: Trust) -> "Measured":
         """The same joint and runs, whose numbers may be so far off."""

@@ -82,8 +82,7 @@ class Offline:
         return Answer(None if mended == last.proposal else mended, recognised=found)
 
     def _mended(self, proposal: Proposal, task: Task, wanted: Sequence[Requirement]) -> Proposal:
-        """With strengths that fulfil the requirements, and further effects where strengths cannot.
-        """
+        """With strengths that fulfil the requirements, or further effects where none can."""
         arguments = task.context, task.templates, wanted, self.key
         mended, hopeless = adjusted_strengths(proposal, *arguments)
         added = [part for name in sorted(hopeless & WISHED.keys()) for part in WISHED[name]]

@@ -20,7 +20,7 @@ from joda.diagnosis.hypotheses.base import (
     unknowns_of,
 )
 from joda.diagnosis.hypotheses.intervals import FELT, WHOLE, ends, felt, places
-from joda.profile import Profile
+from joda.profile import CHANNELS, Profile
 from joda.template import Template
 
 WIDEST = 0.5
@@ -33,6 +33,8 @@ LEAN, USUAL_LEAN = (-1.2, 1.2, 0.03), 0.4
 """Logarithm of the ratio of a well's flanks: bounds and step; its doubt before the data."""
 BARRIER = (0.2, 3.0, 0.02, 0.05, 12.0)
 """Of a latch, in units of its hold."""
+RATIO = (0.0, 3.0, 0.02)
+"""Of a template's curves: strength of each in units of the first one's."""
 CENTRES = ((0.5,), (0.27, 0.73))
 """Of one well, and of two, in their interval; their outer flanks run out more slowly."""
 LOCAL = {
@@ -73,6 +75,8 @@ def from_templates(units: Units, templates: Mapping[str, Template]) -> Iterator[
             yield _wells(units, name, (1.0, -1.0, 1.0, -1.0))
         elif name == "detent_internal":
             yield _wells(units, name, (1.0, -1.0))
+        else:
+            yield _drawn(units, name, template)
 
 
 def _caught(profile: Profile, name: str, interval: tuple[float, float], most: float) -> Profile:
@@ -264,6 +268,45 @@ def _bistable(units: Units, name: str) -> Hypothesis:
         everywhere,
         lambda x: units.force * float(x[0]) * max(1.0, float(x[3])),
         unit_of(units),
+        misfit_tolerance=KNOWN_SHAPE,
+    )
+
+
+def _drawn(units: Units, name: str, template: Template) -> Hypothesis:
+    """A template of which no law is known: its curves as they are drawn. Strength of the first, of
+    each other one in units of that, the interval."""
+    curves = {
+        channel: curve
+        for channel in CHANNELS
+        if (curve := getattr(template.channels, channel)) is not None
+    }
+    first = next(iter(curves))
+
+    def unit(channel: str) -> float:
+        return units.force / (units.speed if channel == "damping" else 1.0)
+
+    def write(profile: Profile, x: Array) -> Profile:
+        interval = ends("anywhere", x)
+        for part, (channel, curve) in zip((1.0, *x[1:-2]), curves.items(), strict=True):
+            y = tuple(unit(channel) * float(x[0] * part) * np.array(curve.y))
+            own = Component(label=name, interval=interval, x=curve.x, y=y)
+            profile = profile.with_component(channel, own)
+        return profile
+
+    bounds, tries = places("anywhere")
+    others: Bounds = [RATIO] * (len(curves) - 1)
+    tries += [(0.0, 1.0)]
+    return Hypothesis(
+        name,
+        "both",
+        unknowns_of(STRENGTH, *others, *bounds),
+        np.array([(TRIAL, *[0.0] * len(others), *t) for t in tries]),
+        write,
+        lambda x: ends("anywhere", x),
+        lambda x: unit(first) * float(x[0]) * max(map(abs, curves[first].y)),
+        unit_of(units, int(first == "damping")),
+        len(bounds),
+        neg_log_prior=RARE,
         misfit_tolerance=KNOWN_SHAPE,
     )
 

@@ -1,0 +1,108 @@
+"""A template that nobody has written a law for: its effect is found, told and added."""
+
+import json
+
+import mujoco
+import numpy as np
+import pytest
+from hidden_cases import read
+
+from joda import JodaError, add, attach, diagnose
+from joda.component import Component
+from joda.diagnosis.hypotheses import hypotheses
+from joda.diagnosis.units import units_of
+from joda.estimation.base_model import segments_for
+from joda.hidden import draw
+from joda.profile import Channel, Channels, Joint, Profile
+from joda.template import read_templates
+
+NAME = "cam_with_three_teeth"
+U = np.linspace(0, 1, 13)
+TEETH = np.round(np.sin(6 * np.pi * U), 9) + 0.0
+SCENE = """<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.002" integrator="implicitfast" gravity="0 0 0"/>
+  <worldbody>
+    <body name="wheel">
+      <joint name="wheel" axis="0 0 1" range="-1.5 1.5" limited="true" damping="0.02"/>
+      <inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.fixture
+def templates(tmp_path):
+    folder = tmp_path / "effects"
+    folder.mkdir()
+    content = {
+        "name": NAME,
+        "description": "A cam whose three teeth draw the joint to three places.",
+        "placement": "Anywhere.",
+        "channels": {"conservative": {"x": U.tolist(), "y": TEETH.tolist()}},
+    }
+    (folder / f"{NAME}.json").write_text(json.dumps(content))
+    return folder
+
+
+def pushed(scene, rng, number, path):
+    """A run of the wheel pushed to and fro, as an encoder sees it."""
+    model = mujoco.MjModel.from_xml_path(str(scene))
+    data, rows, pace = mujoco.MjData(model), [], rng.uniform(0.6, 1.2)
+    for k in range(3000):
+        push = 0.35 * np.sin(pace * data.time + number) + 0.15 * np.sin(3.1 * pace * data.time)
+        if k % 4 == 0:
+            data.qfrc_applied[0] = push
+            rows.append((data.time, data.qpos[0] + 5e-4 * rng.normal(), push))
+        mujoco.mj_step(model, data)
+    np.savetxt(path, rows, "%.7f", ",", header="time,position,force", comments="")
+
+
+def test_it_is_diagnosed_and_added_without_code(tmp_path, templates, rng):
+    size, (a, b) = rng.uniform(0.15, 0.25), (rng.uniform(0.1, 0.3), rng.uniform(0.7, 0.9))
+    teeth = Component(label=NAME, interval=(a, b), x=tuple(U), y=tuple(size * TEETH))
+    true = Profile(
+        joint=Joint(name="wheel", type="hinge", range=(-1.5, 1.5), unit="rad"),
+        channels=Channels(conservative=Channel(components=(teeth,))),
+    )
+    (tmp_path / "plain.xml").write_text(SCENE)
+    attach(tmp_path / "plain.xml", true, tmp_path / "true.xml", native="keep")
+    runs = [tmp_path / f"run{k}.csv" for k in range(4)]
+    for number, path in enumerate(runs):
+        pushed(tmp_path / "true.xml", rng, number, path)
+    line = tmp_path / "plain.xml", "wheel", runs
+    found = diagnose(*line, templates=[templates], json=tmp_path / "d.json")
+    assert found.verdict == "missing_effect", found.summary
+    first = found.effects[0]
+    assert first.effect == NAME and "cam with three teeth" in found.summary
+    assert first.magnitude == pytest.approx(size, rel=0.1)
+    assert first.interval == pytest.approx((a, b), abs=0.03)
+    model, joint, files = line
+    added = add(
+        model, joint, tmp_path / "d.json", files, tmp_path / "new.xml", templates=[templates]
+    )
+    assert added.added, added.reason
+    assert added.after.window < 0.3 * added.before.window
+    with pytest.raises(JodaError, match=f"no effect '{NAME}'"):  # without the folder
+        add(model, joint, tmp_path / "d.json", files, tmp_path / "no.xml")
+
+
+def test_every_template_has_a_hypothesis(tmp_path, templates):
+    """Of each channel that it has one strength, and where it acts."""
+    measured = read(draw(3, "quadratic_damping"))[0]
+    content = json.loads((templates / f"{NAME}.json").read_text())
+    rough = {"x": [0, 0.5, 1], "y": [0, 1, 0]}
+    content["channels"] |= {"friction": rough, "damping": rough}
+    (templates / f"{NAME}.json").write_text(json.dumps(content))
+    every = hypotheses(
+        units_of(segments_for(measured), measured), read_templates([templates]), measured.profile
+    )
+    (own,) = [one for one in every if one.effect == NAME]
+    assert own.trials.shape[1] == len(own.unknowns.low) == 5  # three strengths and two ends
+    x = np.array([2.0, 0.5, 0.25, 0.2, 0.8])
+    channels = own.write(measured.profile, x).channels
+    parts = [getattr(channels, name).components[-1] for name in ("conservative", "friction")]
+    assert all(part.label == NAME and part.interval == (0.2, 0.8) for part in parts)
+    assert max(parts[1].y) == pytest.approx(0.5 * max(parts[0].y))
+    assert own.magnitude(x) == pytest.approx(max(parts[0].y))
