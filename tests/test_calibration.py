@@ -8,7 +8,7 @@ from hidden_cases import read
 import joda
 from joda import JodaError
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.calibration import calibration_of
+from joda.diagnosis.calibration import Calibrator
 from joda.estimation.nuisance import doubted
 from joda.hidden import draw
 from joda.measured.reading import read_measured
@@ -68,7 +68,7 @@ def found_of(folder, rng, trust=None, mass=1.0, beside=False, **wrong):
     (folder / "arm.xml").write_text(arm(1 / mass))
     measured = read_measured(folder / "arm.xml", "arm", runs)
     measured = measured.trusting(trusting(trust or {}))
-    return measured, calibration_of(measured, fit_baseline(measured), beside)
+    return measured, Calibrator(measured).numbers(fit_baseline(measured), beside)
 
 
 def check(measured, found, name, right):
@@ -158,7 +158,7 @@ def test_a_joint_of_the_field_with_wrong_numbers_lacks_no_effect():
         pass
     print(case.seed, case.seal["wrong"])  # shown where the test fails
     measured, _ = read(case)
-    found = calibration_of(measured, fit_baseline(measured))
+    found = Calibrator(measured).numbers(fit_baseline(measured))
     assert found is None or found.alone
 
 

@@ -109,24 +109,32 @@ class Calibration:
         )
 
 
-def calibration_of(
-    measured: Measured, baseline: Baseline, beside: bool = False
-) -> Calibration | None:
-    """The numbers that are off; None where none is, or where they explain little.
+class Calibrator:
+    """Finds numbers that are off; asked again of the same segments, it keeps its first fits."""
 
-    Args:
-        measured: the joint and its runs.
-        baseline: the model fitted to them.
-        beside: whether effects were looked for too, so that these can be compared.
-    """
-    every = nuisances_of(measured, baseline.base)
-    if not measured.runs or not every.names:
-        return None
-    with threadpool_limits(1, BLAS):
-        found = _calibrated(baseline, every, beside)
-        if found and all(found.numbers.little(found.fit.x)):
+    def __init__(self, measured: Measured) -> None:
+        """Of a joint and its runs."""
+        self.measured = measured
+        self._segments: SegmentEstimator | None = None
+        self._fits: dict[tuple[NuisanceName, ...], Fit] = {}
+
+    def numbers(self, baseline: Baseline, beside: bool = False) -> Calibration | None:
+        """The numbers that are off; None where none is, or where they explain little.
+
+        Args:
+            baseline: the model fitted to the runs.
+            beside: whether effects were looked for too, so that these can be compared.
+        """
+        measured, every = self.measured, nuisances_of(self.measured, baseline.base)
+        if not measured.runs or not every.names:
             return None
-        return _longer(measured, found) if found and found.alone else found
+        if self._segments is not baseline.estimator:
+            self._segments, self._fits = baseline.estimator, {}
+        with threadpool_limits(1, BLAS):
+            found = _calibrated(_Search(baseline, every, self._fits), beside)
+            if found and all(found.numbers.little(found.fit.x)):
+                return None
+            return _longer(measured, found) if found and found.alone else found
 
 
 def _longer(measured: Measured, found: Calibration) -> Calibration:
@@ -147,8 +155,8 @@ def _longer(measured: Measured, found: Calibration) -> Calibration:
     return replace(found, numbers=own, fit=fit)
 
 
-def _calibrated(baseline: Baseline, every: Nuisances, beside: bool) -> Calibration | None:
-    found = _Search(baseline, every)
+def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
+    baseline, every = found.baseline, found.every
     whole, first = found.fitted(every.names), found.fitted(()).loss
     count = max(baseline.estimator.samples, 1.0)
     all_of_it, left = (excess(x, count) * count if beside else x for x in (first, whole.loss))
@@ -169,30 +177,42 @@ def _calibrated(baseline: Baseline, every: Nuisances, beside: bool) -> Calibrati
     if np.any(widths > SURPRISE):  # it stands in for what is missing
         surprising = {name for name, off in zip(names, widths, strict=True) if off > SURPRISE}
         rest = tuple(name for name in every.names if name not in surprising)
-        return _calibrated(baseline, every.only(rest), beside) if rest else None
+        return _calibrated(replace(found, every=every.only(rest)), beside) if rest else None
     return _concluded(found, names, best, whole)
 
 
 @dataclass(frozen=True)
 class _Search:
-    """Fits of numbers to segments, in long steps."""
+    """Fits of numbers to segments, in long steps.
+
+    Attributes:
+        baseline: the model as it is, fitted.
+        every: the numbers that may be off.
+        fits: that were made of some of them, by name.
+    """
 
     baseline: Baseline
     every: Nuisances
+    fits: dict[tuple[NuisanceName, ...], Fit]
 
     @property
     def price(self) -> float:
         """Of a number, in loss."""
         return float(np.log(max(self.baseline.estimator.samples, 2.0)))
 
-    def fitted(
-        self, names: Sequence[NuisanceName], near: tuple[Sequence[NuisanceName], Fit] | None = None
-    ) -> Fit:
-        """Some of the numbers, from those of another fit and from the model as it is."""
-        own, base, estimator = self.every.coarser().only(names), self.baseline.base, self._judge
-        none = np.append(base.unknowns.mean, np.zeros(len(names)))
-        fits = [self.near(names, near), self._from(own, none, estimator.segments.start)]
-        return min((estimator.refit(own.make, own.unknowns, one) for one in fits), key=_loss)
+    def fitted(self, names: tuple[NuisanceName, ...]) -> Fit:
+        """Some of the numbers, from the model as it was fitted and as it is."""
+        if names not in self.fits:
+            own, base, estimator = (
+                self.every.coarser().only(names),
+                self.baseline.base,
+                self._estimator,
+            )
+            none = np.append(base.unknowns.mean, np.zeros(len(names)))
+            fits = [self.near(names), self._from(own, none, estimator.segments.start)]
+            refits = (estimator.refit(own.make, own.unknowns, one) for one in fits)
+            self.fits[names] = min(refits, key=_loss)
+        return self.fits[names]
 
     def near(
         self, names: Sequence[NuisanceName], near: tuple[Sequence[NuisanceName], Fit] | None = None
@@ -205,12 +225,12 @@ class _Search:
         return self._from(own, self.every.only(near[0]).taken(near[1].x, names), near[1].start)
 
     @property
-    def _judge(self) -> SegmentEstimator:
+    def _estimator(self) -> SegmentEstimator:
         return self.baseline.estimator.coarser
 
     def _from(self, own: Nuisances, x: Array, start: Array) -> Fit:
         """From numbers and starts: at once, and such that segments that are far off count first."""
-        estimator, fits = self._judge, []
+        estimator, fits = self._estimator, []
         for cauchy_scale in (LEVEL, CAUCHY_SCALE):
             first = estimator.fit(own.make, own.unknowns, x, start, FIRST, cauchy_scale)
             fits.append(estimator.fit(own.make, own.unknowns, first.x, first.start))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joda.diagnosis.baseline import Baseline, fit_baseline
-from joda.diagnosis.calibration import Calibration, calibration_of
+from joda.diagnosis.calibration import Calibration, Calibrator
 from joda.diagnosis.corrections import (
     FAR_OFF,
     OFF,
@@ -160,14 +160,15 @@ def diagnosed(
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
         return Diagnosed(_said(measured, "insufficient_data", why, (), None))
     baseline = fit_baseline(measured)
-    found = calibration_of(measured, baseline) if calibrate else None
+    calibrator = Calibrator(measured)
+    found = calibrator.numbers(baseline) if calibrate else None
     if found and found.alone:
         return _set_right(measured, found, looked(found.righted.of(measured), exclude, told))
     plain = looked(measured, exclude, told, baseline)
     ranking, beside = plain.first[0], False
     if calibrate and found is None and plain.selection.verdict != "adequate":
         ranking, beside = plain.ranking, True
-        found = calibration_of(measured, ranking.baseline, beside)
+        found = calibrator.numbers(ranking.baseline, beside)
     if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
         looks = looked(found.righted.of(measured), exclude, told)
         if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
