@@ -13,18 +13,19 @@ from joda.measured.runs import read_run
 LOG = SHARED / "data" / "emps" / "emps_estimation.csv"
 GAIN = 35.15065188
 """Of the drive, N/V (Janot, Gautier and Brunot 2019)."""
-FRICTION, DAMPING = 20.39, 203.5
-"""Of the screw, N and N·s/m; the same."""
+FRICTION, DAMPING, OFFSET = 20.39, 203.5, 3.16
+"""Of the screw, N, N·s/m and N; the same."""
+MASS = 95.1
 MODEL = """<mujoco>
-  <option timestep="0.001" gravity="0 0 0" integrator="implicitfast"/>
+  <option timestep="0.001" gravity="PULL 0 0" integrator="implicitfast"/>
   <worldbody><body>
     <joint name="screw" type="slide" axis="1 0 0" limited="true" range="-0.1 0.35"
            frictionloss="10" damping="120"/>
-    <inertial pos="0 0 0" mass="95.1" diaginertia="1 1 1"/>
+    <inertial pos="0 0 0" mass="MASS" diaginertia="1 1 1"/>
   </body></worldbody>
   <actuator><motor name="drive" joint="screw" gear="{gear}"/></actuator>
 </mujoco>
-"""
+""".replace("PULL", str(OFFSET / MASS)).replace("MASS", str(MASS))
 PARTS = 4
 """Runs that the log is cut into; every second is used: 12 s."""
 
@@ -47,7 +48,9 @@ def runs(tmp_path_factory):
 def test_the_drives_friction_and_gain_are_found_from_its_volts(runs, tmp_path):
     factor = float(np.random.default_rng().uniform(0.7, 1.4))
     print(factor)  # shown where the test fails
-    (tmp_path / "emps.xml").write_text(MODEL.format(gear=GAIN * factor))
+    (tmp_path / "emps.xml").write_text(
+        MODEL.format(gear=GAIN * factor)
+    )
     found = {
         one.parameter: one
         for one in numbers(fit_baseline(read_runs(tmp_path / "emps.xml", "screw", runs)))
