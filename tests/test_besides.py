@@ -75,6 +75,7 @@ def own_runs(folder, text, sigma=3e-4):
     return paths
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("flag", "own"),
     [

@@ -91,11 +91,13 @@ def test_a_mass_that_is_off_is_told(tmp_path, rng):
     check(*found_of(tmp_path, rng, mass=factor), "mass", factor)
 
 
+@pytest.mark.sweep(2, "one number")
 def test_a_force_of_another_scale_is_told(tmp_path, rng):
     factor = float(rng.choice([rng.uniform(0.6, 0.8), rng.uniform(1.25, 1.5)]))
     check(*found_of(tmp_path, rng, scale=factor), "force_scale", factor)
 
 
+@pytest.mark.sweep(2, "one number")
 def test_a_late_log_is_told(tmp_path, rng):
     late = round(float(rng.uniform(0.005, 0.04)), 3)
     check(*found_of(tmp_path, rng, delay=late), "time_delay", late)
@@ -110,11 +112,13 @@ def test_what_is_smaller_than_the_noise_is_told_too(tmp_path, rng):
     assert fit_baseline(measured).fit.loss < 1.8 * found.loss  # most of what is missed is noise
 
 
+@pytest.mark.sweep(2, "one number")
 def test_an_encoders_zero_is_told(tmp_path, rng):
     zero = float(rng.choice([-1, 1]) * rng.uniform(0.04, 0.15))
     check(*found_of(tmp_path, rng, zero=zero), "position_offset", zero)
 
 
+@pytest.mark.sweep(2, "one number")
 def test_an_offset_of_the_force_is_told(tmp_path, rng):
     offset = float(rng.choice([-1, 1]) * rng.uniform(0.05, 0.12))
     check(*found_of(tmp_path, rng, offset=offset), "force_offset", offset)

@@ -53,7 +53,7 @@ def pushed(folder, rng, numbers, extra=lambda q: 0.0):
     return names
 
 
-@pytest.mark.sweep(2, "corrections")
+@pytest.mark.sweep(1, "corrections")
 @pytest.mark.parametrize("wrong", [{}, {"damping": 1.6}, {"frictionloss": 0.5, "stiffness": 1.3}])
 def test_numbers_that_are_off_are_told_with_their_errors(tmp_path, rng, wrong):
     runs = pushed(tmp_path, rng, NUMBERS)
@@ -72,7 +72,7 @@ def test_numbers_that_are_off_are_told_with_their_errors(tmp_path, rng, wrong):
         assert name in one["explanation"] and "±" in one["explanation"]
 
 
-@pytest.mark.sweep(2, "corrections")
+@pytest.mark.sweep(1, "corrections")
 def test_a_number_that_is_off_beside_a_missing_effect_is_told_too(tmp_path, rng):
     runs = pushed(tmp_path, rng, NUMBERS, lambda q: -0.5)
     (tmp_path / "door.xml").write_text(text_of(NUMBERS | {"damping": 0.6}))

@@ -89,6 +89,7 @@ def test_what_errors_of_a_force_make_is_no_drift(rng):
     assert drift(moved, np.arange(SAMPLES), 0.0, moved=1.0) > 0.05
 
 
+@pytest.mark.sweep(1, "free runs")
 def test_a_small_fault_under_a_force_is_not_cleared(tmp_path):
     """Friction a tenth off in pushed runs, each window of which hides it."""
     model = """<mujoco><compiler angle="radian"/><option timestep=".002"/><worldbody><body>
@@ -151,6 +152,7 @@ def louder(measured, folder, rng, times):
     return read_measured(folder / "model.xml", "lid", files)
 
 
+@pytest.mark.sweep(1, "free runs")
 @pytest.mark.parametrize("times", [1.08, 0.93])
 def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
     """Eight or seven percent of friction, in a noise that hides it in windows."""

@@ -63,7 +63,7 @@ def test_every_family_hides_every_effect_and_laws_of_no_catalogue():
         assert not set(family.beyond) & set(EFFECTS)
 
 
-@pytest.mark.sweep(6)
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize(("family", "effect", "forced"), HIDDEN)
 def test_a_case_shows_its_effect_and_is_read(family, effect, forced):
     case = draw(1, effect, forced, family=family)

@@ -62,7 +62,7 @@ def test_modes_have_the_covariance_they_are_made_of():
     assert np.abs(L @ L.T - covariance).max() < 0.01
 
 
-@pytest.mark.sweep(2, "learned")
+@pytest.mark.sweep(1, "learned")
 def test_a_drag_by_the_root_of_the_speed_is_learned(tmp_path):
     case, measured, unseen = planted(tmp_path, "square_root_damping")
     (law,) = case.truth.hidden
@@ -86,7 +86,7 @@ def test_a_drag_by_the_root_of_the_speed_is_learned(tmp_path):
     assert np.all(error_there[np.abs(at) > 0.05 * at.max()] > 0)
 
 
-@pytest.mark.sweep(2, "learned")
+@pytest.mark.sweep(1, "learned")
 def test_a_period_over_position_is_learned(tmp_path):
     case, measured, _ = planted(tmp_path, "cogging")
     (law,) = case.truth.hidden
@@ -97,7 +97,7 @@ def test_a_period_over_position_is_learned(tmp_path):
     assert np.sqrt(np.mean((force - true) ** 2)) < 0.35 * np.sqrt(np.mean(true**2))
 
 
-@pytest.mark.sweep(2, "learned")
+@pytest.mark.sweep(1, "learned")
 def test_a_spring_whose_end_follows_is_learned(tmp_path):
     case, measured, unseen = planted(tmp_path, "maxwell_relaxation")
     (law,) = case.truth.hidden
@@ -111,7 +111,7 @@ def test_a_spring_whose_end_follows_is_learned(tmp_path):
     assert error(unseen, found.profile).window < 0.3 * error(unseen).window
 
 
-@pytest.mark.sweep(2, "learned")
+@pytest.mark.sweep(1, "learned")
 def test_what_falls_as_a_joint_warms_up_is_learned_in_part(tmp_path):
     _, measured, unseen = planted(tmp_path, "warming_up")
     longest = max(np.ptp(run.time) for run in measured.runs)
@@ -120,7 +120,7 @@ def test_what_falls_as_a_joint_warms_up_is_learned_in_part(tmp_path):
     assert error(unseen, found.profile).window < 0.7 * error(unseen).window
 
 
-@pytest.mark.sweep(2, "learned")
+@pytest.mark.sweep(1, "learned")
 def test_outside_what_was_visited_there_is_no_law(tmp_path):
     _, measured, _ = planted(tmp_path, "cogging")
     found = learned(measured, Terms(position=0.12))
@@ -134,7 +134,7 @@ def test_outside_what_was_visited_there_is_no_law(tmp_path):
     assert b <= s.max() + 0.02
 
 
-@pytest.mark.sweep(2, "learned")
+@pytest.mark.sweep(1, "learned")
 def test_where_nothing_is_missing_nothing_is_learned(tmp_path):
     _, measured, _ = planted(tmp_path, None)
     mended, law = learn(*parted(measured))

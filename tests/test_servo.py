@@ -114,7 +114,7 @@ def test_a_driven_run_is_replayed_under_its_command(tmp_path):
     assert wrong.rmse > 20 * NOISE and wrong.adequacy.verdict == "beyond_noise"
 
 
-@pytest.mark.sweep(2, "servo")
+@pytest.mark.sweep(1, "servo")
 def test_its_gain_and_delay_are_found_and_written(tmp_path):
     rng = np.random.default_rng()
     delay = rng.uniform(0.008, 0.025)
@@ -138,7 +138,7 @@ def test_its_gain_and_delay_are_found_and_written(tmp_path):
     assert compare(tmp_path / "new.xml", "elbow", runs).rmse < 2 * NOISE
 
 
-@pytest.mark.sweep(2, "servo")
+@pytest.mark.sweep(1, "servo")
 def test_friction_in_its_gear_is_found(tmp_path):
     arm = Arm(by_load=np.random.default_rng().uniform(0.12, 0.25))
     found = diagnose(Arm().model(tmp_path / "m.xml"), "elbow", arm.logs(tmp_path))
@@ -148,7 +148,7 @@ def test_friction_in_its_gear_is_found(tmp_path):
     assert not found.corrections
 
 
-@pytest.mark.sweep(2, "servo")
+@pytest.mark.sweep(1, "servo")
 def test_numbers_are_told_and_set_right_where_something_stays_unexplained(tmp_path):
     model, runs = Arm(kp=100.0).model(tmp_path / "m.xml"), Arm(by_load=0.4).logs(tmp_path)
     known = [name for name in EVERY if name != "end_stop_restitution"]
@@ -161,7 +161,7 @@ def test_numbers_are_told_and_set_right_where_something_stays_unexplained(tmp_pa
     assert steps[1].error.window < 0.3 * steps[0].error.window
 
 
-@pytest.mark.sweep(2, "servo")
+@pytest.mark.sweep(1, "servo")
 def test_damping_of_joint_and_actuator_is_one_number(tmp_path):
     model = Arm().model(tmp_path / "m.xml")
     damped = model.read_text().replace('damping=".05"', 'damping="3"')  # with the servo's 4.5

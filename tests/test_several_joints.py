@@ -204,6 +204,7 @@ def test_an_unstable_scene_has_no_error_and_no_warning(tmp_path, capfd):
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.long
 def test_the_joint_whose_gain_is_off_is_found_and_mended(tmp_path):
     runs, given = logs(tmp_path, 3), model(tmp_path, kp=60.0)
     found = diagnose_all(given, runs, ["elbow"], json=tmp_path / "d.json")
