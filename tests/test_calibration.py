@@ -9,7 +9,7 @@ import joda
 from joda import JodaError
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibrator
-from joda.estimation.nuisance import doubted
+from joda.estimation.nuisance import nuisances_of
 from joda.hidden import draw
 from joda.measured.reading import read_measured
 from joda.measured.runs import Run, write_run
@@ -139,7 +139,7 @@ def test_a_force_along_the_way_is_not_explained_by_numbers(tmp_path, rng):
 def test_a_number_that_is_trusted_fully_stays(tmp_path, rng):
     trust = {"mass": 0.0, "force_scale": 0.0}
     measured, found = found_of(tmp_path, rng, trust, mass=1.4)
-    every = doubted(measured, fit_baseline(measured).base)
+    every = nuisances_of(measured, fit_baseline(measured).base)
     assert not {"mass", "force_scale"} & set(every.names)
     assert found is None or not {"mass", "force_scale"} & set(found.names)
 
@@ -148,8 +148,8 @@ def test_widths_are_those_told(tmp_path, rng):
     trust = {"mass": 0.05, "center_of_mass": 0.2, "frictionloss": 0.01, "damping": 0.0}
     measured, _ = found_of(tmp_path, rng, trust)
     base = fit_baseline(measured).base
-    every = doubted(measured, base)
-    widths = dict(zip(every.names, every.doubts, strict=True))
+    every = nuisances_of(measured, base)
+    widths = dict(zip(every.names, every.prior_stds, strict=True))
     assert (widths["mass"], widths["center_of_mass"]) == (0.05, 0.2)
     strengths = dict(zip((name for name, _ in base.places), base.unknowns.prior_std, strict=False))
     assert strengths["friction"] == 0.01 and strengths["damping"] < 1e-5

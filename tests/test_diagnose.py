@@ -261,7 +261,10 @@ ADD = "add model.xml run1.csv --joint joint -o new.xml --diagnosis"
         (f"{ADD} adequate.json", "adequate.json: names no effect to add (verdict: adequate)"),
         (f"{ADD} strange.json", "no effect 'magic'; there are"),
         (f"{ADD} d.json --effect magic", "no effect 'magic'; there are"),
-        (f"{ADD} other.json", "other.json: of joint 'drawer', not of 'joint'"),
+        (
+            f"{ADD} other.json",
+            "other.json: the diagnosis is for joint 'drawer', but --joint is 'joint'",
+        ),
         (f"{ADD} d.json -o there.xml", "there.xml: exists already"),
         ("improve model.xml run1.csv --joint joint -o there.xml", "there.xml: exists already"),
         ("demo --seed 3", "go with joda demo hidden-effect"),

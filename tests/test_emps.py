@@ -48,9 +48,7 @@ def runs(tmp_path_factory):
 def test_the_drives_friction_and_gain_are_found_from_its_volts(runs, tmp_path):
     factor = float(np.random.default_rng().uniform(0.7, 1.4))
     print(factor)  # shown where the test fails
-    (tmp_path / "emps.xml").write_text(
-        MODEL.format(gear=GAIN * factor)
-    )
+    (tmp_path / "emps.xml").write_text(MODEL.format(gear=GAIN * factor))
     found = {
         one.parameter: one
         for one in numbers(fit_baseline(read_runs(tmp_path / "emps.xml", "screw", runs)))

@@ -51,4 +51,4 @@ def test_where_the_force_is_not_known_nothing_is_asked():
     problem = problem_of(found, start, [gap])
     assert [len(time) for time, _ in problem.runs] == [100, 251]
     assert all(np.isfinite(path).all() for path in problem.paths(problem.parameters.start))
-    assert problem.whole.windows.fresh.sum() == 2
+    assert problem.whole.segments.fresh.sum() == 2

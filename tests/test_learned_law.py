@@ -104,7 +104,7 @@ def test_a_spring_whose_end_follows_is_learned(tmp_path):
     found = learned(measured, Terms(memory="position", time=0.12 * np.ptp(measured.runs[0].time)))
     assert found.law.gain(numbers(found)) == pytest.approx(law.stiffness, rel=0.15)
     assert found.law.time(numbers(found)) == pytest.approx(law.time, rel=0.3)
-    draws, h = drawn(Learner(measured), found), found.judge.windows.h
+    draws, h = drawn(Learner(measured), found), found.estimator.segments.h
     told = of_memory(found.law, numbers(found), draws, h)
     for number, right in zip(told, (law.stiffness, law.time), strict=True):
         assert abs(number.value - right) < 4 * number.error

@@ -225,7 +225,7 @@ def test_what_latches_is_not_taken_for_a_latch(tmp_path):
 # --- what the user says comes true
 @pytest.mark.sweep(8)
 @pytest.mark.parametrize(
-    ("name", "description", "wishes"),
+    ("name", "description", "requirements"),
     [
         ("refrigerator", "It closes softly by itself from anywhere.", "closes_anywhere soft"),
         ("refrigerator", "The door does not close by itself.", "left_open held_shut"),

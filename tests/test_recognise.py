@@ -104,7 +104,7 @@ def nameless(model, joint):
 
 
 @pytest.mark.parametrize(
-    ("model", "joint", "wish"),
+    ("model", "joint", "requirement"),
     [
         ("cabinet", "door", "opens_past"),
         ("drawer", "drawer", "closes_near"),
@@ -121,7 +121,7 @@ def test_own_models_are_told_by_their_shape_alone(model, joint, requirement):
 
 
 @pytest.mark.parametrize(
-    ("source", "file", "joint", "wish"),
+    ("source", "file", "joint", "requirement"),
     [
         ("table", "", "base__drawer", "closes_near"),
         ("table", "", "base__slide", "stays_put"),
@@ -444,7 +444,7 @@ def test_a_robots_joint_is_told_whichever_of_its_joints_the_motors_are_on(
 
 # --- how fast it shuts, where it holds
 @pytest.mark.parametrize(
-    ("said", "wish"),
+    ("said", "requirement"),
     [
         ("It shuts with at most 0.4 m/s at the handle.", Requirement("arrives", most=0.4)),
         (

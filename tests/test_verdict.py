@@ -1,4 +1,4 @@
-"""The words of a verdict: "Missing is" and "Right." only where all that they claim holds."""
+"""The words of a verdict: "The model lacks" and "Right." only where all that they claim holds."""
 
 import re
 from dataclasses import replace
@@ -51,7 +51,7 @@ def selection(*likely, verdict="missing_effect"):
 @pytest.mark.parametrize(
     ("probability", "after", "head"),
     [
-        (0.8, 0.001, "Missing is a click-stop (detent) (probability 80 %)."),
+        (0.8, 0.001, "The model lacks a click-stop (detent) (probability 80 %)."),
         (0.5, 0.001, "Best guess: a click-stop (detent) (probability 50 %)."),
         (0.3, 0.001, "Best guess:"),
         (0.8, 0.01, "Something is missing that no known effect explains. Best guess:"),
@@ -72,7 +72,7 @@ def test_what_is_below_the_noise_is_a_guess():
 def test_two_that_cannot_be_told_apart_are_likely_together():
     one = replace(DETENT, probability=0.4, indistinguishable_from=("gravity_offset",))
     said = summarised(one, selection(0.4, 0.35, 0.1), FLOOR, one_way=False, restitution=False)
-    assert said.startswith("Missing is a click-stop (detent) or another pull of gravity")
+    assert said.startswith("The model lacks a click-stop (detent) or another pull of gravity")
     said = summarised(one, selection(0.3, 0.15, 0.1), FLOOR, one_way=False, restitution=False)
     assert said.startswith("Best guess:")
 

@@ -140,7 +140,10 @@ def add(
         measured = right.of(measured)
     own = measured.profile.joint
     if told.get("joint", own.name) != own.name:
-        raise JodaError(f"{diagnosis}: of joint '{told['joint']}', not of '{own.name}'.")
+        raise JodaError(
+            f"{diagnosis}: the diagnosis is for joint '{told['joint']}', "
+            f"but --joint is '{own.name}'."
+        )
     train, held = parted(measured)
     law: Learned | None = None
     if reason := _no_help(told, name) or (None if effect else _in_doubt(told)):

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.applied_corrections import AppliedCorrections, righted
 from joda.diagnosis.baseline import Baseline
-from joda.diagnosis.correction_report import told
+from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.corrections import ANYTHING, Correction
 from joda.diagnosis.hypothesis_fits import FittedHypothesis
 from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
@@ -103,7 +103,7 @@ class Calibration:
         values = self.numbers.values(self.fit.x).items()
         rows = zip(values, self.errors, self.others, self.numbers.little(self.fit.x), strict=True)
         return tuple(
-            told(measured, name, value, float(error), others)
+            correction_of(measured, name, value, float(error), others)
             for (name, value), error, others, little in rows
             if not little
         )

@@ -19,7 +19,7 @@ WHAT: dict[NuisanceName, str] = {
 """With the number, its error and its unit."""
 
 
-def told(
+def correction_of(
     measured: Measured,
     name: NuisanceName,
     value: float,
@@ -38,8 +38,8 @@ def told(
     joint = measured.profile.joint
     unit = _unit(measured, name)
     error *= value if name in FACTORS else 1.0
-    words = _said(measured, name, value, f" \N{PLUS-MINUS SIGN} {_size(name, error):.2g}")
-    alike = " or ".join(_said(measured, *one) for one in others)
+    words = _clause(measured, name, value, f" \N{PLUS-MINUS SIGN} {_size(name, error):.2g}")
+    alike = " or ".join(_clause(measured, *one) for one in others)
     more = f" As likely by these data: {alike}." if alike else ""
     whole = measured.joint_model.inertia if name == "inertia" else 1.0
     return Correction(
@@ -53,7 +53,7 @@ def told(
     )
 
 
-def _said(measured: Measured, name: NuisanceName, value: float, error: str = "") -> str:
+def _clause(measured: Measured, name: NuisanceName, value: float, error: str = "") -> str:
     """A clause."""
     unit = "ms" if name == "time_delay" else _unit(measured, name)
     return WHAT[name].format(_size(name, value), error, unit)

@@ -212,13 +212,13 @@ def decide(
     doubtful = likely[0] < settings.hardly or found.restitution
     chance = max(settings.least_gain, settings.noticeable * found.samples)
     if found.gain < chance or (own < settings.much and doubtful):
-        said = without
+        verdict = without
     elif weights[0] <= novelty_weight:
-        said = "unexplained"
+        verdict = "unexplained"
     else:
-        said = "missing_effect"
+        verdict = "missing_effect"
     excess = own, tuple(map(float, left))
-    return Selection(said, tuple(map(float, likely)), excess, found.effects)
+    return Selection(verdict, tuple(map(float, likely)), excess, found.effects)
 
 
 def shows(first: Ranking, longer: Baseline, settings: Settings = SETTINGS) -> bool:

@@ -40,8 +40,9 @@ def summarised(
 ) -> str:
     """The verdict in a sentence, where something is missing.
 
-    "Missing is" is said only of an answer that is more likely than not, and with which the error on
-    segments held out of the fit falls from more than the noise, and not to many times the noise.
+    "The model lacks" is said only of an answer that is more likely than not, and with which the
+    error on segments held out of the fit falls from more than the noise, and not to many times the
+    noise.
 
     Args:
         first: the likeliest effect.
@@ -67,7 +68,7 @@ def summarised(
     far = after > FAR * floor and after > PART * first.held_out_error_before
     blind = first.held_out_error_before < floor
     probability = _sum(first, selection) if others else first.probability
-    head = "Best guess:" if blind or far or doubt or probability <= EVEN else "Missing is"
+    head = "Best guess:" if blind or far or doubt or probability <= EVEN else "The model lacks"
     more = BLIND if blind else STILL.format(after / floor) if far else ""
     if others:
         why = SAME if one_way else ": these data cannot tell which"

@@ -57,9 +57,9 @@ GAUGE_AGAIN = (
 )
 GAUGE_BACK = "Measure the way back too, as slowly."
 AGAIN = (
-    "Repeat one slow motion three times, to and fro, then the same fast: what differs between "
-    "repeats depends on time or on what was before, what differs with speed is a resistance, what "
-    "does neither is a force over position."
+    "Repeat one slow motion three times, in both directions, then the same fast: if repeats "
+    "differ, the effect has memory or changes with time; if fast and slow differ, it is a resistance; if "
+    "neither, it is a force over position."
 )
 UNEVEN = (
     "Something is missing that no known effect explains: the force's error, {:.2g} {} RMS beside a "
@@ -141,7 +141,7 @@ class Diagnosed:
 def diagnosed(
     measured: Measured,
     exclude: Collection[str] = (),
-    told: Progress = lambda done, total, what: None,
+    progress: Progress = lambda done, total, what: None,
     calibrate: bool = True,
 ) -> Diagnosed:
     """Finds what a model lacks.
@@ -149,28 +149,28 @@ def diagnosed(
     Args:
         measured: the joint and its runs.
         exclude: effects that are not considered.
-        told: how much is done, of how much, and what.
+        progress: told how much is done, of how much, and what.
         calibrate: whether numbers of the joint's body and of the measurement may be off.
     """
     if not usable(segments_for(measured)).any():
-        return Diagnosed(_said(measured, "insufficient_data", TOO_SHORT, (), None))
+        return Diagnosed(_report(measured, "insufficient_data", TOO_SHORT, (), None))
     if why := at_rest(measured):
         why = f"{why[0].upper()}{why[1:]}."
-        return Diagnosed(_said(measured, "insufficient_data", why, (), None))
+        return Diagnosed(_report(measured, "insufficient_data", why, (), None))
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
-        return Diagnosed(_said(measured, "insufficient_data", why, (), None))
+        return Diagnosed(_report(measured, "insufficient_data", why, (), None))
     baseline = fit_baseline(measured)
     calibrator = Calibrator(measured)
     found = calibrator.numbers(baseline) if calibrate else None
     if found and found.alone:
-        return _set_right(measured, found, looked(found.righted.of(measured), exclude, told))
-    plain = looked(measured, exclude, told, baseline)
+        return _set_right(measured, found, looked(found.righted.of(measured), exclude, progress))
+    plain = looked(measured, exclude, progress, baseline)
     ranking, beside = plain.first[0], False
     if calibrate and found is None and plain.selection.verdict != "adequate":
         ranking, beside = plain.ranking, True
         found = calibrator.numbers(ranking.baseline, beside)
     if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
-        looks = looked(found.righted.of(measured), exclude, told)
+        looks = looked(found.righted.of(measured), exclude, progress)
         if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
             return _set_right(measured, found, looks)
     return replace(_concluded(measured, plain), looks=plain.evidence)
@@ -180,12 +180,12 @@ def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> 
     """What looking at a joint and runs says whose numbers were set right, with these."""
     out = replace(_concluded(found.righted.of(measured), looks), looks=looks.evidence)
     numbers = found.corrections(measured)
-    said = out.diagnosis
+    report = out.diagnosis
     summary = " ".join(
-        [said.summary, "Beside it numbers are off:", *(n.explanation for n in numbers)]
+        [report.summary, "Beside it numbers are off:", *(n.explanation for n in numbers)]
     )
-    told = replace(said, summary=summary, corrections=(*numbers, *said.corrections))
-    return replace(out, diagnosis=told, calibration=found)
+    diagnosis = replace(report, summary=summary, corrections=(*numbers, *report.corrections))
+    return replace(out, diagnosis=numbers_off, calibration=found)
 
 
 def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
@@ -196,10 +196,10 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
     puzzled = first_weighed.verdict == "unexplained" and bool(measured.runs)
     puzzling = first_ranking if puzzled else None
     if selection.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
-        return Diagnosed(_said(measured, "insufficient_data", why, (), None))
+        return Diagnosed(_report(measured, "insufficient_data", why, (), None))
     suffice = not selection.likely and looks.free and looks.free.suffice
     if selection.verdict == "adequate" or suffice:
-        return _calm(measured, ranking, looks.free)
+        return _adequate(measured, ranking, looks.free)
     held = Holdout(ranking.baseline, measured)
     named = range(min(NAMED, len(ranking.candidates)))
     every = {
@@ -216,8 +216,8 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
         if sized:
             there = every[sized[0]].interval
             why = OUT_THERE.format(*there, 100 * visited_share(measured, there))
-        said = _said(measured, "unexplained", why, (), experiment)
-        return _driven(Diagnosed(said, puzzling=puzzling), ranking.baseline)
+        report = _report(measured, "unexplained", why, (), experiment)
+        return _driven(Diagnosed(report, puzzling=puzzling), ranking.baseline)
     findings = tuple(every[k] for k in sized)
     profile = ranking.candidates[sized[0]].written(ranking.baseline.base)
     first = findings[0]
@@ -225,7 +225,7 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
     if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
         # nor do segments held out know of anything
-        return _calm(measured, first_ranking, looks.free)
+        return _adequate(measured, first_ranking, looks.free)
     verdict = selection.verdict if helps else "unexplained"
     base, candidate = ranking.baseline.base, ranking.candidates[sized[0]]
     doubt = one_factor(base, candidate) or other_unit(measured)
@@ -234,8 +234,8 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
     own = numbers(ranking.baseline, candidate) if sure else ()
     summary += f" But {doubt}." if doubt else off_beside(own)
     worth = tuple(one for one in findings if one.probability >= WORTH_NAMING)
-    said = replace(
-        _said(measured, verdict, summary, worth, experiment),
+    report = replace(
+        _report(measured, verdict, summary, worth, experiment),
         corrections=corrections(own, measured.profile.joint, FAR_OFF),
         doubt=doubt,
         unexplained_probability=selection.unknown if verdict == selection.verdict else None,
@@ -245,8 +245,8 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
         if sure
         else None
     )
-    told = Diagnosed(said, profile if worth else None, findings, puzzling, corrected=servo)
-    return told if sure or doubt else _driven(told, ranking.baseline)
+    diagnosis = Diagnosed(report, profile if worth else None, findings, puzzling, corrected=servo)
+    return diagnosis if sure or doubt else _driven(diagnosis, ranking.baseline)
 
 
 def _driven(found: Diagnosed, baseline: Baseline) -> Diagnosed:
@@ -257,23 +257,23 @@ def _driven(found: Diagnosed, baseline: Baseline) -> Diagnosed:
         right := corrected(baseline, own, OFF, baseline.fit.x)
     ):
         return found
-    said = found.diagnosis
-    told = replace(
-        said,
-        summary=f"{said.summary}{off_without(own)}",
+    report = found.diagnosis
+    diagnosis = replace(
+        report,
+        summary=f"{report.summary}{off_without(own)}",
         corrections=corrections(own, baseline.base.profile.joint, OFF),
     )
-    return replace(found, diagnosis=told, corrected=right)
+    return replace(found, diagnosis=numbers_off, corrected=right)
 
 
-def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosed:
+def _adequate(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosed:
     """No effect shows in segments: the model is adequate, unless whole runs or curves deny it."""
 
     def unexplained(summary: str, experiment: str | None) -> Diagnosed:
-        return Diagnosed(_said(measured, "unexplained", summary, (), experiment))
+        return Diagnosed(_report(measured, "unexplained", summary, (), experiment))
 
     if not measured.runs and _uneven(measured, ranking.baseline):
-        return unexplained(_said_uneven(measured), GAUGE_AGAIN)
+        return unexplained(_report_uneven(measured), GAUGE_AGAIN)
     left = worst(measured, ranking.baseline)
     if left.free > BEYOND:
         return unexplained(DRIFTING.format(left.free), AGAIN)
@@ -281,41 +281,41 @@ def _calm(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagno
         return unexplained(SLOWLY, AGAIN)
     told_by = (free.numbers, free.errors) if free and free.denied else None
     own, worst_run = numbers(ranking.baseline, found=told_by), worst_missed(measured)
-    told = off(own)
-    if free and free.denied and not told:
+    numbers_off = off(own)
+    if free and free.denied and not numbers_off:
         return unexplained(TOGETHER, AGAIN)
-    if told and moved_one_way(measured):
+    if numbers_off and moved_one_way(measured):
         experiment = _next(measured, ranking, weigh(ranking), one_way=True)
-        summary = EITHER.format(told) + SAME + "."
+        summary = EITHER.format(numbers_off) + SAME + "."
         summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
         return unexplained(summary, experiment)
-    if told:
-        told = f" Its own numbers are off: {told}.{by_one_factor(own)}"
+    if numbers_off:
+        numbers_off = f" Its own numbers are off: {numbers_off}.{by_one_factor(own)}"
     missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
-    if told and worst_run and worst_run.fault:
-        summary = WITH_THESE.format(WHOLE.format(missed), told, noise)
-    elif told and free and free.denied:
-        summary = WITH_THESE.format(FREELY, told, noise)
+    if numbers_off and worst_run and worst_run.fault:
+        summary = WITH_THESE.format(WHOLE.format(missed), numbers_off, noise)
+    elif numbers_off and free and free.denied:
+        summary = WITH_THESE.format(FREELY, numbers_off, noise)
     else:
         loose = missed > MULTIPLE and left.whole <= BEYOND
-        adrift = not told and strays(measured) < CHANCE
+        adrift = not numbers_off and strays(measured) < CHANCE
         where = "In windows the model" if adrift or (loose and left.whole > SOME) else "The model"
-        summary = f"{where} is adequate: {noise} that an effect would explain.{told}"
+        summary = f"{where} is adequate: {noise} that an effect would explain.{numbers_off}"
         summary += WITHOUT.format(missed, left.whole) if loose else ADRIFT if adrift else ""
     summary += AT_ENDS.format(left.whole) if left.whole > BEYOND else ""
     if doubt := other_unit(measured):
         summary += f" But {doubt}."
-    calm = _said(measured, "adequate", summary, (), None)
-    calm = replace(calm, corrections=corrections(own, measured.profile.joint, OFF))
+    report = _report(measured, "adequate", summary, (), None)
+    report = replace(report, corrections=corrections(own, measured.profile.joint, OFF))
     driven = ranking.baseline.base.joint_model.servo is not None
     if doubt or (by_one_factor(own) and not driven):
-        return Diagnosed(calm)
+        return Diagnosed(report)
     x = free.numbers if free and free.denied else ranking.baseline.fit.x
-    return Diagnosed(calm, corrected=corrected(ranking.baseline, own, OFF, x))
+    return Diagnosed(report, corrected=corrected(ranking.baseline, own, OFF, x))
 
 
-def _said_uneven(measured: Measured) -> str:
+def _report_uneven(measured: Measured) -> str:
     """How far off the curves are; where their unit is in doubt, that is asked first."""
     if doubt := other_unit(measured):
         return f"{doubt[0].upper()}{doubt[1:]}."
@@ -331,7 +331,7 @@ def _uneven(measured: Measured, baseline: Baseline) -> bool:
     return curves_verdict(curves, failing) == "beyond_noise"
 
 
-def _said(
+def _report(
     measured: Measured,
     verdict: Verdict,
     summary: str,
