@@ -52,8 +52,9 @@ RECORD_MORE = (
 )
 GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in both directions."
 GAUGE_AGAIN = (
-    "Measure the same again, and at places nearer together: what comes again is the joint's, what "
-    "does not is the hand's or the gauge's."
+    "Repeat one slow motion three times, in both directions, then the same fast: if repeats "
+    "differ, the effect has memory or changes with time; if fast and slow differ, it is a "
+    "resistance; if neither, it is a force over position."
 )
 GAUGE_BACK = "Measure the way back too, as slowly."
 AGAIN = (
@@ -185,7 +186,7 @@ def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> 
         [report.summary, "Beside it numbers are off:", *(n.explanation for n in numbers)]
     )
     diagnosis = replace(report, summary=summary, corrections=(*numbers, *report.corrections))
-    return replace(out, diagnosis=numbers_off, calibration=found)
+    return replace(out, diagnosis=diagnosis, calibration=found)
 
 
 def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
@@ -263,7 +264,7 @@ def _driven(found: Diagnosed, baseline: Baseline) -> Diagnosed:
         summary=f"{report.summary}{off_without(own)}",
         corrections=corrections(own, baseline.base.profile.joint, OFF),
     )
-    return replace(found, diagnosis=numbers_off, corrected=right)
+    return replace(found, diagnosis=diagnosis, corrected=right)
 
 
 def _adequate(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosed:
