@@ -55,7 +55,7 @@ def test_of_a_known_law_the_size_is_as_uncertain_as_linear_least_squares_says():
     _, baseline, candidate = found(6, "quadratic_damping")
     one = fitted(baseline, candidate)
     about = baseline.estimator.linear(one.make, one.unknowns, one.x, candidate.fit.start)
-    H = about.normal()[0] + np.diag(one.unknowns.prior_std**-2.0)
+    H = about.normal()[0] + one.unknowns.known
     each, _ = about.normals()
     np.testing.assert_allclose(each.sum(axis=0), about.normal()[0], rtol=1e-8)
     scale = candidate.hypothesis.magnitude(np.ones(1))

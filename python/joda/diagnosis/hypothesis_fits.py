@@ -135,7 +135,7 @@ def screened(
     segments, fit, about = estimator.segments, point.fit, point.about
     profile = base.written(fit.x)
     H, gradient = about.normal()
-    H = H + np.diag(base.unknowns.prior_std**-2.0)
+    H = H + base.unknowns.known
     gains, out = [], []
     for trial in hypothesis.trials:
         simulator = base.with_profile(hypothesis.write(profile, trial), fit.x)

@@ -182,7 +182,7 @@ def _prior(fitted: _Fitted) -> Array:
     wide[own] = (unknowns.high - unknowns.low)[own] / np.sqrt(12)
     strengths = own[unknowns.high[own] == STRENGTH[1]]
     wide[strengths] = PLAUSIBLE * max(np.abs(fitted.x[strengths]).max(initial=0.0), TRIAL)
-    return np.diag(unknowns.prior_std**-2.0 + wide**-2.0)
+    return unknowns.known + np.diag(wide**-2.0)
 
 
 def _seen(baseline: Baseline, found: FittedHypothesis) -> tuple[float, tuple[float, float]]:

@@ -52,15 +52,14 @@ RECORD_MORE = (
 )
 GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in both directions."
 GAUGE_AGAIN = (
-    "Repeat one slow motion three times, in both directions, then the same fast: if repeats "
-    "differ, the effect has memory or changes with time; if fast and slow differ, it is a "
-    "resistance; if neither, it is a force over position."
+    "Measure the same again, and at places nearer together: what comes again is the joint's, what "
+    "does not is the hand's or the gauge's."
 )
 GAUGE_BACK = "Measure the way back too, as slowly."
 AGAIN = (
     "Repeat one slow motion three times, in both directions, then the same fast: if repeats "
-    "differ, the effect has memory or changes with time; if fast and slow differ, it is a resistance; if "
-    "neither, it is a force over position."
+    "differ, the effect has memory or changes with time; if fast and slow differ, it is a "
+    "resistance; if neither, it is a force over position."
 )
 UNEVEN = (
     "Something is missing that no known effect explains: the force's error, {:.2g} {} RMS beside a "

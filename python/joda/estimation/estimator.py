@@ -291,8 +291,8 @@ class SegmentEstimator:
         for _ in range(iterations):
             about = self.linear(make, unknowns, x, start, cauchy_scale, central)
             H, gradient = about.normal()
-            H = H + np.diag(unknowns.prior_std**-2.0)
-            gradient = gradient + (x - unknowns.mean) / unknowns.prior_std**2
+            H = H + unknowns.known
+            gradient = gradient + unknowns.pull(x)
             before = loss
             for _ in range(BACKTRACKS):
                 move = _step(H, gradient, damping, unknowns, x)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from joda.estimation.least_squares import Inequalities
 
@@ -21,6 +22,8 @@ class Unknowns:
         constraints: what else must hold.
         widest: to which bounds those may be widened that are only usual, shape (2, k), lows first;
             NaN for what cannot be beyond its bound. None for nothing to widen.
+        rough: combinations of the numbers of which standard normal values are known before the
+            data, shape (r, k); None for none.
     """
 
     low: Array
@@ -30,6 +33,7 @@ class Unknowns:
     prior_std: Array
     constraints: Inequalities | None = None
     widest: Array | None = None
+    rough: Array | None = None
 
     def pressed(self, x: Array) -> bool:
         """Whether a number is as large or as small as is usual, but may be larger or smaller."""
@@ -58,16 +62,32 @@ class Unknowns:
         """Both, one after the other."""
         pairs = zip(_parts(self), _parts(other), strict=True)
         low, high, step, mean, prior_std = (np.concatenate(pair) for pair in pairs)
-        return Unknowns(low, high, step, mean, prior_std)
+        both = [np.zeros((0, len(u.low))) if u.rough is None else u.rough for u in (self, other)]
+        rough = block_diag(*both) if len(both[0]) + len(both[1]) else None
+        return Unknowns(low, high, step, mean, prior_std, rough=rough)
 
     def some(self, kept: NDArray[np.bool_]) -> "Unknowns":
         """Some of them, without what else must hold."""
         low, high, step, mean, prior_std = (part[kept] for part in _parts(self))
-        return Unknowns(low, high, step, mean, prior_std)
+        alone = None if self.rough is None else ~self.rough[:, ~kept].any(axis=1)
+        rough = None if self.rough is None else self.rough[alone][:, kept]
+        return Unknowns(low, high, step, mean, prior_std, rough=rough)
 
     def penalty(self, x: Array) -> float:
         """What the numbers lose by being off what was known."""
-        return float(np.sum(((x - self.mean) / self.prior_std) ** 2))
+        off = float(np.sum(((x - self.mean) / self.prior_std) ** 2))
+        return off if self.rough is None else off + float(np.sum((self.rough @ x) ** 2))
+
+    @property
+    def known(self) -> Array:
+        """Inverse covariance of the numbers before the data, shape (k, k)."""
+        own = np.diag(self.prior_std**-2.0)
+        return own if self.rough is None else own + self.rough.T @ self.rough
+
+    def pull(self, x: Array) -> Array:
+        """Half the penalty's gradient."""
+        off = (x - self.mean) / self.prior_std**2
+        return off if self.rough is None else off + self.rough.T @ (self.rough @ x)
 
 
 EMPTY = np.zeros(0)

@@ -59,6 +59,9 @@ HEAVY = 300.0
 MOVED = 0.9
 """Part of the largest friction per load, or added inertia, from which no force is felt to move the
 joint: something else does."""
+BENDS = 2.0
+"""How much a free curve bends at a control point (one standard deviation), in usual forces: where
+no segment has been, what is beside tells it."""
 TINY = 1e-12
 """As good as no force."""
 
@@ -97,7 +100,7 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
     return Hypothesis(
         effect,
         "both",
-        unknowns_of(*[STRENGTH] * KNOTS),
+        replace(unknowns_of(*[STRENGTH] * KNOTS), rough=np.diff(np.eye(KNOTS), 2, axis=0) / BENDS),
         np.full((1, KNOTS), 0.5 * TRIAL),
         write,
         raised,
