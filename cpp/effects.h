@@ -114,8 +114,8 @@ inline double StribeckFriction(const Stribeck& stribeck, double s, double v) {
 }
 
 // The bounds where the channel, the joint's own frictionloss included, gives `friction`.
-inline FrictionBounds BoundFriction(const Effects& e, double friction, double s, double v,
-                                    double load) {
+inline FrictionBounds FindFrictionBounds(const Effects& e, double friction, double s, double v,
+                                         double load) {
   const double both = friction + StribeckFriction(e.stribeck, s, v) + e.load * std::abs(load);
   return {std::max(0.0, both + e.asymmetry.positive(s).value),
           std::max(0.0, both + e.asymmetry.negative(s).value)};

@@ -57,7 +57,7 @@ struct StopRow {
   double D, stiffness, damping;
 };
 
-inline StopRow MakeStopRow(double damping, double h, double inertia) {
+inline StopRow FindStopRow(double damping, double h, double inertia) {
   return {kStopImpedance / (1 - kStopImpedance) * inertia, kStopStiffness / (h * h),
           damping / (kStopImpedance * h)};
 }

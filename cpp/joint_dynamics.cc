@@ -138,7 +138,7 @@ void JointDynamics::SetStops(const Step& step, mjData* d, const Joint& joint) {
   if (!stops.low && !stops.high) return;
   ForEachLimit(step.m, d, joint.id, joint.dof, [&](int row, mjtNum side) {
     const std::optional<double>& damping = side > 0 ? stops.low : stops.high;
-    if (damping) SetStop(step, d, row, MakeStopRow(*damping, step.h, 1 / RowMobility(d, row)));
+    if (damping) SetStop(step, d, row, FindStopRow(*damping, step.h, 1 / RowMobility(d, row)));
   });
 }
 
@@ -195,7 +195,8 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
     const auto resist = [&](double velocity) {
       Resistance out = {damping, {friction, friction}};
       if (effects && step.damper) out.drag += ExtraDamping(*effects, s, velocity);
-      if (effects && step.friction) out.dry = BoundFriction(*effects, friction, s, velocity, load);
+      if (effects && step.friction)
+        out.dry = FindFrictionBounds(*effects, friction, s, velocity, load);
       return out;
     };
     Resistance own = resist(v);

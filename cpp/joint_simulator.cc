@@ -71,7 +71,7 @@ void JointSimulator::Advance(double h, double force, double command, State* stat
   const auto resist = [&](double velocity) {
     if (!effects) return Resistance{damping, {dry, dry}};
     return Resistance{damping + ExtraDamping(*effects, s, velocity),
-                      BoundFriction(*effects, dry, s, velocity, load)};
+                      FindFrictionBounds(*effects, dry, s, velocity, load)};
   };
   const Resistance own = resist(v);
   double spring = p.conservative(s).value, pushed = force;
@@ -222,7 +222,7 @@ JointSimulator::Limit JointSimulator::LimitRow(double h, double q, double v) con
   const double sign = low ? 1 : -1, distance = low ? q - lo : hi - q;
   if (const Effects* effects = profile_.effects.get()) {
     if (const auto& own = low ? effects->stops.low : effects->stops.high) {
-      const StopRow stop = MakeStopRow(*own, h, body_.row_inertia);
+      const StopRow stop = FindStopRow(*own, h, body_.row_inertia);
       return {sign, stop.D, -stop.damping * sign * v - stop.stiffness * distance};
     }
   }

@@ -82,7 +82,7 @@ bool Resist(Random& random, const Effects& e) {
   const double s = 3 * Uniform(random) - 1, v = 2 * Uniform(random) - 1, h = 0.002;
   const double load = 10 * Uniform(random), held = 4 * Uniform(random) - 2;
   const double damping = ExtraDamping(e, s, v);
-  const FrictionBounds bounds = BoundFriction(e, 1, s, v, load);
+  const FrictionBounds bounds = FindFrictionBounds(e, 1, s, v, load);
   const double left = BristleStiffnessScale(e.presliding, held, bounds.Bound(), v);
   Loose handle = {0, v};
   const Backlash backlash = e.backlash.handle > 0 ? e.backlash : Backlash{1, 1};

@@ -201,7 +201,7 @@ TEST_CASE("friction grows with the load and with its direction") {
   const Effects e = ParseEffects(
       "load_dependent_friction coefficient=0.1;"
       "asymmetric_friction direction=negative: 0 1 | 0 1 | 0.5 0.5");
-  const FrictionBounds bounds = BoundFriction(e, 1, 0.5, 0, -20);
+  const FrictionBounds bounds = FindFrictionBounds(e, 1, 0.5, 0, -20);
   CHECK(bounds.positive == 3);
   CHECK(bounds.negative == 3.5);
   CHECK(bounds.Bound() == 3.25);

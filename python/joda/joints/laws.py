@@ -78,15 +78,15 @@ def resistance(
     """Damping and friction.
 
     Args:
-        own, s, v: as for `damping`.
+        own, s, v: as for `extra_damping`.
         drag, dry: of the channels, N·m·s/rad and N·m.
-        load: as for `friction`.
+        load: as for `friction_bounds`.
     """
-    up, down = friction(own, s, v, load)
-    return Resistance(drag + damping(own, s, v), dry + up, dry + down)
+    up, down = friction_bounds(own, s, v, load)
+    return Resistance(drag + extra_damping(own, s, v), dry + up, dry + down)
 
 
-def damping(own: Effects, s: Array, v: Array) -> Array:
+def extra_damping(own: Effects, s: Array, v: Array) -> Array:
     """What is added to the damping, N·m·s/rad.
 
     Args:
@@ -102,16 +102,16 @@ def damping(own: Effects, s: Array, v: Array) -> Array:
     return out
 
 
-def friction(own: Effects, s: Array, v: Array, load: Array) -> tuple[Array, Array]:
+def friction_bounds(own: Effects, s: Array, v: Array, load: Array) -> tuple[Array, Array]:
     """What is added to the largest friction in positive and in negative motion, N·m.
 
     Args:
-        own, s, v: as for `damping`.
+        own, s, v: as for `extra_damping`.
         load: gravity's force on the joint and the force that is applied to it, N·m.
     """
     both = jnp.zeros_like(v)
     if own.stribeck_friction is not None:
-        both = both + _stribeck(own.stribeck_friction, s, v)
+        both = both + _stribeck_friction(own.stribeck_friction, s, v)
     if own.load_dependent_friction is not None:
         both = both + own.load_dependent_friction.coefficient * jnp.abs(load)
     sides = own.asymmetric_friction
@@ -120,7 +120,7 @@ def friction(own: Effects, s: Array, v: Array, load: Array) -> tuple[Array, Arra
     return both + _value(sides.positive, s), both + _value(sides.negative, s)
 
 
-def friction_row(
+def stiffen_friction_row(
     bristles: Presliding | None,
     held: Array,
     bound: Array,
@@ -159,7 +159,7 @@ def friction_row(
     return D, part * bristles.damping * left
 
 
-def gravity(offset: GravityOffset | None, q: Array) -> tuple[Array, Array]:
+def offset_force(offset: GravityOffset | None, q: Array) -> tuple[Array, Array]:
     """A gravity offset's force at q (rad), N·m, and its largest stiffness, N·m/rad."""
     if offset is None:
         return jnp.zeros_like(q), jnp.zeros_like(q)
@@ -168,14 +168,14 @@ def gravity(offset: GravityOffset | None, q: Array) -> tuple[Array, Array]:
     return offset.sin * jnp.sin(q) + offset.cos * jnp.cos(q) + offset.force, steepest
 
 
-def learned(
+def learned_force(
     own: Learned | None, s: Array, v: Array, remembered: Array, h: Array | float
 ) -> tuple[Array, Array]:
     """A learned force in a step: push - drag times the velocity after the step.
 
     Args:
         own: None: none.
-        s, v: as for `damping`.
+        s, v: as for `extra_damping`.
         remembered: see `remember`.
         h: timestep, s.
 
@@ -209,7 +209,7 @@ def remember(own: Learned | None, v: Array, remembered: Array, h: Array | float)
     return remembered - jnp.expm1(-h / own.time) * (toward - remembered)
 
 
-def backlash(
+def move_handle(
     handle: Backlash | None, g: Array, w: Array, v: Array, force: Array, h: Array | float
 ) -> tuple[Array, Array, Array]:
     """A step of a handle before the joint.
@@ -307,7 +307,7 @@ def _coast(inertia: Array, force: Array, against: Resistance, v: Array, h: Array
     return jnp.where(free > 0, up, jnp.minimum(down, 0))
 
 
-def end_stop(
+def stop_row(
     own: EndStops, low: Array, inertia: Array, h: Array | float
 ) -> tuple[Array, Array, Array, Array]:
     """The row of an end stop with a restitution of its own.
@@ -333,7 +333,7 @@ def _along(own: Directed, s: Array, v: Array) -> Array:
     return jnp.where(v >= STILL, up, jnp.where(v <= -STILL, down, 0))
 
 
-def _stribeck(own: Stribeck, s: Array, v: Array) -> Array:
+def _stribeck_friction(own: Stribeck, s: Array, v: Array) -> Array:
     """e(s) exp(-(|v| / velocity)^exponent); the logarithm keeps derivatives finite."""
     x = jnp.abs(v) / own.velocity
     moves = x > 0

@@ -46,7 +46,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     s = (q - lo) * per_range
     order = dict(zip(CHANNELS, prepared.orders, strict=True))
 
-    force, descent = jax.vmap(laws.gravity)(own.gravity_offset, q)
+    force, descent = jax.vmap(laws.offset_force)(own.gravity_offset, q)
     near, damping, dry = (jnp.zeros_like(v) for _ in range(3))
     if spring:
         stacks = prepared.conservative
@@ -63,7 +63,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     g, w, remembered = unpack(m, d, own, len(dof))
     yielding = h * stiffness
     if damper:
-        every = jax.vmap(laws.learned, in_axes=(0, 0, 0, 0, None))
+        every = jax.vmap(laws.learned_force, in_axes=(0, 0, 0, 0, None))
         learned, slows = every(own.learned_force, s, v, remembered, h)
         force, yielding = force + learned, yielding + slows
     external = load = jnp.zeros_like(v)
@@ -95,7 +95,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     bound = 0.5 * (up + down)[at]
     psi = jnp.clip(last.force[row], -bound, bound)
     bristles = jax.tree.map(lambda x: x[at], own.presliding_friction)
-    stiff = jax.vmap(laws.friction_row, in_axes=(0, 0, 0, 0, 0, None, 0))
+    stiff = jax.vmap(laws.stiffen_friction_row, in_axes=(0, 0, 0, 0, 0, None, 0))
     D, slipping = stiff(bristles, psi, bound, v[at], inertia[at], h, passage.resistance[at])
     rows.set(row, D, bound, psi, v[at] / h)
     if damper:
@@ -121,7 +121,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     force = force + shift - jnp.sign(v) * limited
     force = force + passage.force + (passage.scale - 1) * external
     applied = d.qfrc_applied[dof]
-    push = jax.vmap(laws.backlash, in_axes=(0, 0, 0, 0, 0, None))
+    push = jax.vmap(laws.move_handle, in_axes=(0, 0, 0, 0, 0, None))
     pushed, g, w = push(own.backlash, g, w, v, applied, h)
     d = rows.write(d)
     d = d.replace(qfrc_passive=d.qfrc_passive.at[dof].add(force + pushed - applied))
@@ -149,7 +149,7 @@ def _set_stops(
         h: timestep, s.
     """
     side = rows.J[row, dof]  # 1: beyond the low end, -1: the high one, 0: neither
-    has, D, stiffness, damping = laws.end_stop(stops, side > 0, inertia, h)
+    has, D, stiffness, damping = laws.stop_row(stops, side > 0, inertia, h)
     reference = -damping * side * v - stiffness * rows.pos[row]
     rows.limit(row, has & (side != 0), D, reference)
 

@@ -76,7 +76,7 @@ def values(curves: Curves, variant: int, joint: int, position: float) -> Values:
 
 
 @wp.func
-def descent(curves: Curves, variant: int, joint: int, lo: float, hi: float) -> float:
+def max_stiffness(curves: Curves, variant: int, joint: int, lo: float, hi: float) -> float:
     """The largest descent of the conservative force over the pieces that touch [lo, hi]."""
     where = curves.where[variant, joint]
     out = float(0.0)

@@ -12,7 +12,7 @@ import mujoco
 import warp as wp
 
 from joda.warp import laws, learned
-from joda.warp.curves import Curves, Values, descent, values
+from joda.warp.curves import Curves, Values, max_stiffness, values
 from joda.warp.numbers import Curve, Number, Place, Row, State
 
 wp.set_module_options({"max_unroll": max(len(Number), len(State))})
@@ -118,7 +118,7 @@ def resist(n: Numbers, curves: Values, joint: Resisting, v: float) -> wp.vec3:
         return wp.vec3(drag, joint.friction, joint.friction)
     both = (
         joint.friction
-        + laws.stribeck(
+        + laws.stribeck_friction(
             n[int(Number.STRIBECK_FRICTION_STRENGTH)] * curves[int(Curve.STRIBECK)],
             n[int(Number.STRIBECK_FRICTION_VELOCITY)],
             n[int(Number.STRIBECK_FRICTION_EXPONENT)],
@@ -168,7 +168,7 @@ def implicit_stiffness(
     stiffness = wp.abs(force) * per_range / laws.STRIDE
     if steepest + gravity > soft:
         reach = h * (wp.abs(v) + h / inertia * wp.abs(force)) * per_range
-        near = strength * descent(curves, variant, joint, s - reach, s + reach)
+        near = strength * max_stiffness(curves, variant, joint, s - reach, s + reach)
         stiffness = wp.max(stiffness, gravity + wp.min(near, steepest))
     return wp.max(0.0, stiffness - soft)
 
@@ -211,7 +211,7 @@ def recall(
             after = laws.settle(n[int(Number.BACKLASH_PLAY)], h, side, gap, speed, v)
             out[int(State.GAP)] = after[0]
             out[int(State.SPEED)] = after[1]
-        out[int(State.REMEMBERED)] = learned.recalled(
+        out[int(State.REMEMBERED)] = learned.remember(
             n[int(Number.LEARNED_FORCE_CHANGE)],
             n[int(Number.LEARNED_FORCE_TIME)],
             h,
@@ -325,7 +325,7 @@ def act(
     )
     if joint.damps != 0:
         table = learned.resistance(profiles.tables, variant, j, s, v)
-        pushed = learned.push(
+        pushed = learned.learned_force(
             n[int(Number.LEARNED_FORCE_STRENGTH)] * table,
             n[int(Number.LEARNED_FORCE_STIFFNESS)],
             n[int(Number.LEARNED_FORCE_CHANGE)],
@@ -398,7 +398,7 @@ def act(
         if bristles > 0.0:
             breakaway = n[int(Number.PRESLIDING_FRICTION_BREAKAWAY)]
             left = laws.bristle_stiffness_scale(breakaway, psi, bound, v)
-            stiffness = laws.bristle_row(left, h, bristles, inertia)
+            stiffness = laws.bristle_stiffness_scale_in_row(left, h, bristles, inertia)
             if joint.damps != 0:
                 rate = n[int(Number.PRESLIDING_FRICTION_DAMPING)]
                 drag += passage.resistance * rate * left
@@ -422,7 +422,7 @@ def act(
     next_speed = float(passage.speed)
     inertia_before = n[int(Number.BACKLASH_HANDLE)]
     if inertia_before > 0.0:
-        moved = laws.handle(play, inertia_before, h, applied, v, gap, speed)
+        moved = laws.move_handle(play, inertia_before, h, applied, v, gap, speed)
         force += moved[0] - applied
         next_gap = moved[1]
         next_speed = moved[2]

@@ -43,7 +43,7 @@ def sign(x: float) -> float:
 
 
 @wp.func
-def stribeck(excess: float, velocity: float, exponent: float, v: float) -> float:
+def stribeck_friction(excess: float, velocity: float, exponent: float, v: float) -> float:
     """Friction above Coulomb's that fades as the joint moves at v, N·m."""
     if excess <= 0.0:
         return 0.0
@@ -64,7 +64,9 @@ def bristle_stiffness_scale(breakaway: float, held: float, bound: float, v: floa
 
 
 @wp.func
-def bristle_row(left: float, h: float, stiffness: float, inertia: float) -> float:
+def bristle_stiffness_scale_in_row(
+    left: float, h: float, stiffness: float, inertia: float
+) -> float:
     """D of the friction row where `left` of the bristles' stiffness is left, kg·m²."""
     in_row = wp.max(left, LEAST_IN_ROW - inertia / (h * h * stiffness))
     if left <= LEAST_BRISTLE:
@@ -134,7 +136,7 @@ def settle(play: float, h: float, side: float, gap: float, speed: float, v: floa
 
 
 @wp.func
-def handle(
+def move_handle(
     play: float, inertia: float, h: float, applied: float, v: float, gap: float, speed: float
 ) -> wp.vec3:
     """A step of the handle before the joint: its force on the joint, its gap and its speed."""

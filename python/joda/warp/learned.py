@@ -101,7 +101,7 @@ def gone(h: float, time: float) -> float:
 
 
 @wp.func
-def push(
+def learned_force(
     table: wp.vec2, stiffness: float, change: float, time: float, h: float, v: float, held: float
 ) -> wp.vec2:
     """A learned force in a step: a force, and a drag on the velocity after it.
@@ -124,7 +124,7 @@ def push(
 
 
 @wp.func
-def recalled(change: float, time: float, h: float, v: float, held: float) -> float:
+def remember(change: float, time: float, h: float, v: float, held: float) -> float:
     """What is remembered after a step, at whose end the joint moves at v."""
     toward = wp.where(change == 0.0, time * v, wp.abs(v))
     return held + gone(h, time) * (toward - held)
