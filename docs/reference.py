@@ -1,4 +1,5 @@
-"""The reference, from the code: commands, Python, the plugin's attributes, effects, schemas."""
+"""The reference, from the code: commands, Python, the plugin's attributes, effects, schemas, the
+house."""
 
 import inspect
 import json
@@ -6,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
+import architecture
 import typer
 
 import joda
@@ -51,6 +53,7 @@ def write(folder: Path) -> None:
         "attributes": attributes,
         "effects": effects,
         "schemas": schemas,
+        "architecture": architecture.page,
     }
     for name, page in pages.items():
         path, text = folder / f"{name}.md", page()
