@@ -18,7 +18,7 @@ from joda.commands.add import sentences as of_added
 from joda.commands.diagnose import sentences
 from joda.diagnosis import improvement
 from joda.diagnosis.outcome import read_runs
-from joda.diagnosis.phrases import NAMES
+from joda.diagnosis.phrases import effect_names, named
 from joda.hidden import draw
 from joda.measured.runs import write_run
 
@@ -98,11 +98,11 @@ def test_the_diagnosis_is_as_the_contract_says(hidden):
     assert told["next_experiment"] is None or isinstance(told["next_experiment"], str)
     for one in told["effects"]:
         assert {key: type(one[key]) for key in KEYS} == KEYS
-        assert one["effect"] in NAMES
+        assert one["effect"] in effect_names()
         assert 0 <= one["interval"][0] < one["interval"][1] <= 1
         assert 0 <= one["probability"] <= 1
         assert one["direction"] in ("both", "positive", "negative")
-        assert set(one["indistinguishable_from"]) <= set(NAMES)
+        assert set(one["indistinguishable_from"]) <= set(effect_names())
         assert len(one["interval_error"]) == 2 and one["magnitude_error"] > 0
         assert one["probability"] >= 0.01
     assert all(0 <= a < b <= 1 for a, b in told["unvisited"])
@@ -283,7 +283,7 @@ def test_the_demo_opens_the_seal(tmp_path):
     assert seal["effect"] == result.truth["effect"]
     assert result.right == (result.diagnosis.effects[0].effect == seal["effect"])
     opened = next(k for k, sentence in enumerate(said) if "seal is opened" in sentence)
-    assert NAMES[seal["effect"]] in said[opened + 1]
+    assert named(seal["effect"]) in said[opened + 1]
     assert result.judgement in said[opened + 2 :]
     assert not any("Hidden is" in sentence for sentence in said)
     assert result.after.rmse_window < result.before.rmse_window

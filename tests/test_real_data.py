@@ -15,7 +15,6 @@ from scipy import signal
 
 from joda.diagnosis.adding import add_effect
 from joda.diagnosis.learning.choosing import learn
-from joda.diagnosis.rivals import DRIVING, RESISTING
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
 from joda.joints.resistance import damping, friction_bounds
@@ -71,6 +70,17 @@ DOOR = {
     "inertial": 'pos="0.15 0 0" mass="2" diaginertia="0.02 0.02 0.02"',
 }
 DOORS = {"ikea": ("ikea_cabinet_log", "ikea_cabinet_2"), "lab": ("lab_cabinet_log",)}
+RESISTING = (
+    *("position_dependent_friction", "position_dependent_damping", "constant_friction_hinge"),
+    *("constant_damping_hinge", "asymmetric_friction", "direction_dependent_damping"),
+)
+DRIVING = (
+    *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
+    *("spring_return_to_low_end", "spring_return_to_high_end", "bistable_mechanism"),
+    *("magnetic_return_to_low_end", "magnetic_return_to_high_end", "gravity_offset"),
+    *("spring_loaded_snap_detent_to_low_end", "spring_loaded_snap_detent_to_high_end"),
+    *("detent_internal", "bistable_mechanism_internal"),
+)
 BY_PLACE = {"position_dependent_friction", "position_dependent_damping", *DRIVING} - set(OFFSETS)
 """What differs along the way: a resistance, a spring, a magnet, a latch."""
 

@@ -49,13 +49,22 @@ class Template(File):
         name: the file's name without its ending.
         description: the behaviour, for people and models to choose by.
         placement: where on a joint it is typically found.
+        title: what a model without it lacks, in a few words; by default the name's.
+        shows: how it shows in measurements, a clause.
         channels: prototype curves in the interval's own coordinate u, from 0 at its low end to 1.
     """
 
     name: str
     description: str
     placement: str
+    title: str = ""
+    shows: str = "what is missing there has the shape of the template's curves"
     channels: Curves
+
+    @property
+    def named(self) -> str:
+        """What a model without it lacks."""
+        return self.title or self.name.replace("_", " ")
 
 
 def read_templates(folders: Sequence[str | Path] = ()) -> dict[str, Template]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.outcome import NO_TRUST, read_runs
-from joda.diagnosis.phrases import LEARN, NAMES, named, percent
+from joda.diagnosis.phrases import LEARN, effect_names, named, percent
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
 from joda.files import check_targets, write_together
@@ -82,7 +82,7 @@ def diagnose(
 
 def check_effect(name: str, templates: Collection[str] = ()) -> None:
     """Raises JodaError if there is no effect of that name, nor a template."""
-    every = dict.fromkeys((*NAMES, *templates))
+    every = dict.fromkeys((*effect_names(), *templates))
     if name not in every:
         raise JodaError(f"no effect '{name}'; there are {', '.join(every)}.")
 

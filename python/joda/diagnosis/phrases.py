@@ -1,60 +1,25 @@
 """Effects in words: what is missing, where, how much, and what shows it."""
 
+from functools import cache
+
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
 from joda.profile import Joint
+from joda.template import Template, read_templates
 
-NAMES = {
-    "constant_friction_hinge": "dry friction",
-    "constant_damping_hinge": "viscous damping",
-    "constant_positive_conservative_hinge": "a constant force towards +q",
-    "constant_negative_conservative_hinge": "a constant force towards \N{MINUS SIGN}q",
-    "detent_internal": "a click-stop (detent)",
-    "bistable_mechanism": "an over-centre mechanism with two stable sides",
-    "bistable_mechanism_internal": "a snap between two stable places within the range",
-    "magnetic_return_to_low_end": "a magnet at the low end",
-    "magnetic_return_to_high_end": "a magnet at the high end",
-    "spring_return_to_low_end": "a return spring towards the low end",
-    "spring_return_to_high_end": "a return spring towards the high end",
-    "spring_loaded_snap_detent_to_low_end": "a latch at the low end",
-    "spring_loaded_snap_detent_to_high_end": "a latch at the high end",
-    "position_dependent_friction": "dry friction that differs along the way",
-    "position_dependent_damping": "damping that differs along the way",
-    "asymmetric_friction": "more dry friction in one direction than in the other",
-    "direction_dependent_damping": "more damping in one direction than in the other",
-    "stribeck_friction": "more dry friction at rest than in motion (Stribeck)",
-    "quadratic_damping": "drag that grows with the square of speed",
-    "presliding_friction": "dry friction that gives way elastically before it slides",
-    "load_dependent_friction": "dry friction that grows with the load",
-    "added_inertia": "more inertia than the model has",
-    "gravity_offset": "another pull of gravity (tilt, or another centre of mass)",
-    "end_stop_restitution": "ends of the range that throw the joint back",
-    "backlash": "play between what is pushed and what moves",
-    "learned_force": "a law learned from the runs",
+CURVES = {
+    "position_dependent_friction": (
+        "dry friction that differs along the way",
+        "a resistance missing that does not depend on speed, and differs with position",
+    ),
+    "position_dependent_damping": (
+        "damping that differs along the way",
+        "a resistance missing that grows with speed, and differs with position",
+    ),
 }
-SHOWS = {
-    "constant_friction_hinge": "the joint stops, or is held, where the model goes on",
-    "constant_damping_hinge": "fast motion loses more than the model's, in proportion to speed",
-    "constant_positive_conservative_hinge": "the force missing is the same in both directions",
-    "constant_negative_conservative_hinge": "the force missing is the same in both directions",
-    "detent_internal": "the joint is drawn to the middle of that place from either side",
-    "bistable_mechanism": "the force missing changes its sign at a tipping point",
-    "bistable_mechanism_internal": "the joint is drawn to two places there, with a barrier between",
-    "magnetic_return_to_low_end": "a pull that grows steeply towards the end",
-    "magnetic_return_to_high_end": "a pull that grows steeply towards the end",
-    "spring_return_to_low_end": "a force missing that grows in proportion to position",
-    "spring_return_to_high_end": "a force missing that grows in proportion to position",
-    "spring_loaded_snap_detent_to_low_end": "a barrier before the end, and a hold behind it",
-    "spring_loaded_snap_detent_to_high_end": "a barrier before the end, and a hold behind it",
-    "position_dependent_friction": "a resistance missing that does not depend on speed, and "
-    "differs with position",
-    "position_dependent_damping": "a resistance missing that grows with speed, and differs with "
-    "position",
-}
-SHAPE = "what is missing there has the shape of the template's curves"
-"""What shows a template of one's own."""
+"""Name and what shows it, of the free curves; other effects and templates have their own."""
 WAYS = {"positive": "towards +q", "negative": "towards \N{MINUS SIGN}q"}
 
-assert set(NAMES) >= {*EFFECTS, *CHANNEL_EFFECTS}
+assert set(CURVES) == set(CHANNEL_EFFECTS)
 
 LEARN = (
     "What has no name can be learned from these runs: joda add ... --effect learned_force, which "
@@ -66,9 +31,27 @@ SUREST = 0.99
 """Highest probability that is said."""
 
 
+@cache
+def effect_names() -> tuple[str, ...]:
+    """All that may be missing, but for templates of one's own."""
+    return (*read_templates(), *CURVES, *EFFECTS)
+
+
 def named(effect: str) -> str:
     """The effect in a few words: a template of one's own by its file's name."""
-    return NAMES.get(effect, effect.replace("_", " "))
+    return _words(effect)[0]
+
+
+@cache
+def _words(effect: str) -> tuple[str, str]:
+    """An effect's name, and what shows it."""
+    if effect in CURVES:
+        return CURVES[effect]
+    if effect in EFFECTS:
+        return EFFECTS[effect].NAME, _lower(EFFECTS[effect].SHOWS)
+    if own := read_templates().get(effect):
+        return own.named, own.shows
+    return effect.replace("_", " "), Template.model_fields["shows"].default
 
 
 def percent(probability: float) -> str:
@@ -111,7 +94,7 @@ def explained(
     value, doubt, unit = size
     way = f", {WAYS[direction]}" if direction in WAYS else ""
     of = "" if unit == "1" else f" {unit}"
-    shows = SHOWS.get(effect) or (_lower(EFFECTS[effect].SHOWS) if effect in EFFECTS else SHAPE)
+    shows = _words(effect)[1]
     before, after, noise = errors
     name = named(effect)
     return (

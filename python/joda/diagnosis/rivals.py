@@ -1,22 +1,14 @@
 """Effects that the measurements cannot tell apart."""
 
+from functools import cache
+
 from joda.diagnosis.search import Ranking
 from joda.diagnosis.selection import LEFT, LITTLE, Selection
+from joda.effects import CHANNEL_EFFECTS, EFFECTS
+from joda.template import read_templates
 
 RIVAL = 0.35
 """Part of the excess that an effect may leave that counts as an alternative."""
-RESISTING = (
-    *("position_dependent_friction", "position_dependent_damping", "constant_friction_hinge"),
-    *("constant_damping_hinge", "asymmetric_friction", "direction_dependent_damping"),
-)
-DRIVING = (
-    *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
-    *("spring_return_to_low_end", "spring_return_to_high_end", "bistable_mechanism"),
-    *("magnetic_return_to_low_end", "magnetic_return_to_high_end", "gravity_offset"),
-    *("spring_loaded_snap_detent_to_low_end", "spring_loaded_snap_detent_to_high_end"),
-    *("detent_internal", "bistable_mechanism_internal"),
-)
-"""What resists motion, and what is a force over position: the same where it goes one way only."""
 ALIKE = 0.1
 """By how much of the misfit two effects may differ that the data cannot tell apart."""
 
@@ -33,8 +25,16 @@ def indistinguishable(
         if abs(left[k] - left[number]) < ALIKE * (left[number] + LITTLE)
         and left[k] < max(RIVAL * own, LEFT)
     }
-    if one_way:
-        for mine, other in ((RESISTING, DRIVING), (DRIVING, RESISTING)):
-            if names[number] in mine:
-                alike |= set([name for name in names if name in other][:1])
+    if one_way and (mine := _kind(names[number])):
+        alike |= set([name for name in names if _kind(name) not in (None, mine)][:1])
     return tuple(name for name in names if name in alike and name != names[number])
+
+
+@cache
+def _kind(effect: str) -> str | None:
+    """A force over position or a resistance: the same where the joint goes one way only."""
+    if effect in EFFECTS:
+        return EFFECTS[effect].KIND
+    template = read_templates().get(effect)
+    forces = template is not None and template.channels.conservative is not None
+    return "force" if forces else "resistance" if template or effect in CHANNEL_EFFECTS else None

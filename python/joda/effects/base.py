@@ -39,12 +39,17 @@ class Effect(Frozen):
 
     Attributes:
         effect: its name.
+        NAME: what a model without it lacks, in a few words.
+        KIND: a force over position or a resistance, which runs in one direction do not tell apart;
+            None of neither.
         DESCRIPTION: in plain words.
         LAW: the formula; v is the joint's velocity, s its normalised position.
         SOURCE: where the formula is from.
         SHOWS: how it shows in measurements.
     """
 
+    NAME: ClassVar[str]
+    KIND: ClassVar[Literal["force", "resistance"] | None] = None
     DESCRIPTION: ClassVar[str]
     LAW: ClassVar[str]
     SOURCE: ClassVar[str]

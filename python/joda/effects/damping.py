@@ -11,6 +11,8 @@ from joda.effects.base import CurveEffect, Direction, parameter
 class DirectionDependentDamping(CurveEffect):
     """More damping in one direction than in the other."""
 
+    NAME = "more damping in one direction than in the other"
+    KIND = "resistance"
     DESCRIPTION = "Damping is larger in one direction: a soft-close damper, a door closer."
     LAW = "force -y(s) v while v has the direction, 0 otherwise"
     SOURCE = "Janot, Young and Gautier, Control Eng. Practice 73 (2018) on the EMPS drive"
@@ -24,6 +26,8 @@ class DirectionDependentDamping(CurveEffect):
 class QuadraticDamping(CurveEffect):
     """Drag that grows with the square of speed."""
 
+    NAME = "drag that grows with the square of speed"
+    KIND = "resistance"
     DESCRIPTION = "Drag grows with the square of speed: air, oil through an orifice."
     LAW = "force -y(s) v |v|"
     SOURCE = "Newton's drag; Blevins, Applied Fluid Dynamics Handbook (1984)"

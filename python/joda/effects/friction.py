@@ -11,6 +11,8 @@ from joda.effects.base import CurveEffect, Direction, Effect, parameter
 class AsymmetricFriction(CurveEffect):
     """More dry friction in one direction than in the other."""
 
+    NAME = "more dry friction in one direction than in the other"
+    KIND = "resistance"
     DESCRIPTION = "Dry friction is larger while moving in one direction than in the other."
     LAW = "f = f_max(s) + y(s) while v has the direction, f_max(s) otherwise"
     SOURCE = "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083"
@@ -27,6 +29,8 @@ class AsymmetricFriction(CurveEffect):
 class StribeckFriction(CurveEffect):
     """More dry friction at rest than in motion."""
 
+    NAME = "more dry friction at rest than in motion (Stribeck)"
+    KIND = "resistance"
     DESCRIPTION = "Dry friction is larger at rest and falls off with speed: it breaks away."
     LAW = "f = f_max(s) + y(s) exp(-(|v| / velocity)^exponent)"
     SOURCE = "Stribeck 1902; Bo and Pavelescu, Wear 82 (1982) 277"
@@ -50,6 +54,8 @@ class StribeckFriction(CurveEffect):
 class LoadDependentFriction(Effect):
     """Dry friction that grows with the load on the joint."""
 
+    NAME = "dry friction that grows with the load"
+    KIND = "resistance"
     DESCRIPTION = "Dry friction grows with the load that the joint carries."
     LAW = (
         "f = f_max(s) + coefficient |load|; load: what its gear transmits, the actuator's force "
@@ -65,6 +71,8 @@ class LoadDependentFriction(Effect):
 class PreslidingFriction(Effect):
     """Dry friction that gives way elastically before it slides."""
 
+    NAME = "dry friction that gives way elastically before it slides"
+    KIND = "resistance"
     DESCRIPTION = (
         "Before dry friction slides it gives way like a spring: small motions come back, reversals "
         "are soft."

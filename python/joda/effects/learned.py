@@ -21,6 +21,7 @@ Row = Annotated[tuple[float, ...], Field(min_length=3, max_length=24)]
 class LearnedForce(Effect):
     """A resistance over position and velocity that was learned from data, and one memory."""
 
+    NAME = "a law learned from the runs"
     DESCRIPTION = (
         "What no named effect says: a resistance over position and speed as the data show it, and "
         "a memory."

@@ -10,6 +10,7 @@ from joda.effects.base import Effect, parameter
 class AddedInertia(Effect):
     """More inertia than the bodies have."""
 
+    NAME = "more inertia than the model has"
     DESCRIPTION = "The joint is harder to set in motion than its bodies' masses make it."
     LAW = "force -inertia dv/dt"
     SOURCE = "Newton's second law; `armature` of the joint in the scene"
@@ -22,6 +23,8 @@ class AddedInertia(Effect):
 class GravityOffset(Effect):
     """Gravity acts otherwise than the bodies' masses say: tilt, or a wrong centre of mass."""
 
+    NAME = "another pull of gravity (tilt, or another centre of mass)"
+    KIND = "force"
     DESCRIPTION = "The axis is tilted, or the centre of mass is elsewhere than in the model."
     LAW = "force sin sin(q) + cos cos(q) on a hinge, force on a slide"
     SOURCE = "torque of a weight on an arm"
@@ -54,6 +57,7 @@ little less than what the plugin takes."""
 class Backlash(Effect):
     """Play between two parts, of which the joint's own is the one that is measured."""
 
+    NAME = "play between what is pushed and what moves"
     DESCRIPTION = (
         "What pushes the joint has play, or what the joint moves has: a loose handle, gears, a "
         "slack linkage."
@@ -114,6 +118,7 @@ ENDS: dict[End, tuple[float, float]] = {"both": (0.0, 1.0), "low": (0.0, 0.02), 
 class EndStopRestitution(Effect):
     """How the ends of the range, or one of them, throw the joint back."""
 
+    NAME = "ends of the range that throw the joint back"
     DESCRIPTION = "The ends of the range, or one of them, bounce more, or less, than the model's."
     LAW = "speed after / speed before = restitution; the limit's solver parameters are set so"
     SOURCE = "Newton's coefficient of restitution"
