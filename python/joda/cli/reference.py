@@ -34,7 +34,7 @@ def templates(
 
     found = run(folders or (), output, name=name, force=force)
     if as_json:
-        print_json([one.model_dump(mode="json", exclude_none=True) for one in found.values()])
+        print_json([one.model_dump(mode="json", exclude_unset=True) for one in found.values()])
     elif output:
         say(output)
     else:
