@@ -311,7 +311,7 @@ def test_what_has_no_mass_weighs_next_to_nothing(beside, tmp_path):
     from pxr import Usd, UsdPhysics
 
     export(beside, "usd", tmp_path / "o.usda")
-    stage = Usd.SceneRenderer.Open(str(tmp_path / "o.usda"))
+    stage = Usd.Stage.Open(str(tmp_path / "o.usda"))
     bodies = [one for one in stage.Traverse() if one.HasAPI(UsdPhysics.RigidBodyAPI)]
     masses = [UsdPhysics.MassAPI(one).GetMassAttr().Get() for one in bodies]
     assert len(masses) == 5 and sum(masses) == pytest.approx(whole) and all(m > 0 for m in masses)
@@ -345,7 +345,7 @@ def test_a_joint_without_a_profile_keeps_what_the_scene_gives_it(beside, tmp_pat
     from pxr import Usd, UsdPhysics
 
     assert export(beside, "usd", tmp_path / "o.usda").notes == ()
-    stage = Usd.SceneRenderer.Open(str(tmp_path / "o.usda"))
+    stage = Usd.Stage.Open(str(tmp_path / "o.usda"))
     joint = stage.GetPrimAtPath("/o/joint_hatch")
     drive = UsdPhysics.DriveAPI.Get(joint, "angular")
     assert np.degrees(drive.GetDampingAttr().Get()) == pytest.approx(10)
@@ -379,7 +379,7 @@ def test_the_usd_is_the_scene(scene, model, tmp_path):
     from pxr import UsdGeom, UsdPhysics
 
     told = {one.joint: one for one in export(scene, "usd", tmp_path / "o.usda").joints}
-    stage = Usd.SceneRenderer.Open(str(tmp_path / "o.usda"))
+    stage = Usd.Stage.Open(str(tmp_path / "o.usda"))
     cache = UsdGeom.XformCache()
     anchors, axes = poses(model, JOINTS, dict.fromkeys(JOINTS, 0.0))
     for name, anchor, axis in zip(JOINTS, anchors, axes, strict=True):

@@ -195,9 +195,9 @@ title = "hinged widget"
 evidence = "we made it"
 joint = "hinge"
 common = 30
-wishes = ["stays_put"]
+requirements = ["stays_put"]
 force = "room door"
-parts = [{ effect = "constant_friction_hinge", place = [0, 1], friction = "weak", reason = "rubs" }]
+effects = [{ effect = "constant_friction_hinge", place = [0, 1], friction = "weak", reason = "rubs" }]
 shape.travel = [10, 200]
 """
 

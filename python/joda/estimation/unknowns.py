@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from joda.estimation.least_squares import Inequalities
 
@@ -62,8 +61,10 @@ class Unknowns:
         """Both, one after the other."""
         pairs = zip(_parts(self), _parts(other), strict=True)
         low, high, step, mean, prior_std = (np.concatenate(pair) for pair in pairs)
-        both = [np.zeros((0, len(u.low))) if u.rough is None else u.rough for u in (self, other)]
-        rough = block_diag(*both) if len(both[0]) + len(both[1]) else None
+        before, after = (0, len(other.low)), (len(self.low), 0)
+        own = [(self.rough, before), (other.rough, after)]
+        padded = [np.pad(part, ((0, 0), sides)) for part, sides in own if part is not None]
+        rough = np.vstack(padded) if padded else None
         return Unknowns(low, high, step, mean, prior_std, rough=rough)
 
     def some(self, kept: NDArray[np.bool_]) -> "Unknowns":

@@ -43,7 +43,7 @@ def usd(
     except ImportError:
         raise JodaError('export --to usd needs usd-core; run: pip install ".[export]"') from None
 
-    stage = Usd.SceneRenderer.CreateInMemory()
+    stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)

@@ -14,7 +14,7 @@ from joda.scenes.motion import Motion
 PATIENCE = 0.25
 """How long (s) what takes longer goes on although a newer profile waits."""
 
-SceneRenderer = Callable[[Profile, Stale], Any]
+Stage = Callable[[Profile, Stale], Any]
 
 
 class Live:
@@ -105,7 +105,7 @@ class Live:
             self.failed[name] = str(error)
         self._told(name)
 
-    def _stages(self) -> dict[str, tuple[SceneRenderer | None, Any]]:
+    def _stages(self) -> dict[str, tuple[Stage | None, Any]]:
         """What makes each stage, and what it depends on besides the profile."""
         session, start, runs = self.session, self.start, self.session.runs
 
