@@ -197,7 +197,9 @@ joint = "hinge"
 common = 30
 requirements = ["stays_put"]
 force = "room door"
-effects = [{ effect = "constant_friction_hinge", place = [0, 1], friction = "weak", reason = "rubs" }]
+effects = [
+  { effect = "constant_friction_hinge", place = [0, 1], friction = "weak", reason = "rubs" },
+]
 shape.travel = [10, 200]
 """
 
