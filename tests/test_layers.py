@@ -12,7 +12,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 
 LAYERS = [
-    {"plain"},
+    {"plain", "threads"},
     {"errors", "_core", "component"},
     {"files", "effects"},
     {"making"},

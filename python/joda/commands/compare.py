@@ -22,6 +22,7 @@ from joda.measured.visited import unvisited
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
 from joda.pictures.style import house_style, png
+from joda.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+@one_blas_thread
 def compare(
     model: str | Path,
     joint: str,

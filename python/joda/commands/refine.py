@@ -39,6 +39,7 @@ from joda.scenes.context import Context, context
 from joda.scenes.model import find_joint, joint_name, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
+from joda.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -83,6 +84,7 @@ class Refined:
     notes: tuple[str, ...]
 
 
+@one_blas_thread
 def refine(
     model: str | Path,
     joint: str,

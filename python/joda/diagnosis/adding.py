@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.coverage import at_rest
@@ -19,11 +18,11 @@ from joda.diagnosis.overlap import overlap
 from joda.diagnosis.paired_test import FALLEN, worse
 from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
 from joda.diagnosis.shape_refinement import Trials, Tried, checked, likeliest
-from joda.estimation.estimator import BLAS
 from joda.measured.errors import Errors, errors, known
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.profile import Profile
+from joda.threads import one_blas_thread
 
 NEARLY = 0.95
 """Part of the error before, and of the loss, to which an effect must bring runs held out."""
@@ -93,6 +92,7 @@ def replayed(measured: Measured, profile: Profile | None = None) -> tuple[Error,
     return Error(known(found.whole), found.window), found
 
 
+@one_blas_thread
 def add_effect(
     train: Measured,
     held: Measured,
@@ -123,11 +123,10 @@ def add_effect(
     progress("the effect's own numbers")
     given = given or train.profile
     trials = Trials(train, held)
-    with threadpool_limits(1, BLAS):
-        baseline = fit_baseline(train)
-        begin = starts(baseline, effect, direction, near)
-        tried = [one for start in begin for one in trials.reshaped(start, effect, progress)]
-        loss = trials.unseen.loss(train.profile)
+    baseline = fit_baseline(train)
+    begin = starts(baseline, effect, direction, near)
+    tried = [one for start in begin for one in trials.reshaped(start, effect, progress)]
+    loss = trials.unseen.loss(train.profile)
 
     needs = Needs(train)
 
@@ -157,9 +156,8 @@ def add_effect(
     departs = departures(given, first.profile, effect, near)
     if departs.sentences:
         parts = departs.parts
-        with threadpool_limits(1, BLAS):
-            back = restored(first.profile, given, parts)
-            tried += trials.holding(back, parts, progress) if parts else []
+        back = restored(first.profile, given, parts)
+        tried += trials.holding(back, parts, progress) if parts else []
         count = len(departs.sentences)
         found = [(one, departures(given, one.profile, effect, near)) for one in tried]
         other, error_then, _ = best(one for one, own in found if len(own.sentences) < count)
@@ -169,8 +167,7 @@ def add_effect(
     if departs.parts:
         progress("the model's own numbers without the effect")
         own = checked(baseline.base.written(baseline.fit.x))
-        with threadpool_limits(1, BLAS):
-            without = likeliest(trials.reshaped(own, effect, progress))
+        without = likeliest(trials.reshaped(own, effect, progress))
         if _as_good(without, first):
             return AddedEffect(train.profile, None, before, before, OWN)
     return AddedEffect(first.profile, effect, before, after, departs=departs)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.applied_corrections import AppliedCorrections, righted
 from joda.diagnosis.baseline import Baseline
@@ -18,7 +17,7 @@ from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.corrections import ANYTHING, Correction
 from joda.diagnosis.hypothesis_fits import FittedHypothesis
 from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
-from joda.estimation.estimator import BLAS, CAUCHY_SCALE, Fit, SegmentEstimator, excess
+from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of
 from joda.measured.reading import Measured
 
@@ -130,11 +129,10 @@ class Calibrator:
             return None
         if self._segments is not baseline.estimator:
             self._segments, self._fits = baseline.estimator, {}
-        with threadpool_limits(1, BLAS):
-            found = _calibrated(_Search(baseline, every, self._fits), beside)
-            if found and all(found.numbers.little(found.fit.x)):
-                return None
-            return _longer(measured, found) if found and found.alone else found
+        found = _calibrated(_Search(baseline, every, self._fits), beside)
+        if found and all(found.numbers.little(found.fit.x)):
+            return None
+        return _longer(measured, found) if found and found.alone else found
 
 
 def _longer(measured: Measured, found: Calibration) -> Calibration:

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from threadpoolctl import threadpool_limits
-
 from joda.diagnosis.adding import Error, add_effect, error
 from joda.diagnosis.applied_corrections import AppliedCorrections
 from joda.diagnosis.baseline import fit_baseline
@@ -18,10 +16,10 @@ from joda.diagnosis.shape_refinement import refitted
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
 from joda.estimation.base_model import segments_for
-from joda.estimation.estimator import BLAS
 from joda.measured.reading import Measured
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
+from joda.threads import one_blas_thread
 
 MOST = 5
 """Effects that are added at most."""
@@ -72,6 +70,7 @@ class Step:
         return self.added.effect if self.added else None
 
 
+@one_blas_thread
 def improved(
     measured: Measured, progress: Progress = lambda what: None
 ) -> tuple[tuple[Step, ...], str]:
@@ -129,10 +128,9 @@ def _numbers_first(parts: Parts, before: Error, progress: Progress) -> Step | No
     """The numbers of a driven joint set right before anything is asked: few models know them, and a
     diagnosis of a model that is far off takes as long as the next one."""
     progress("the model's own numbers")
-    with threadpool_limits(1, BLAS):
-        begun = fit_baseline(parts[0])
-        found = numbers(begun)
-        right = corrected(begun, found, OFF, begun.fit.x)
+    begun = fit_baseline(parts[0])
+    found = numbers(begun)
+    right = corrected(begun, found, OFF, begun.fit.x)
     own = corrections(found, begun.base.profile.joint, OFF)
     return _set_right(parts, before, right, own, progress) if right else None
 
@@ -162,8 +160,7 @@ def _set_right(
     progress("the model's own numbers")
     train, held = _driven(parts, right.servo)
     train = train.changed(right.profile)
-    with threadpool_limits(1, BLAS):
-        profile = refitted(train, right.profile, segments_for(train).length)
+    profile = refitted(train, right.profile, segments_for(train).length)
     after = error(held.changed(profile))
     rises = before.whole is not None and (after.whole or 0.0) > before.whole
     if after.window > WORTH * before.window or rises:

@@ -7,12 +7,11 @@ from os import cpu_count
 from typing import TypeVar
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, CoarseFit
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, beside, joined
-from joda.estimation.estimator import BLAS, Fit, SegmentEstimator
+from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.profile import Profile
 
 PERTURBED, NEAR = 4, 3.0
@@ -79,7 +78,7 @@ def rank(
     tried = [h for h in baseline.hypotheses if h.effect not in {*exclude, RESTITUTION}]
     restitution = [h for h in baseline.hypotheses if h.effect == RESTITUTION]
     silent = RESTITUTION in exclude
-    with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
+    with ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, progress, 2 * len(tried) + PERTURBED)
         candidates = _fitted(baseline, tried, work, roughly)
         if not roughly:
@@ -128,7 +127,7 @@ def narrowed(
         )
         return baseline.perturbed(candidate) if stuck else candidate
 
-    with threadpool_limits(1, BLAS), ThreadPoolExecutor(cpu_count()) as pool:
+    with ThreadPoolExecutor(cpu_count()) as pool:
         candidates = _Work(pool, progress, len(tried)).all(again, tried)
         baseline = _restarted(baseline, candidates)
     there = [one for one in candidates if not one.vanished]

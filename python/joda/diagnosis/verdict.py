@@ -42,6 +42,7 @@ from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part, visited_share
 from joda.measured.whiteness import strays
 from joda.profile import Profile
+from joda.threads import one_blas_thread
 
 FALLEN = 0.95
 """Part of an error held out that an effect leaves at most, where only a second look knows of it."""
@@ -138,6 +139,7 @@ class Diagnosed:
     calibration: Calibration | None = None
 
 
+@one_blas_thread
 def diagnosed(
     measured: Measured,
     exclude: Collection[str] = (),

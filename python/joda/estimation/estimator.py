@@ -21,8 +21,6 @@ Array = NDArray[np.float64]
 Make = Callable[[Array], Simulator]
 """A joint, or a scene, with its numbers."""
 
-BLAS = "blas"
-"""Fits' matrices are small: threads of their own would only be in the way of ours."""
 CAUCHY_SCALE = 20.0
 """Mean square residual at which the Cauchy loss of a segment bends into a logarithm."""
 BACKTRACKS = 6

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from joda.diagnosis.adding import (
     NO_LESS,
@@ -26,8 +25,9 @@ from joda.diagnosis.overlap import divided
 from joda.diagnosis.paired_test import worse
 from joda.diagnosis.plausible import Needs, implausible
 from joda.diagnosis.shape_refinement import Likelihood
-from joda.estimation.estimator import BLAS, excess
+from joda.estimation.estimator import excess
 from joda.measured.reading import Measured
+from joda.threads import one_blas_thread
 
 LENGTHS = (0.12, 0.05, 0.025)
 """Over which a force over position changes, normalised."""
@@ -136,6 +136,7 @@ def _worth(more: Tried, less: Tried) -> bool:
     return more.unseen < WORTH * less.unseen and clearly(more.unseen, less.unseen)
 
 
+@one_blas_thread
 def learn(
     train: Measured, held: Measured, progress: Callable[[str], None] = lambda what: None
 ) -> tuple[AddedEffect, Learned | None]:
@@ -159,8 +160,7 @@ def learn(
         return refused(reason)
     loss = Likelihood(held).loss(own)
     anew = divided(own, LABEL)[1]  # of a law that was learned before none is left
-    with threadpool_limits(1, BLAS):
-        best = Learning(train.changed(anew), held.changed(anew), progress).chosen()
+    best = Learning(train.changed(anew), held.changed(anew), progress).chosen()
     profile = best.learned.profile
     if best.terms == Terms() or not clearly(best.unseen, loss):
         return refused(NOTHING_LEFT if before.window < NO_MORE * held.floor else NO_LESS)

@@ -2,11 +2,8 @@
 
 from dataclasses import dataclass
 
-from threadpoolctl import threadpool_limits
-
 from joda.diagnosis.adding import error, starts
 from joda.diagnosis.baseline import fit_baseline
-from joda.estimation.estimator import BLAS
 from joda.measured.reading import Measured
 
 
@@ -33,8 +30,7 @@ def nearest(train: Measured, held: Measured, effect: str, unseen: float) -> Near
         effect: its name.
         unseen: the learned law's error on what was held out, in segments.
     """
-    with threadpool_limits(1, BLAS):
-        profiles = starts(fit_baseline(train), effect, None, None)
+    profiles = starts(fit_baseline(train), effect, None, None)
     if not profiles or not unseen:
         return None
     return Nearest(effect, error(held, profiles[0]).window / unseen)
