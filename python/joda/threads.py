@@ -11,8 +11,8 @@ R = TypeVar("R")
 
 
 def one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, during which BLAS starts no threads of its own: on a busy machine they only wait
-    for each other."""
+    """The function, during which BLAS starts no threads of its own: they would only wait for each
+    other on a busy machine."""
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from joda.diagnosis.applied_corrections import AppliedCorrections, righted
 from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.correction_report import correction_of
-from joda.diagnosis.corrections import ANYTHING, Correction
+from joda.diagnosis.corrections import ANYTHING
+from joda.diagnosis.findings import Correction
 from joda.diagnosis.hypothesis_fits import FittedHypothesis
 from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from joda.diagnosis.corrections import Correction
+from joda.diagnosis.findings import Correction
 from joda.estimation.nuisance import FACTORS, NuisanceName
 from joda.measured.reading import Measured
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from joda.component import Component
 from joda.diagnosis.baseline import Baseline
+from joda.diagnosis.findings import Correction, Parameter
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.estimation.base_model import BaseModel, shared_damping
 from joda.profile import Joint, Profile
@@ -31,43 +31,12 @@ ALIKE = 0.12
 SLOW = 0.02
 """A delay of commands (s) of which a part counts as the same part of another number does."""
 
-OfModel = Literal[
-    "mass", "inertia", "gravity", "center_of_mass", "damping", "frictionloss", "stiffness"
-]
-OfMeasurement = Literal[
-    "actuator_gain", "time_delay", "force_scale", "force_offset", "position_offset"
-]
-Parameter = OfModel | OfMeasurement
 NATIVE: dict[str, Parameter] = {
     DAMPING: "damping",
     FRICTION: "frictionloss",
     SPRING: "stiffness",
 }
 """The model's own numbers by the labels of their components (`joda.scenes.native`)."""
-
-
-@dataclass(frozen=True)
-class Correction:
-    """A number of the model or of the measurement that the runs contradict.
-
-    Attributes:
-        parameter: the joint's attribute in MJCF, or what of its body, its actuator or the
-            measurement it is.
-        joint: its name.
-        factor: the right value over the model's; None where that is zero.
-        value: the right one.
-        error: its standard error.
-        unit: of both.
-        explanation: for a person.
-    """
-
-    parameter: Parameter
-    joint: str
-    factor: float | None
-    value: float
-    error: float
-    unit: str
-    explanation: str
 
 
 @dataclass(frozen=True)

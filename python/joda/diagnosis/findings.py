@@ -5,8 +5,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from joda.diagnosis.corrections import Correction
-from joda.diagnosis.selection import Verdict
 from joda.errors import JodaError
 from joda.files import read_json
 from joda.plain import plain
@@ -15,6 +13,38 @@ from joda.scenes.contacts import Contact
 NO_SIZE = 0.025
 """Size of an effect, in its standard deviations, up to which it is none; that of one which is seen
 from afar only is a thirtieth (`joda.diagnosis.uncertainty`)."""
+Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
+OfModel = Literal[
+    "mass", "inertia", "gravity", "center_of_mass", "damping", "frictionloss", "stiffness"
+]
+OfMeasurement = Literal[
+    "actuator_gain", "time_delay", "force_scale", "force_offset", "position_offset"
+]
+Parameter = OfModel | OfMeasurement
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A number of the model or of the measurement that the runs contradict.
+
+    Attributes:
+        parameter: the joint's attribute in MJCF, or what of its body, its actuator or the
+            measurement it is.
+        joint: its name.
+        factor: the right value over the model's; None where that is zero.
+        value: the right one.
+        error: its standard error.
+        unit: of both.
+        explanation: for a person.
+    """
+
+    parameter: Parameter
+    joint: str
+    factor: float | None
+    value: float
+    error: float
+    unit: str
+    explanation: str
 
 
 @dataclass(frozen=True)

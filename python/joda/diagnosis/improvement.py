@@ -7,9 +7,9 @@ from joda.diagnosis.adding import Error, add_effect, error
 from joda.diagnosis.applied_corrections import AppliedCorrections
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibration
-from joda.diagnosis.corrections import OFF, Corrected, Correction, corrected, corrections, numbers
+from joda.diagnosis.corrections import OFF, Corrected, corrected, corrections, numbers
 from joda.diagnosis.departures import FAITHFUL, Departures
-from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.findings import Correction, Diagnosis, Finding
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.pair_search import pairs
 from joda.diagnosis.shape_refinement import refitted

@@ -5,16 +5,14 @@ What the fits leave is the `Evidence`, every number that decides on it is one of
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from joda.diagnosis.baseline import Baseline
+from joda.diagnosis.findings import Verdict
 from joda.diagnosis.hypotheses.base import KNOWN_LAW
 from joda.diagnosis.search import WORST, Ranking, rescaled
 from joda.estimation.estimator import SegmentEstimator, excess
-
-Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from joda.diagnosis.corrections import (
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
 from joda.diagnosis.experiments import Model, means_of, next_experiment, there_and_back
-from joda.diagnosis.findings import Diagnosis, Finding
+from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.horizons import HorizonSearch, looked
@@ -31,7 +31,7 @@ from joda.diagnosis.phrases import explained
 from joda.diagnosis.plausible import unseen_place
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.search import Progress, Ranking
-from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection, Verdict, weigh
+from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection, weigh
 from joda.diagnosis.summary import BOUNCY, SAME, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.estimation.base_model import segments_for, usable

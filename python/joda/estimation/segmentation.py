@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from joda.estimation.segments import GRID, LOOSE, Array, Integers, Segments, rows_of
 from joda.measured import smoothing
-from joda.measured.failing import STOP
-from joda.measured.runs import Run, held, known
+from joda.measured.runs import STOP, Run, held, known
 
 SHORTEST, LONGEST = 0.1, 0.5
 """Of segments, s, unless the joint goes through its range in less than `QUICK` of the shortest."""

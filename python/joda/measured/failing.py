@@ -12,7 +12,7 @@ from joda.measured.failing_intervals import BINS, failing_intervals
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.measured.replay import Window
-from joda.measured.runs import Run
+from joda.measured.runs import STOP, Run
 
 Array = NDArray[np.float64]
 By = Literal["position", "velocity", "direction", "time", "load"]
@@ -40,8 +40,6 @@ FORCE = 8
 COLUMNS = 13
 KNOCK = 12
 """Column of the rows: whether the joint is at an end of its range in the window."""
-STOP = 0.004
-"""How near an end of the range, in normalised position, counts as touching it, beside noise."""
 MOSTLY = 0.8
 """Part of what is beyond the noise at ends from which speed, direction, time and load are told by
 other windows alone: a knock has all of these, but by its place."""

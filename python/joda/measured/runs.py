@@ -17,6 +17,9 @@ from joda.scenes.actuators import Drive
 
 Array = NDArray[np.float64]
 
+STOP = 0.004
+"""How near an end of the range, in normalised position, counts as touching it, beside noise."""
+
 COLUMNS = ("time", "position", "velocity", "force")
 LEAST = 4
 """Fewest samples that make a run or a curve."""
