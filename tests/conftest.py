@@ -1,5 +1,6 @@
-"""Sweeps: of many cases of one test, and of the tests that take long, some are drawn anew in every
-session; `--whole` runs all. And the random numbers of tests that ask for them (`rng`)."""
+"""Sweeps: of many cases of one test, and of the tests that take long or are slow, some are drawn
+anew in every session; `--whole` runs all. And the random numbers of tests that ask for them (`rng`).
+"""
 
 import os
 import random
@@ -14,8 +15,8 @@ sys.path[:0] = [str(Path(__file__).parent / name) for name in ("helpers", "bench
 # tests run side by side: threads within matrix products would only be in each other's way
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SEED = "JODA_SWEEPS"
-LONG, FEW = 0.05, 10
-"""Part of the long tests that a session of more than so many files draws."""
+LONG, SLOW, FEW = 0.05, 1 / 3, 10
+"""Part of the long tests, and of the slow ones, that a session of more than so many files draws."""
 
 
 @pytest.fixture
@@ -40,6 +41,7 @@ def pytest_configure(config):
         "markers",
         "long(group): of the tests that take long a session draws a part, groups as a whole",
     )
+    config.addinivalue_line("markers", "slow: of the tests that take some time it draws more")
     os.environ.setdefault(SEED, str(secrets.randbits(32)))  # the same in every worker
 
 
@@ -50,15 +52,18 @@ def pytest_report_header(config):
 def pytest_collection_modifyitems(config, items):
     if config.getoption("--whole"):
         return
-    sweeps, long = defaultdict(list), defaultdict(list)
+    sweeps, long, slow = defaultdict(list), defaultdict(list), defaultdict(list)
     for item in items:
         if mark := item.get_closest_marker("sweep"):
             count, *group = mark.args
             sweeps[group[0] if group else item.nodeid.partition("[")[0], count].append([item])
         if mark := item.get_closest_marker("long"):
             long[mark.args[0] if mark.args else item.nodeid].append(item)
+        if item.get_closest_marker("slow"):
+            slow[item.nodeid.partition("[")[0]].append(item)
     if len({item.path for item in items}) > FEW:  # who asks for a file gets all of it
         sweeps["long", round(LONG * len(long))] = list(long.values())
+        sweeps["slow", round(SLOW * len(slow))] = list(slow.values())
     left = set()
     for (name, count), cases in sweeps.items():
         if len(cases) == len(items):  # they were asked for

@@ -30,6 +30,7 @@ def off(scene, law):
     return float(np.sqrt(np.mean(np.square(wrong))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", LAWS)
 def test_a_hidden_force_is_added(tmp_path, effect):
     gauged(tmp_path, LAWS[effect], noise=NOISE)

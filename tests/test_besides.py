@@ -39,6 +39,7 @@ def scene_with(folder, extra):
     return folder / "scene.xml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("named", ELEMENTS)
 def test_what_a_replay_leaves_out_is_said(named, tmp_path):
     runs = runs_of(door(), tmp_path, 3, 2)

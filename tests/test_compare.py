@@ -168,6 +168,7 @@ def test_a_whole_run_is_what_mujoco_steps(tmp_path):
     assert found.rmse == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_command_writes_numbers_a_picture_and_a_page(tmp_path):
     scene_of(door(), tmp_path)
     runs_of(door(BUMP), tmp_path, 1, 2)

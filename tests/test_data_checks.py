@@ -386,6 +386,7 @@ def test_a_mistake_is_found_and_named(kind, rng):
         assert suspicion.fatal == (kind in FATAL) or kind == "outside"
 
 
+@pytest.mark.slow
 def test_a_good_run_raises_no_suspicion(rng):
     raised = []
     for _ in range(5 * COUNT):

@@ -150,6 +150,7 @@ def test_what_is_held_stays_while_all_else_is_fitted(rubbing):
     assert one.unseen < trials.tried(rubbing.profile).unseen
 
 
+@pytest.mark.slow
 def test_a_number_that_the_runs_contradict_is_told(tmp_path, rng):
     """The model's friction is three times too large, and the drag is missing."""
     measured = thrown(tmp_path, rng, 3, drag=0.02, friction=FRICTION / 3)
@@ -160,6 +161,7 @@ def test_a_number_that_the_runs_contradict_is_told(tmp_path, rng):
     assert f"native friction {FRICTION:g} → 0.01" in added_effect.departs.changed
 
 
+@pytest.mark.slow
 def test_an_effect_gets_no_credit_for_numbers_that_were_wrong(tmp_path, rng):
     """The model's friction and damping are several times too large, and nothing is missing."""
     runs = runs_of(door(), tmp_path, int(rng.integers(2**31)), 4)

@@ -21,6 +21,7 @@ def test_a_true_model_is_adequate(tmp_path):
     assert said(tmp_path, lambda s, d: 0 * s).verdict == "adequate"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", LAWS)
 def test_a_hidden_force_is_named(tmp_path, effect):
     found = said(tmp_path, LAWS[effect])
@@ -45,6 +46,7 @@ def test_one_direction_only_names_a_resistance_and_a_force(tmp_path):
     assert found.next_experiment == "Measure the way back too, as slowly."
 
 
+@pytest.mark.slow
 def test_uneven_friction_does_not_decide_what_is_named(tmp_path):
     """A latch on a part of the range, beside forces that are many times the gauge's noise."""
     found = said(
@@ -90,6 +92,7 @@ def test_what_changes_from_sample_to_sample_clears_nothing(tmp_path):
         assert told.verdict != "adequate", kind
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [15, 40, 150])
 def test_curves_of_a_true_model_are_cleared(tmp_path, samples):
     found = [compared(tmp_path, lambda s, d: 0 * s, samples=samples) for _ in range(40)]

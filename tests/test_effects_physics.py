@@ -184,6 +184,7 @@ def test_dahls_force_decays_to_its_bound_over_distance(tmp_path, direction):
     assert np.abs(np.array(force) - exact).max() < 2e-3 * bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.5, 0.95])
 @pytest.mark.parametrize(
     "effect",

@@ -117,6 +117,7 @@ def test_a_small_fault_under_a_force_is_not_cleared(tmp_path):
     assert not right.adequacy.adrift
 
 
+@pytest.mark.slow
 # --- of a joint
 def test_a_true_model_follows_its_free_runs(tmp_path, rng):
     told = []

@@ -50,6 +50,7 @@ def test_the_true_model_misses_a_null_by_the_noise():
     assert true_error(case) == pytest.approx(case.noise, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(2))
 def test_in_mujoco_the_true_profile_moves_as_in_the_simulator(number):
     """Effects of the plugin against laws, steps and friction that were written apart from it."""

@@ -541,6 +541,7 @@ def pushed_slowly() -> Log:
     return Log(t, q + 1e-4 * np.random.default_rng(3).normal(size=len(t)), force)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ODD)
 def test_what_is_unusual_but_right_raises_no_doubt(name, tmp_path):
     xml, make = ODD[name]

@@ -91,6 +91,7 @@ def test_an_end_whose_speeds_tell_that_it_is_no_bouncier_is_not_tried(tmp_path, 
     assert set(baseline.impacts) == sides
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("high", "restitution"), [(0.6, True), (0.13, False)])
 def test_a_stop_of_another_stiffness_is_not_taken_for_a_bouncy_one(tmp_path, high, restitution):
     """The joint's stops are rigid; the model's yield for a third of a segment."""

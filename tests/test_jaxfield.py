@@ -205,6 +205,7 @@ def test_gradients_by_control_values_lie_between_the_one_sided_differences(part,
         assert low <= float(by.y[0, k]) <= high or flat
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("combine", ["sum", "max"])
 def test_gradients_by_everything_are_central_differences(combine):
     first = Component(interval=(0.1, 0.8), x=(0, 0.3, 0.5, 0.9, 1), y=(1, 2, 1.5, -3, 0.5))

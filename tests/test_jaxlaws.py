@@ -147,6 +147,7 @@ def test_a_joint_flies_through_its_play_and_shares_its_momentum_with_the_load():
     assert passage.side == -1
 
 
+@pytest.mark.slow
 def test_a_learned_table_is_numpys_and_filling_changes_nothing():
     rng = np.random.default_rng()
     for _ in range(3):

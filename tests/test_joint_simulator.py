@@ -73,6 +73,7 @@ def assert_same(found, profile, model, forces, within=1e-7):
 # --- the engine
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
 @pytest.mark.parametrize("number", range(len(templates())), ids=sorted(templates()))
 def test_a_template_moves_under_random_forces_as_in_the_engine(number, path):

@@ -14,6 +14,7 @@ WIDE = (-1e6, 1e6)
 FRICTION = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("solver", "integrator"), [*COMBINATIONS, *((s, "RK4") for s in SOLVERS)])
 @pytest.mark.parametrize("ratio", 10.0 ** np.arange(-4, 5))
 def test_terminal_speed_is_force_over_damping(solver, integrator, ratio):

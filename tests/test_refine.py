@@ -270,6 +270,7 @@ BARE = """<mujoco>
 </mujoco>"""
 
 
+@pytest.mark.slow
 def test_a_force_of_the_other_sign_bends_nothing(tmp_path):
     done = command(tmp_path, *planted_runs(tmp_path, -1.0), joint="joint")
     assert (done.returncode, done.stdout) == (2, "")

@@ -102,6 +102,7 @@ def test_a_curve_and_an_actuator_are_set_right_too():
     assert wrong.driving(None) is None
 
 
+@pytest.mark.slow
 def test_compare_replays_with_what_is_wrong_set_right(tmp_path, rng):
     wrong = drawn(rng)
     model, file = tmp_path / "arm.xml", tmp_path / "arm.corrections.json"

@@ -105,6 +105,7 @@ def test_a_joint_in_c_moves_as_the_engine_with_the_plugin(tmp_path, servo):
         assert path[k] == pytest.approx(data.qpos[0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_driven_run_is_replayed_under_its_command(tmp_path):
     arm = Arm()
     runs = arm.logs(tmp_path)

@@ -152,6 +152,7 @@ def test_the_force_of_the_others_is_that_of_a_planar_arm():
     assert np.ptp(found) > 1.0
 
 
+@pytest.mark.slow
 def test_each_joint_is_replayed_among_the_others(tmp_path):
     runs = logs(tmp_path)
     for joint in ("shoulder", "elbow"):

@@ -101,6 +101,7 @@ def test_a_folder_that_may_not_be_written(command, closed, forked):
     check_refusal(ended, closed, before, "Permission denied")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [line for line in WRITING if not line.startswith(SLOW)])
 def test_a_full_disk(command, full, forked):
     before = contents(full)

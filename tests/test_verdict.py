@@ -219,6 +219,7 @@ def test_one_way_friction_and_a_force_are_both_named_if_neither_is_sure(extra, t
     assert told.next_experiment == "Measure the way back too, as slowly."
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("times", "asked_for"), [(0.3, False), (0.1, True), (0.001, True)])
 def test_one_factor_on_a_curve_is_told(times, asked_for, tmp_path):
     """Newtons without their lever arm, or kN·m: all that is measured is off by one factor."""
@@ -227,6 +228,7 @@ def test_one_factor_on_a_curve_is_told(times, asked_for, tmp_path):
     assert asked_for or "All by one factor, about 0.3:" in told.summary, told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [(1,), (1, -1)])
 @pytest.mark.parametrize("times", [0.1, 0.05])
 def test_an_error_of_all_the_force_is_not_called_small(times, way, tmp_path):

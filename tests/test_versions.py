@@ -110,6 +110,7 @@ def test_the_plugins_physics(python):
     assert passed and int(passed[1]) > 250
 
 
+@pytest.mark.slow
 def test_what_a_version_lacks_is_refused_in_a_sentence(python, tmp_path):
     if python.version == "3.17.0":
         pytest.skip("it has all that joda needs")

@@ -54,6 +54,7 @@ def both(**own) -> dict[str, Profile]:
 STEEL = {"arm": flat("arm", friction=0.2, damping=0.05), "drawer": flat("drawer", 2.0, 3.0)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "cone"), CONFIGURATIONS, ids="{}".format)
 def test_random_profiles_move_as_with_the_plugin(integrator, cone):
     """Of 300 at least 95 % are that close (docs/warp.md); of these 60, drawn anew, at least 85 %:
