@@ -1,5 +1,5 @@
 """Sweeps: of many cases of one test, and of the tests that take long or are slow, some are drawn
-anew in every session; `--whole` runs all. And the random numbers of tests that ask for them (`rng`).
+anew in every session; `--whole` runs all. And random numbers for tests that ask for them (`rng`).
 """
 
 import os
