@@ -65,7 +65,7 @@ def summarised(
             "but with it windows held out of the fit are missed as much."
         )
     after = first.held_out_error_after
-    far = after > FAR * floor and after > PART * first.held_out_error_before
+    far = far_off(first, floor)
     blind = first.held_out_error_before < floor
     probability = _sum(first, selection) if others else first.probability
     head = "Best guess:" if blind or far or doubt or probability <= EVEN else "The model lacks"
@@ -74,6 +74,13 @@ def summarised(
         why = SAME if one_way else ": these data cannot tell which"
         return f"{head} {either}{why}.{more}"
     return f"{head} {name} ({likely}).{more}"
+
+
+def far_off(found: Finding, floor: float) -> bool:
+    """Whether what was held out is still missed by many noises with an effect, and by more than a
+    small part of what it was missed by without."""
+    after = found.held_out_error_after
+    return after > FAR * floor and after > PART * found.held_out_error_before
 
 
 def _sum(first: Finding, selection: Selection) -> float:

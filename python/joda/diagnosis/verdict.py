@@ -32,7 +32,7 @@ from joda.diagnosis.plausible import unseen_place
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.search import Progress, Ranking
 from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection, weigh
-from joda.diagnosis.summary import BOUNCY, SAME, other_unit, summarised
+from joda.diagnosis.summary import BOUNCY, SAME, far_off, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.estimation.base_model import segments_for, usable
 from joda.measured.curves import curves_verdict, failing_force
@@ -225,6 +225,7 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
     first = findings[0]
     helps = first.held_out_error_after < first.held_out_error_before
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
+    hardly |= far_off(first, measured.floor)
     if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
         # nor do segments held out know of anything
         return _adequate(measured, first_ranking, looks.free)
