@@ -8,6 +8,8 @@ from joda.measured.reading import Measured
 
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""
+FALLEN = 0.95
+"""Part of an error held out that an effect leaves at most, where that must tell of it."""
 FAR, PART = 10.0, 0.1
 """Noises by which segments held out may be missed with what is said to be missing; or part of what
 they are missed by without it."""
@@ -55,11 +57,10 @@ def summarised(
     name = phrases.named(first.effect)
     others = " or ".join(map(phrases.named, first.indistinguishable_from))
     either = f"{name} or {others}" if others else name
-    helps = first.held_out_error_after < first.held_out_error_before
     if selection.verdict == "unexplained":
         return _unexplained(either if one_way else name, selection, one_way, restitution)
     likely = f"probability {phrases.percent(first.probability)}"
-    if not helps:
+    if not helps(first, floor):
         return (
             f"Something is missing that no known effect explains. Best guess: {name} ({likely}); "
             "but with it windows held out of the fit are missed as much."
@@ -74,6 +75,14 @@ def summarised(
         why = SAME if one_way else ": these data cannot tell which"
         return f"{head} {either}{why}.{more}"
     return f"{head} {name} ({likely}).{more}"
+
+
+def helps(found: Finding, floor: float) -> bool:
+    """Whether what was held out is missed by less with an effect; where it is missed by less than
+    the noise even without, whether not by clearly more: there its error is noise with and without.
+    """
+    before, after = found.held_out_error_before, found.held_out_error_after
+    return after < before or (before < floor and FALLEN * after < before)
 
 
 def far_off(found: Finding, floor: float) -> bool:

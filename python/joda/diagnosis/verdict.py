@@ -32,7 +32,7 @@ from joda.diagnosis.plausible import unseen_place
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.search import Progress, Ranking
 from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection, weigh
-from joda.diagnosis.summary import BOUNCY, SAME, far_off, other_unit, summarised
+from joda.diagnosis.summary import BOUNCY, FALLEN, SAME, far_off, helps, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
 from joda.estimation.base_model import segments_for, usable
 from joda.measured.curves import curves_verdict, failing_force
@@ -44,8 +44,6 @@ from joda.measured.whiteness import strays
 from joda.profile import Profile
 from joda.threads import one_blas_thread
 
-FALLEN = 0.95
-"""Part of an error held out that an effect leaves at most, where only a second look knows of it."""
 TOO_SHORT = "The measurements are too short to tell anything."
 RECORD_MORE = (
     "Record more: move the joint through its whole range in both directions, slowly and fast, with "
@@ -223,13 +221,12 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
     findings = tuple(every[k] for k in sized)
     profile = ranking.candidates[sized[0]].written(ranking.baseline.base)
     first = findings[0]
-    helps = first.held_out_error_after < first.held_out_error_before
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
     hardly |= far_off(first, measured.floor)
     if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
         # nor do segments held out know of anything
         return _adequate(measured, first_ranking, looks.free)
-    verdict = selection.verdict if helps else "unexplained"
+    verdict = selection.verdict if helps(first, measured.floor) else "unexplained"
     base, candidate = ranking.baseline.base, ranking.candidates[sized[0]]
     doubt = one_factor(base, candidate) or other_unit(measured)
     summary = summarised(first, selection, measured.floor, one_way, ranking.restitution, doubt)
