@@ -50,7 +50,7 @@ def pushed(scene, rng, number, path):
     """A run of the wheel pushed to and fro, as an encoder sees it."""
     model = mujoco.MjModel.from_xml_path(str(scene))
     data, rows, pace = mujoco.MjData(model), [], rng.uniform(0.6, 1.2)
-    for k in range(2500):
+    for k in range(3000):
         push = 0.35 * np.sin(pace * data.time + number) + 0.15 * np.sin(3.1 * pace * data.time)
         if k % 4 == 0:
             data.qfrc_applied[0] = push
@@ -68,7 +68,7 @@ def test_it_is_diagnosed_and_added_without_code(tmp_path, templates, rng):
     )
     (tmp_path / "plain.xml").write_text(SCENE)
     attach(tmp_path / "plain.xml", true, tmp_path / "true.xml", native="keep")
-    runs = [tmp_path / f"run{k}.csv" for k in range(3)]
+    runs = [tmp_path / f"run{k}.csv" for k in range(4)]
     for number, path in enumerate(runs):
         pushed(tmp_path / "true.xml", rng, number, path)
     line = tmp_path / "plain.xml", "wheel", runs

@@ -35,6 +35,8 @@ BARRIER = (0.2, 3.0, 0.02, 0.05, 12.0)
 """Of a latch, in units of its hold."""
 RATIO = (0.0, 3.0, 0.02)
 """Of a template's curves: strength of each in units of the first one's."""
+WIDER = (0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.9, 1.0)
+"""Widths at which such a one is tried besides: where its force changes sign, fits find no other."""
 CENTRES = ((0.5,), (0.27, 0.73))
 """Of one well, and of two, in their interval; their outer flanks run out more slowly."""
 LOCAL = {
@@ -295,7 +297,7 @@ def _drawn(units: Units, name: str, template: Template) -> Hypothesis:
 
     bounds, tries = places("anywhere")
     others: Bounds = [RATIO] * (len(curves) - 1)
-    tries += [(0.0, 1.0)]
+    tries += [(float(a), float(a + w)) for w in WIDER for a in np.arange(0, 1.001 - w, 0.05)]
     return Hypothesis(
         name,
         "both",
@@ -308,6 +310,7 @@ def _drawn(units: Units, name: str, template: Template) -> Hypothesis:
         len(bounds),
         neg_log_prior=RARE,
         misfit_tolerance=KNOWN_SHAPE,
+        kept=3,
     )
 
 
