@@ -45,7 +45,7 @@ def _graph(names: Mapping[Path, str]) -> Graph:
     }
     for path, name in names.items():
         if name in out:
-            wanted = {part for imported in _imports(path) for part in _names(imported)}
+            wanted = {part for imported in imports(path) for part in _names(imported)}
             out[name] |= {one for one in wanted & out.keys() if one != name}
     return {name: frozenset(others) for name, others in out.items()}
 
@@ -56,7 +56,7 @@ def _names(imported: str) -> tuple[str, ...]:
     return parts[0], ".".join(parts[-2:])
 
 
-def _imports(path: Path) -> set[str]:
+def imports(path: Path) -> set[str]:
     """Modules of joda that a file imports at run time, without the package's own name."""
     tree = ast.parse(path.read_text("utf-8"))
     typing = {

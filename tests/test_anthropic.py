@@ -661,7 +661,7 @@ def test_failures_in_a_batch_are_those_of_their_asks(server, tmp_path):
     names = list(outcomes)
     by_wish = {f"wish of {name}": outcome for name, outcome in outcomes.items()}
     server.results = lambda entry: next(
-        outcome for requirement, outcome in by_wish.items() if requirement in texts(entry["params"])
+        outcome for wish, outcome in by_wish.items() if wish in texts(entry["params"])
     )
     asks = [Ask(name, task(description=f"wish of {name}"), []) for name in names]
     got = batch(server, asks, tmp_path / "batch.json")

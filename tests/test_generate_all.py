@@ -67,11 +67,11 @@ def answered(entry):
 def test_every_joint_is_as_if_generated_alone(models, tmp_path):
     done = generate_all(models, tmp_path / "out")
     assert list(done) == NAMES
-    joint_model = generate(models / "kitchen" / "oven.xml", "door", tmp_path / "single")
+    by_itself = generate(models / "kitchen" / "oven.xml", "door", tmp_path / "single")
     made = done["kitchen/oven/door"]
     assert made.folder == tmp_path / "out" / "kitchen" / "oven" / "door"
     for name in ("proposal.json", "composed.json"):
-        assert (made.folder / name).read_bytes() == (joint_model.folder / name).read_bytes()
+        assert (made.folder / name).read_bytes() == (by_itself.folder / name).read_bytes()
     for each in done.values():
         mujoco.MjModel.from_xml_path(str(each.folder / "scene.xml"))
 

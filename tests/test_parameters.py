@@ -41,8 +41,8 @@ def test_whatever_is_allowed_keeps_signs_and_rises_and_falls(name):
     rng = np.random.default_rng(0)
     for _ in range(20):
         G, h = p.constraints.G, p.constraints.h
-        requirement = rng.normal(0, 0.5, len(p.start))
-        theta = p.start + bounded_step(np.eye(len(requirement)), requirement, G, h - G @ p.start)
+        wish = rng.normal(0, 0.5, len(p.start))
+        theta = p.start + bounded_step(np.eye(len(wish)), wish, G, h - G @ p.start)
         after = p.written(theta)
         for channel in CHANNELS:
             pairs = (getattr(q.channels, channel).components for q in (profile, after))

@@ -1,6 +1,7 @@
 """Effect templates: equivalent joint-level behaviours as prototype curves, one JSON file each."""
 
 from collections.abc import Sequence
+from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Self
@@ -79,14 +80,20 @@ def read_templates(folders: Sequence[str | Path] = ()) -> dict[str, Template]:
     Raises:
         JodaError: a folder does not exist, or a file is no template.
     """
-    with as_file(files("joda") / "templates") as bundled:
-        paths = sorted(bundled.glob("*.json"))
+    paths = []
     for folder in map(Path, folders):
         if not folder.is_dir():
             raise JodaError(f"{folder}: no such folder of templates.")
         paths += sorted(folder.glob("*.json"))
-    templates = {path.stem: _read(path) for path in paths}
+    templates = _library() | {path.stem: _read(path) for path in paths}
     return dict(sorted(templates.items()))
+
+
+@cache
+def _library() -> dict[str, Template]:
+    """The library's own, read once."""
+    with as_file(files("joda") / "templates") as bundled:
+        return {path.stem: _read(path) for path in sorted(bundled.glob("*.json"))}
 
 
 def _read(path: Path) -> Template:

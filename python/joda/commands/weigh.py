@@ -16,7 +16,7 @@ from joda.scenes.model import find_joint, joint_name, load, load_model, moves_wi
 
 
 @dataclass(frozen=True)
-class Selection:
+class Weighed:
     """What was made of a part's mass.
 
     Attributes:
@@ -42,7 +42,7 @@ def weigh(
     output: str | Path,
     *,
     force: bool = False,
-) -> Selection:
+) -> Weighed:
     """Writes a model in which what a joint moves has an estimated mass.
 
     Masses and inertias of all bodies that the joint moves are multiplied by one factor; centres of
@@ -90,7 +90,7 @@ def weigh(
     found = float(after.body_subtreemass[after.jnt_bodyid[find_joint(after, joint)]])
     if not np.isclose(found, estimate.mass, rtol=1e-3):
         raise JodaError(f"{target}: MuJoCo wrote {found:.3g} kg, not {estimate.mass:.3g} kg.")
-    return Selection(before, estimate, doubts, target)
+    return Weighed(before, estimate, doubts, target)
 
 
 def _written(spec: mujoco.MjSpec, source: Path, folder: Path) -> bytes:

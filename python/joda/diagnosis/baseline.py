@@ -181,5 +181,5 @@ def fit_baseline(
         if explained and fit_so.loss < fit.loss - CLEARLY:
             base, fit, given = yielding, fit_so, given_so
     every = hypotheses(units_of(segments, measured), measured.templates, measured.profile)
-    begun = initial_points(estimator.coarser, base.coarser(), given, fit)
-    return Baseline(estimator, base, measured.joint_model, fit, begun, tuple(every))
+    points = initial_points(estimator.coarser, base.coarser(), given, fit)
+    return Baseline(estimator, base, measured.joint_model, fit, points, tuple(every))

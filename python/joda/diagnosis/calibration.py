@@ -202,12 +202,8 @@ class _Search:
     def fitted(self, names: tuple[NuisanceName, ...]) -> Fit:
         """Some of the numbers, from the model as it was fitted and as it is."""
         if names not in self.fits:
-            own, base, estimator = (
-                self.every.coarser().only(names),
-                self.baseline.base,
-                self._estimator,
-            )
-            none = np.append(base.unknowns.mean, np.zeros(len(names)))
+            own, estimator = self.every.coarser().only(names), self._estimator
+            none = np.append(self.baseline.base.unknowns.mean, np.zeros(len(names)))
             fits = [self.near(names), self._from(own, none, estimator.segments.start)]
             refits = (estimator.refit(own.make, own.unknowns, one) for one in fits)
             self.fits[names] = min(refits, key=_loss)

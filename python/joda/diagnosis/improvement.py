@@ -128,10 +128,10 @@ def _numbers_first(parts: Parts, before: Error, progress: Progress) -> Step | No
     """The numbers of a driven joint set right before anything is asked: few models know them, and a
     diagnosis of a model that is far off takes as long as the next one."""
     progress("the model's own numbers")
-    begun = fit_baseline(parts[0])
-    found = numbers(begun)
-    right = corrected(begun, found, OFF, begun.fit.x)
-    own = corrections(found, begun.base.profile.joint, OFF)
+    baseline = fit_baseline(parts[0])
+    found = numbers(baseline)
+    right = corrected(baseline, found, OFF, baseline.fit.x)
+    own = corrections(found, baseline.base.profile.joint, OFF)
     return _set_right(parts, before, right, own, progress) if right else None
 
 
