@@ -47,6 +47,7 @@ def test_a_hidden_force_is_added(tmp_path, effect):
     json.dumps(found.as_json())
 
 
+@pytest.mark.slow
 def test_what_does_not_help_is_not_added(tmp_path):
     gauged(tmp_path, lambda s, d: 0 * s, noise=NOISE)
     model, curve, said = (tmp_path / name for name in ("model.xml", "curve.csv", "said.json"))

@@ -31,6 +31,7 @@ def unclear(tmp_path):
     return compare(tmp_path / "model.xml", "joint", [tmp_path / "held_out3.csv"])
 
 
+@pytest.mark.slow
 def test_an_error_of_many_noises_is_never_an_all_clear(unclear):
     assert unclear.rmse > 10 * unclear.noise_floor
     assert unclear.adequacy.verdict == "beyond_noise"
@@ -38,6 +39,7 @@ def test_an_error_of_many_noises_is_never_an_all_clear(unclear):
     assert "times the noise" in said(unclear)
 
 
+@pytest.mark.slow
 def test_where_it_fails_is_found_in_the_whole_run_too(unclear):
     assert {"direction", "load", "time"} <= {place.by for place in unclear.failing}
 
@@ -105,6 +107,7 @@ def test_a_run_of_unknown_force_is_named_with_its_reason(tmp_path):
     assert found.adequacy.verdict != "within_noise"
 
 
+@pytest.mark.slow
 def test_what_changes_its_sign_is_not_blamed_on_a_direction(tmp_path, seed=5):
     """A bump that pushes both ways while the joint moves in one direction."""
     both = door(flat(1.5, 0.2, 0.4), flat(-1.5, 0.6, 0.8))
@@ -135,6 +138,7 @@ def test_two_long_runs_of_signs_are_a_pattern_and_random_ones_rarely():
     assert residual_pattern(rows_of(np.ones(WINDOWS - 1))) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["spring_return_to_high_end", "quadratic_damping"])
 def test_a_right_model_of_noisy_free_runs_is_not_blamed_for_their_starts(tmp_path, effect):
     """Noise of 0.8 % of the range: a velocity that is lost in it is not taken for zero."""

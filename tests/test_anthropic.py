@@ -601,6 +601,7 @@ def test_proposers_say_whether_they_take_batches(server):
     assert not isinstance(Offline(), BatchProposer)
 
 
+@pytest.mark.slow
 def test_a_request_is_the_same_bytes_in_another_process(server, tmp_path):
     """By its bytes a batch's request is known again: the pictures in it are drawn anew."""
     code = """

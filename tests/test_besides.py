@@ -50,6 +50,7 @@ def test_what_a_replay_leaves_out_is_said(named, tmp_path):
     assert "no fault of the model" not in " ".join(sentences(found))
 
 
+@pytest.mark.slow
 def test_other_tendons_and_joda_s_own_are_none(tmp_path):
     runs = runs_of(door(), tmp_path, 3, 1)
     wheel = EQUAL.format('<joint joint1="wheel" polycoef="0 0 0 0 0"/>')
@@ -76,6 +77,7 @@ def own_runs(folder, text, sigma=3e-4):
     return paths
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("flag", "own"),

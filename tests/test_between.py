@@ -39,6 +39,7 @@ def quiet(theta, misfit) -> None:
     pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
     [
@@ -105,6 +106,7 @@ def test_what_misses_the_windows_is_worse():
     assert not joint.worse(joint.fit(true, 4, quiet), true)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("iterations", [1, 2, 7, 12])
 def test_it_does_not_take_more_iterations_than_it_may(iterations):
     joint = between(planted("constant_damping_hinge", 0))

@@ -86,6 +86,7 @@ def check(measured, found, name, right):
     assert not told
 
 
+@pytest.mark.slow
 def test_a_mass_that_is_off_is_told(tmp_path, rng):
     factor = float(rng.choice([rng.uniform(0.5, 0.75), rng.uniform(1.3, 1.6)]))
     check(*found_of(tmp_path, rng, mass=factor), "mass", factor)
@@ -103,6 +104,7 @@ def test_a_late_log_is_told(tmp_path, rng):
     check(*found_of(tmp_path, rng, delay=late), "time_delay", late)
 
 
+@pytest.mark.slow
 def test_what_is_smaller_than_the_noise_is_told_too(tmp_path, rng):
     late = round(float(rng.uniform(0.010, 0.014)), 3)
     measured, found = found_of(tmp_path, rng, beside=True, delay=late, noise=20 * SIGMA)
@@ -118,16 +120,19 @@ def test_an_encoders_zero_is_told(tmp_path, rng):
     check(*found_of(tmp_path, rng, zero=zero), "position_offset", zero)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(2, "one number")
 def test_an_offset_of_the_force_is_told(tmp_path, rng):
     offset = float(rng.choice([-1, 1]) * rng.uniform(0.05, 0.12))
     check(*found_of(tmp_path, rng, offset=offset), "force_offset", offset)
 
 
+@pytest.mark.slow
 def test_of_runs_of_which_nothing_is_wrong_nothing_is_told(tmp_path, rng):
     assert found_of(tmp_path, rng)[1] is None
 
 
+@pytest.mark.slow
 def test_a_force_along_the_way_is_not_explained_by_numbers(tmp_path, rng):
     place = rng.uniform(-0.5, 0.5)
     _, found = found_of(
@@ -136,6 +141,7 @@ def test_a_force_along_the_way_is_not_explained_by_numbers(tmp_path, rng):
     assert found is None or not found.alone
 
 
+@pytest.mark.slow
 def test_a_number_that_is_trusted_fully_stays(tmp_path, rng):
     trust = {"mass": 0.0, "force_scale": 0.0}
     measured, found = found_of(tmp_path, rng, trust, mass=1.4)
@@ -144,6 +150,7 @@ def test_a_number_that_is_trusted_fully_stays(tmp_path, rng):
     assert found is None or not {"mass", "force_scale"} & set(found.names)
 
 
+@pytest.mark.slow
 def test_widths_are_those_told(tmp_path, rng):
     trust = {"mass": 0.05, "center_of_mass": 0.2, "frictionloss": 0.01, "damping": 0.0}
     measured, _ = found_of(tmp_path, rng, trust)

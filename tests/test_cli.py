@@ -90,6 +90,7 @@ def test_a_renderer_that_mujoco_does_not_know_is_one_sentence():
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.slow
 def test_what_is_printed_meets_a_full_disk_a_closed_pipe_and_an_old_terminal():
     command = [sys.executable, "-c", "from joda.cli import main; main()"]
     with open("/dev/full", "w") as full:

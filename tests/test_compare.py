@@ -81,6 +81,7 @@ def rng(seed):
     return np.random.default_rng(seed)
 
 
+@pytest.mark.slow
 def test_the_true_model_is_at_the_noise_and_fails_nowhere(tmp_path, seed):
     found = compare(scene_of(door(), tmp_path), "joint", runs_of(door(), tmp_path, seed))
     assert found.noise_floor == pytest.approx(5e-4 * SPAN, rel=0.1), seed
@@ -89,6 +90,7 @@ def test_the_true_model_is_at_the_noise_and_fails_nowhere(tmp_path, seed):
     assert all(place.error < 6 * found.noise_floor for place in found.failing), seed
 
 
+@pytest.mark.slow
 def test_a_hidden_bump_is_found_where_it_is_and_as_large_as_it_is(tmp_path, seed):
     found = compare(scene_of(door(), tmp_path), "joint", runs_of(door(BUMP), tmp_path, seed))
     assert found.rmse_window > 3 * found.noise_floor, seed
@@ -102,6 +104,7 @@ def test_a_hidden_bump_is_found_where_it_is_and_as_large_as_it_is(tmp_path, seed
     assert any("too much towards +q" in sentence for sentence in sentences(found))
 
 
+@pytest.mark.slow
 def test_missing_damping_fails_by_velocity_in_both_directions(tmp_path, seed):
     found = compare(
         scene_of(door(damping=0.0), tmp_path),
@@ -189,6 +192,7 @@ def test_the_command_writes_numbers_a_picture_and_a_page(tmp_path):
     assert "c.json" in again.stderr
 
 
+@pytest.mark.slow
 def test_without_jax_it_works(tmp_path):
     scene_of(door(), tmp_path)
     runs_of(door(), tmp_path, 1, 1)
@@ -359,6 +363,7 @@ def test_a_curve_shows_a_missing_bump_where_it_is(tmp_path, rng):
         assert place.friction == pytest.approx(0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_runs_and_curves_together_and_curves_alone(tmp_path):
     scene = scene_of(door(), tmp_path)
     runs, curve = runs_of(door(), tmp_path, 1, 2), gauge(door(), tmp_path)
@@ -418,6 +423,7 @@ def test_too_few_samples_in_a_direction(tmp_path, position):
         compare(scene_of(door(), tmp_path), "joint", [tmp_path / "few.csv"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("files", ["gauge.csv", "run0.csv gauge.csv"])
 def test_the_command_takes_curves(tmp_path, rng, files):
     scene_of(door(), tmp_path)

@@ -53,6 +53,7 @@ def pushed(folder, rng, numbers, extra=lambda q: 0.0):
     return names
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1, "corrections")
 @pytest.mark.parametrize("wrong", [{}, {"damping": 1.6}, {"frictionloss": 0.5, "stiffness": 1.3}])
 def test_numbers_that_are_off_are_told_with_their_errors(tmp_path, rng, wrong):

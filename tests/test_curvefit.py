@@ -127,6 +127,7 @@ def test_what_curves_cannot_be_used_for(tmp_path, runs, fit, said):
     assert not (tmp_path / "b.xml").exists()
 
 
+@pytest.mark.slow
 def test_the_command_needs_no_jax_and_speaks_of_force(tmp_path):
     attached(tmp_path, profiles=door(pull=1.2))
     gauge(tmp_path, "c.csv", door())

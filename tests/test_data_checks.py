@@ -462,6 +462,7 @@ SHARES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", SHARES)
 def test_a_turned_force_is_told_whatever_the_force_mostly_overcomes(most, rng):
     for _ in range(COUNT // 2):

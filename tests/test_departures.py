@@ -127,6 +127,7 @@ def without_its_own(profile):
     return bare.with_component("friction", level(ADDED, FRICTION + RUBS))
 
 
+@pytest.mark.slow
 def test_a_number_that_need_not_vanish_stays(rubbing, monkeypatch):
     start = without_its_own(rubbing.profile)
     monkeypatch.setattr(adding, "starts", lambda *_: [start])
@@ -173,6 +174,7 @@ def test_an_effect_gets_no_credit_for_numbers_that_were_wrong(tmp_path, rng):
         assert added_effect.reason == OWN
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("near", [(0.55, 0.75), (0.05, 0.25)])
 def test_an_effect_that_acts_elsewhere_than_diagnosed_is_told(tmp_path, rng, near):

@@ -211,6 +211,7 @@ def test_a_true_model_is_adequate_and_nothing_is_added(tmp_path):
     assert not (tmp_path / "new.xml").exists()
 
 
+@pytest.mark.slow
 def test_curves_alone_are_diagnosed_and_beside_runs_ignored(tmp_path):
     case = draw(1, None)
     runs = write(case, tmp_path, count=1)
@@ -246,6 +247,7 @@ def mistaken(tmp_path):
 ADD = "add model.xml run1.csv --joint joint -o new.xml --diagnosis"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "words"),
     [

@@ -32,6 +32,7 @@ def test_a_hidden_force_is_named(tmp_path, effect):
     assert found.unit == "N·m"
 
 
+@pytest.mark.slow
 def test_asymmetric_friction_is_named_with_what_is_the_same(tmp_path):
     found = said(tmp_path, lambda s, d: -0.3 * (d > 0))
     names = [effect.effect for effect in found.effects[:2]]
@@ -68,6 +69,7 @@ def compared(folder: Path, law, **kind) -> Comparison:
     return compare(folder / "model.xml", "door", [folder / measured.curves[0].curve.name])
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(2)
 @pytest.mark.parametrize("per_click", [2.3, 3.0, 4.0])
 @pytest.mark.parametrize("apart", [0.0, 0.3])
@@ -83,6 +85,7 @@ def test_clicks_as_narrow_as_the_samples_are_no_noise(tmp_path, per_click, apart
     assert "leaves less than" not in told.summary
 
 
+@pytest.mark.slow
 def test_what_changes_from_sample_to_sample_clears_nothing(tmp_path):
     """Measured one way only, and either way at other places."""
     for kind in ({"ways": (1,)}, {"apart": 0.5}):
@@ -137,6 +140,7 @@ def test_what_either_way_tells_again_is_the_joints(tmp_path, wobbles):
     assert found.curves[0].noise_floor_force < 0.02
 
 
+@pytest.mark.slow
 def test_a_force_in_grams_is_doubted(tmp_path):
     measured = gauged(tmp_path, lambda s, d: -14 * d)
     assert any("in another unit" in note for note in measured.notes)

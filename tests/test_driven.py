@@ -131,6 +131,7 @@ def test_a_driven_joint_s_run_without_force_is_refused_unless_passive(tmp_path):
     assert found.rmse_window < 1.5 * found.noise_floor  # 50 N·m/rad would pull it to zero
 
 
+@pytest.mark.slow
 def test_with_a_force_the_actuator_s_own_is_not_added(tmp_path):
     model = write(tmp_path, ARM.format(actuator=SERVO), "arm.xml")
     for passive in (False, True):
@@ -176,6 +177,7 @@ def test_other_columns_are_ignored_in_silence(tmp_path):
     assert read_measured(model, "elbow", [run]).notes == ()
 
 
+@pytest.mark.slow
 def test_the_command_takes_passive(tmp_path):
     model = write(tmp_path, ARM.format(actuator=SERVO), "arm.xml")
     run = swung(tmp_path, forced=False)

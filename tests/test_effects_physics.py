@@ -324,6 +324,7 @@ def reference(load, friction, damping, seconds, h=1e-5):
 LOADS = {"light": behind(0.02, 0.87, 0.8), "heavy": behind(0.05, 0.25, 0.5)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", LOADS.values(), ids=LOADS)
 def test_a_load_behind_the_play_moves_as_compliant_flanks_let_it(tmp_path, load):
     expected = reference(load, 0.5, 0.3, 3.0)

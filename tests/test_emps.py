@@ -45,6 +45,7 @@ def runs(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_the_drives_friction_and_gain_are_found_from_its_volts(runs, tmp_path):
     factor = float(np.random.default_rng().uniform(0.7, 1.4))
     print(factor)  # shown where the test fails
@@ -59,6 +60,7 @@ def test_the_drives_friction_and_gain_are_found_from_its_volts(runs, tmp_path):
     assert 0 <= found["time_delay"].value < 0.005
 
 
+@pytest.mark.slow
 def test_volts_are_replayed_as_the_force_that_they_make(runs, tmp_path):
     (tmp_path / "emps.xml").write_text(MODEL.format(gear=GAIN))
     text = runs[0].read_text().replace("ctrl:drive", "force").split("\n")

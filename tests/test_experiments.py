@@ -249,6 +249,7 @@ def test_the_command_leaves_a_gallery_whose_commands_run(tmp_path):
     assert "there is no case 'door'; there are: lighter" in fails("experiments", "door")
 
 
+@pytest.mark.slow
 def test_it_works_where_nothing_can_render(tmp_path, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     done = experiments(["switch"], tmp_path, seeds=1)

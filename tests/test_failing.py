@@ -68,6 +68,7 @@ def test_a_force_that_explains_no_misfit_is_not_blamed():
     assert failing(uneven) and all(place.force is None for place in failing(uneven))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("friction", "spring", "rest", "mass"), [(0.3, 2, 0.1, 1.0), (1.2, 20, -0.3, 4.0)]
 )
@@ -95,6 +96,7 @@ SWINGS = """<mujoco><compiler angle="radian"/><option timestep=".001"/><worldbod
 </body></worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 def test_a_whole_run_that_no_constant_force_explains_blames_none(tmp_path):
     """A swing whose model is a little too heavy parts from it ever more: no window shows it."""
     path = write(tmp_path, SWINGS.format(mass=4.016), "model.xml")

@@ -153,6 +153,7 @@ def louder(measured, folder, rng, times):
     return read_measured(folder / "model.xml", "lid", files)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1, "free runs")
 @pytest.mark.parametrize("times", [1.08, 0.93])
 def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
@@ -167,6 +168,7 @@ def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
     assert "The model is adequate" not in said.summary
 
 
+@pytest.mark.slow
 def test_a_drag_is_no_friction(tmp_path, rng):
     """Over a range of speeds no friction stands in for it."""
     measured = thrown(tmp_path, rng, 3, drag=0.02 * INERTIA / 0.03)

@@ -117,6 +117,7 @@ def whole(folder):
     return History.read(folder / "history.json")
 
 
+@pytest.mark.slow
 def test_it_leaves_exactly_its_files(made):
     assert {path.name for path in made.folder.iterdir()} == FILES
     pictures = sorted(path.name for path in (made.folder / "pictures").iterdir())
@@ -347,6 +348,7 @@ def test_interrupted_and_resumed_it_gives_the_same_bytes(made, quick, tmp_path):
     assert [r.proposal for r in more.history.rounds] == [r.proposal for r in made.history.rounds]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["behaviour", "draw", "attach", "write_bytes", "write_text"])
 def test_interrupted_at_any_step_it_can_be_resumed(made, quick, tmp_path, monkeypatch, step):
     """In the second round, wherever the interruption falls; what it cost is kept."""
@@ -504,6 +506,7 @@ def test_after_a_refusal_it_can_be_resumed(joda, quick, server, tmp_path):
     assert whole(tmp_path / "out").complete
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_at_once_and_it_can_be_resumed(joda, server, tmp_path):
     server.script[:] = [reply(), "hang"]
     command = [sys.executable, "-c", "from joda.cli import main; main()", *map(str, FRIDGE)]

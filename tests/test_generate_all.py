@@ -156,6 +156,7 @@ def test_mistakes_are_sentences(models, tmp_path, monkeypatch, change, says):
     assert not Path("out").exists()
 
 
+@pytest.mark.slow
 def test_third_party_models_with_includes(tmp_path):
     folder = SHARED / "assets"
     if not folder.is_dir():
@@ -166,6 +167,7 @@ def test_third_party_models_with_includes(tmp_path):
     assert models == {"microwave", "wooden_cabinet", "calvin_table_D"}
 
 
+@pytest.mark.slow
 def test_rounds_of_all_joints_are_batches(server, models, tmp_path):
     server.results, server.looks = answered, 1
     told = []
@@ -180,6 +182,7 @@ def test_rounds_of_all_joints_are_batches(server, models, tmp_path):
     assert told[-1] == (3, 3, "done") and all(0 <= done <= total == 3 for done, total, _ in told)
 
 
+@pytest.mark.slow
 def test_interrupted_while_polling_it_goes_on_without_paying_twice(
     server,
     models,
@@ -201,6 +204,7 @@ def test_interrupted_while_polling_it_goes_on_without_paying_twice(
     assert all(each.history.complete for each in done.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["behaviour", "attach"])
 def test_interrupted_while_answers_are_taken_it_goes_on_without_paying_twice(
     server, models, tmp_path, monkeypatch, step
@@ -227,6 +231,7 @@ def test_interrupted_while_answers_are_taken_it_goes_on_without_paying_twice(
     assert all(each.history.usage.requests == 2 for each in done.values())
 
 
+@pytest.mark.slow
 def test_a_service_that_stops_answering_is_a_sentence_and_it_goes_on(
     server,
     models,
@@ -244,6 +249,7 @@ def test_a_service_that_stops_answering_is_a_sentence_and_it_goes_on(
     assert all(each.history.complete for each in done.values())
 
 
+@pytest.mark.slow
 def test_a_refusal_in_a_batch_is_that_joints(server, models, tmp_path, joda):
     def results(entry):
         if "drawer, a slide" in texts(entry["params"]):

@@ -67,6 +67,7 @@ def test_in_mujoco_the_true_profile_moves_as_in_the_simulator(number):
     assert np.quantile(missed, part) < 3 * case.noise
 
 
+@pytest.mark.slow
 def test_the_true_memory_makes_the_error_small():
     case = draw(1, "backlash")
     assert true_error(case) < 1.5 * case.noise

@@ -63,6 +63,7 @@ def test_every_family_hides_every_effect_and_laws_of_no_catalogue():
         assert not set(family.beyond) & set(EFFECTS)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(4)
 @pytest.mark.parametrize(("family", "effect", "forced"), HIDDEN)
 def test_a_case_shows_its_effect_and_is_read(family, effect, forced):
@@ -94,6 +95,7 @@ def test_a_seed_gives_the_same_case_of_a_family_and_families_differ():
     assert len(set(digests)) == len(OTHERS)
 
 
+@pytest.mark.slow
 def test_a_resistance_in_a_part_of_the_range_is_called_position_dependent():
     for seed in range(4):
         case = draw(seed, "constant_friction_hinge", False)
@@ -130,6 +132,7 @@ def test_the_true_joint_misses_a_quiet_run_by_the_noise():
     assert case.achievable is case.achievable
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize(("family", "seed"), [("household", 1), ("switches", 1), ("machinery", 2)])
 def test_in_mujoco_the_true_numbers_move_as_in_the_simulator(family, seed):
@@ -212,6 +215,7 @@ COURSES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(4)
 @pytest.mark.parametrize("course", COURSES, ids=lambda course: type(course).__name__)
 def test_a_conservative_law_takes_no_energy_around_a_loop(course):
@@ -231,6 +235,7 @@ def test_a_dead_centre_is_left_and_a_well_is_not():
         assert lobe(np.array([0.2]))[0] < 0 < lobe(np.array([-0.2]))[0]
 
 
+@pytest.mark.slow
 def test_springs_and_frictions_of_a_joint_hold_below_their_limit():
     laws = [rubbing.PowerStribeck(0.5, 0.3, 1.0), rubbing.RationalStribeck(0.5, 0.3)]
     laws += [memory.RunningIn(0.5, 1.0), rubbing.FrictionAlong(0.5, shapes.Trapezoid(0, 1, 0.1))]
@@ -259,6 +264,7 @@ def test_an_orifice_brakes_as_its_formula():
     assert 0.5 * v * np.hypot(v, 1.0) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [memory.slips(0.5, 1e3, 4), memory.BrittleBristle(0.5, 1e3, 0.5)])
 def test_presliding_is_a_spring_first_and_friction_at_last(law):
     truth = Truth(joint(), 0.5, 5.0, (law,))
@@ -293,6 +299,7 @@ def test_backlash_lets_the_measured_part_move_alone_until_it_has_crossed():
     assert (v[-1] - v[-5001]) / 0.1 == pytest.approx(1.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_masses_move_along():
     linked = Truth(joint(0.0, 1.0), 0.0, 0.0, (Linkage(1.0, 0.3, 1.0),))
     _, q, v = move(linked, v=0.5)

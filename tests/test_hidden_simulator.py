@@ -154,6 +154,7 @@ def test_the_base_model_has_the_inertia_and_gravity_of_the_joint(seed):
         assert inertia[0] == pytest.approx(base.inertia, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_case():
     one, other = draw(1, "bistable_mechanism"), draw(1, "bistable_mechanism")
     assert one.seal == other.seal
@@ -165,6 +166,7 @@ def test_a_seed_gives_the_same_case():
 NAMES = [*EFFECTS, *OUTSIDE, "added_inertia"]
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(5)
 @pytest.mark.parametrize(("effect", "second"), list(zip(NAMES[::2], NAMES[1::2], strict=True)))
 def test_what_is_hidden_shows(effect, second):

@@ -417,6 +417,7 @@ def written(folder, make, log: Log):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_be_meant_is_refused_with_the_remedy(name, door, good, tmp_path):
     make, said, remedy = REFUSED[name]

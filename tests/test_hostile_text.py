@@ -150,6 +150,7 @@ def test_progress_obeys_nothing(name, capfd, monkeypatch):
 # --- names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_joints_name(name, forked, tmp_path):
     folder = tmp_path / "work"
@@ -378,6 +379,7 @@ READS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_is_refused_in_a_sentence(name, good, forked):
     kind, change, sentence = FILES[name]
@@ -404,6 +406,7 @@ def test_a_file_without_end_is_not_read(tmp_path):
             read(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["HTML", "a link", "turned around", "rich markup", "XML"])
 def test_a_proposals_words_are_shown_escaped(name, good, forked, tmp_path):
     proposal = json.loads((good / "proposal.json").read_text())
@@ -543,6 +546,7 @@ def server(monkeypatch):
         yield state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ANSWERS)
 def test_an_answer_is_refused_in_a_sentence(name, server):
     server.script[:], sentence = [ANSWERS[name][0]], ANSWERS[name][1]

@@ -67,6 +67,7 @@ def ends_named(found):
     return [one.interval for one in found.effects if one.effect == RESTITUTION]
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(2)
 @pytest.mark.parametrize(
     ("low", "high", "place"),

@@ -810,6 +810,7 @@ def test_actuators_that_are_no_position_servos_get_no_positions(arm, tmp_path):
     assert [one.target for one in made.columns] == ["position:rail"]
 
 
+@pytest.mark.slow
 # --- the command
 def test_the_command_prints_a_table_and_json_and_its_runs_are_compared(tmp_path):
     model = tmp_path / "pendulum.xml"

@@ -82,6 +82,7 @@ def said(verdict, *effects):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("refused", "there"), [((), BOTH), (BOTH[1:], BOTH[:1]), (BOTH, ())])
 def test_of_the_best_pair_as_much_is_added_as_lowers_the_error(monkeypatch, train, refused, there):
     joint = Joint(monkeypatch, BOTH, refused)

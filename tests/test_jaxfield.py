@@ -109,6 +109,7 @@ def test_channels_survive_the_journey(golden):
 descent = jax.jit(jaxfield.max_stiffness)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("combine", ["sum", "max"])
 def test_max_descent_is_the_plugins(combine):
     """Over the whole range that of C++; over a part, that of the cubics that touch it."""
@@ -171,6 +172,7 @@ def drawn_components(draw) -> Component:
     return Component(interval=(a / 20, b / 20), x=x, y=tuple(y))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=150)
 @given(
     st.lists(drawn_components(), min_size=1, max_size=3),

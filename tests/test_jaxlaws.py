@@ -36,6 +36,7 @@ def numbers(*values):
     return [jnp.array(float(value)) for value in values]
 
 
+@pytest.mark.slow
 def test_damping_depends_on_the_direction_and_the_speed():
     up = {"interval": (0.0, 0.5), "y": (2.0, 4.0)}
     own = alone(
@@ -160,6 +161,7 @@ def test_a_learned_table_is_numpys_and_filling_changes_nothing():
                 np.testing.assert_allclose(part, expected, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", ["position", "speed"])
 def test_a_memory_forgets_as_an_exponential(memory):
     """After one time constant at 3 rad/s, and two of rest."""

@@ -89,6 +89,7 @@ def test_a_template_moves_under_random_forces_as_in_the_engine(number, path):
         assert np.ptp(visited) > 0.1 * (hi - lo)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", list(cases("hinge", 1, 1, 1)))
 @pytest.mark.parametrize("kind", KINDS)
 def test_effects_act_as_in_the_engine(kind, case):

@@ -163,6 +163,7 @@ def test_the_command_adds_it(tmp_path):
     assert error(after).window < 0.5 * error(unseen).window
 
 
+@pytest.mark.slow
 def test_a_wave_is_learned_from_a_curve(tmp_path):
     periods = np.random.default_rng().uniform(3, 6)
     gauged(tmp_path, lambda s, way: 0.6 * np.sin(2 * np.pi * periods * s), noise=0.02)

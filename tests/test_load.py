@@ -359,6 +359,7 @@ def test_friction_never_drives(kind, h, mu):
 DRIVEN = {**RICH, "mu": 0.3}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("integrator", EULER_LIKE)
 def test_however_a_step_is_taken_a_driven_joint_moves_the_same(integrator, step):

@@ -165,6 +165,7 @@ COUNTED = {"microwave": 0, "cabinet": 0, "table": 0, "kitchen": 10, "drawer": 0,
 switch whose mass lies beside it."""
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", NAMES)
 def test_other_people_s_scenes_are_seldom_doubted(name):

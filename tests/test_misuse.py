@@ -145,6 +145,7 @@ def garbled(arguments: list[str], dice: random.Random) -> list[str]:
     return changed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(COUNT))
 def test_misuse(number, good, forked, tmp_path):
     seed = SEED + number
@@ -191,6 +192,7 @@ GLFW = re.compile(r'Traceback.*\n  File "<string>", line \d+, in <module>\nKeybo
 START = "from joda.__main__ import main; print(flush=True); main()"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(max(COUNT // 8, 1)))
 def test_ctrl_c_at_any_moment(number, good, tmp_path):
     """As in a terminal: the child processes that render are told too."""

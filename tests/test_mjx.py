@@ -166,6 +166,7 @@ def test_friction_holds_and_lets_go_where_the_plugin_does():
     assert np.ptp(positions, axis=0).min() > 0.1 * SPANS.min() and still[-50:].all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("template", ["constant_damping_hinge", "detent_internal"])
 def test_a_damping_row_that_is_switched_off_leaves_the_limited_force(template):
     model = scene()
@@ -231,6 +232,7 @@ def knob_profile(name: str, rng: np.random.Generator) -> Profile:
     return Profile(joint=joint, channels=Channels.model_validate(channels))
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1, "motions in mjx")
 def test_stiff_springs_on_four_knobs_are_the_plugins():
     """Springs far beyond explicit stability, sums and maxima mixed, other rows around them."""
@@ -390,6 +392,7 @@ def python(code: str, **options) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("missing", ["jax", "mujoco.mjx"])
 def test_without_jax_the_error_says_what_to_install(missing):
     done = python(f"import sys; sys.modules['{missing}'] = None; import joda.mjx")
@@ -399,6 +402,7 @@ def test_without_jax_the_error_says_what_to_install(missing):
     assert last.endswith('run: pip install ".[mjx]"')
 
 
+@pytest.mark.slow
 def test_another_version_of_mjx_is_refused():
     code = (
         "import importlib.metadata as metadata; found = metadata.version\n"

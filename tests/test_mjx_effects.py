@@ -178,6 +178,7 @@ def check_alone(scene, forces, found):
         assert np.abs(path - found[:, k]).max() < 2e-8 * SPANS[k]
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(2, "effects in mjx")
 def test_random_tables_move_as_in_the_plugin(folder):
     """Of fresh seeds, each with another size and memory, side by side as a batch."""
@@ -271,6 +272,7 @@ def test_end_stops_among_other_rows_are_the_plugins():
     np.testing.assert_allclose(found, path, rtol=0, atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(2, "effects in mjx")
 @pytest.mark.parametrize("kind", JOINTS.values())
 def test_driven_joints_that_touch_others_have_the_load_of_the_plugins(kind):

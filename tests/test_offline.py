@@ -141,6 +141,7 @@ def test_an_own_model_is_recognised_whatever_its_file_is_called(name, tmp_path):
     assert kind(renamed, joint) == title
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "joint", "title"),
     [

@@ -59,6 +59,7 @@ def pushed(scene, rng, number, path):
     np.savetxt(path, rows, "%.7f", ",", header="time,position,force", comments="")
 
 
+@pytest.mark.slow
 def test_it_is_diagnosed_and_added_without_code(tmp_path, templates, rng):
     size, (a, b) = rng.uniform(0.15, 0.25), (rng.uniform(0.1, 0.3), rng.uniform(0.7, 0.9))
     teeth = Component(label=NAME, interval=(a, b), x=tuple(U), y=tuple(size * TEETH))
@@ -88,6 +89,7 @@ def test_it_is_diagnosed_and_added_without_code(tmp_path, templates, rng):
         add(model, joint, tmp_path / "d.json", files, tmp_path / "no.xml")
 
 
+@pytest.mark.slow
 def test_every_template_has_a_hypothesis(tmp_path, templates):
     """Of each channel that it has one strength, and where it acts."""
     measured = read(draw(3, "quadratic_damping"))[0]

@@ -136,6 +136,7 @@ def test_no_effect_turns_or_grows_where_no_run_was(measured, x, y, said):
     assert unseen_shape((seen, measured), profile, "detent_internal", measured.profile) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("whole", "windows", "apart", "said"),
     [

@@ -77,6 +77,7 @@ def test_breakaway_at_the_friction_curve(solver, integrator, inertia, scale):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("solver", "integrator"), [*COMBINATIONS, ("Newton", "RK4")])
 @pytest.mark.parametrize(("inertia", "friction"), [(1e-6, 0.01), (1e-2, 1.0), (10.0, 100.0)])
 def test_a_held_joint_does_not_creep(solver, integrator, inertia, friction):
@@ -99,6 +100,7 @@ def test_a_held_lid_under_gravity_does_not_creep():
         assert abs(data.qpos[0] - start) < 2 * 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("solver", "integrator"), COMBINATIONS)
 @pytest.mark.parametrize("inertia", [1e-6, 1e-2, 1.0])
 def test_a_detent_settles_where_its_energy_is_least(solver, integrator, inertia):
@@ -222,6 +224,7 @@ def test_rk4_is_right_in_the_limit():
     assert errors[1] / errors[2] == pytest.approx(2, rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", EULER_LIKE)
 def test_trajectory_converges_to_scipys(integrator):
     """Conservative force, friction and damping varying with s, against a fine-step integration."""

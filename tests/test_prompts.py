@@ -165,6 +165,7 @@ def test_the_check_refuses_what_the_service_refuses():
         check(asked)
 
 
+@pytest.mark.slow
 def test_three_rounds_stay_within_twelve_thousand_tokens(pictures, previews):
     asked_of = task(pictures=pictures, description="It shall close by itself near the end.")
     turns = [turn(), turn(number=1)]

@@ -65,6 +65,7 @@ def without(baseline):
     return {h.effect for h in baseline.hypotheses} - {EFFECT, *OTHERS}
 
 
+@pytest.mark.slow
 def test_what_is_left_rough_changes_nothing_of_the_best(baseline, ranked, monkeypatch):
     refined = []
     monkeypatch.setattr(search, "ENOUGH", 0.0)
@@ -250,6 +251,7 @@ def test_a_curve_is_level_where_no_run_has_been(baseline, effect):
     assert part.y[-1] > part.y[0]
 
 
+@pytest.mark.slow
 def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened():
     """Drag as an effect of which usually only a tenth of the true size is looked for."""
     baseline = fit_baseline(read(draw(84751434, EFFECT))[0].changed(runs=[0, 4]))

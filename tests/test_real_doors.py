@@ -54,6 +54,7 @@ def door(request, tmp_path_factory):
     return request.param, door_curve(one), *found
 
 
+@pytest.mark.slow
 def test_the_proposal_is_twice_as_near_as_the_best_spring(door):
     name, curve, ours, _ = door
     error = rms(ours - curve)

@@ -167,6 +167,7 @@ def test_objects_that_nobody_has_seen_are_told_by_their_shape_alone():
     assert right >= 0.75 * len(rows), f"seed {seed}: {right} of {len(rows)}"
 
 
+@pytest.mark.slow
 def test_what_is_made_of_objects_is_what_is_expected_of_them():
     seed = secrets.randbelow(2**31)
     rows = {row.part: row for row in made(seed, named=True, rounds=1)}
@@ -500,6 +501,7 @@ def test_a_toy_chests_lid_holds_between_the_standards_angles(tmp_path):
     assert "falls shut" in " ".join(other.met) and other.recognised.force.shuts.most == 3.5
 
 
+@pytest.mark.slow
 def test_a_door_that_would_slam_is_slowed(tmp_path):
     """One that is to shut more slowly than 0.16 m/s may come to rest before: then that is told."""
     limit = secrets.SystemRandom().uniform(0.1, 0.3)
@@ -536,6 +538,7 @@ class Slamming:
         return Answer(first.model_copy(update=update))
 
 
+@pytest.mark.slow
 def test_what_somebody_proposes_is_held_against_real_joints(tmp_path):
     """A laptop's lid that a spring slams shut: it should hold, and such lids take less."""
     done = generate(MODELS / "laptop.xml", "lid", tmp_path / "lid", proposer=Slamming())

@@ -223,6 +223,7 @@ class TestThePapersDoor:
         assert content(door.folder) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("files", "says"),
     [
@@ -315,6 +316,7 @@ def test_what_changes_where_no_run_was_is_said():
     assert "from 0.1 to 0.3 N·m" in told
 
 
+@pytest.mark.slow
 def test_gravity_that_is_fitted_is_written(tmp_path):
     rng = np.random.default_rng()
     text = CABINET.replace('timestep="0.002"', f'timestep="{STEP}"')

@@ -139,12 +139,14 @@ def test_third_party(tmp_path, name, joint):
     check(render(asset(name), joint, tmp_path))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["0 0 1", "0 0 -1", "1 0 0", "0 1 0", "1 1 0.3"])
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
 def test_any_axis_without_a_light(tmp_path, kind, axis):
     check(render(one(tmp_path, kind, axis), "lid", tmp_path, count=2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_random_scenes(tmp_path, seed):
     path = tmp_path / "random.xml"

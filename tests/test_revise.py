@@ -166,6 +166,7 @@ def test_a_proposer_that_has_nothing_to_change_is_a_sentence(folder):
         revise(folder, COMPLAINT, proposer=Content())
 
 
+@pytest.mark.slow
 def test_a_model_is_told_the_users_words(server, joda, tmp_path, quick):
     fridge, folder = MODELS / "refrigerator.xml", tmp_path / "out"
     server.script[:] = [reply()]

@@ -204,6 +204,7 @@ def jammed(folder, count=4):
     ]
 
 
+@pytest.mark.slow
 def test_what_lies_in_a_contact_is_left_out_and_said(tmp_path):
     model, runs = jammed(tmp_path)
     raw = [read_run(run) for run in runs]

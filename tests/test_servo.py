@@ -73,6 +73,7 @@ def test_a_held_command_has_its_means():
     np.testing.assert_allclose(found, [1.0, 1.0, 3.0, 5.0, -2.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "servo",
     [
@@ -162,6 +163,7 @@ def test_numbers_are_told_and_set_right_where_something_stays_unexplained(tmp_pa
     assert steps[1].error.window < 0.3 * steps[0].error.window
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1, "servo")
 def test_damping_of_joint_and_actuator_is_one_number(tmp_path):
     model = Arm().model(tmp_path / "m.xml")

@@ -162,6 +162,7 @@ def test_each_joint_is_replayed_among_the_others(tmp_path):
     assert wrong.rmse > 20 * NOISE
 
 
+@pytest.mark.slow
 def test_all_at_once_are_replayed_in_the_scene(tmp_path):
     runs = logs(tmp_path)
     arm = mujoco.MjModel.from_xml_path(str(model(tmp_path)))
@@ -231,6 +232,7 @@ def test_a_joint_that_the_log_has_not_stays_at_its_reference(tmp_path):
     assert note == "log.csv: has no positions of 'shoulder': held at the model's reference."
 
 
+@pytest.mark.slow
 def test_pictures_are_of_one_joint(tmp_path):
     run = log(tmp_path / "log.csv", 0, seconds=1.0)
     command = [sys.executable, "-m", "joda", "compare", str(model(tmp_path)), str(run)]

@@ -154,6 +154,7 @@ def test_review_asks_the_least_sure_first_and_keeps_each_decision(models, tmp_pa
     assert asked_again == asked[1:]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_a_key", "quick")
 def test_the_command_takes_kinds_words_and_mistakes(joda, models, tmp_path, monkeypatch):
     out = tmp_path / "out"

@@ -82,6 +82,7 @@ def test_a_slow_push_stands_beside_a_curve(tmp_path):
     assert [one.curve.name for one in measured.curves] == ["back.csv", "run.csv"]
 
 
+@pytest.mark.slow
 def test_nor_a_run_that_the_model_follows(tmp_path):
     """A slow push against the friction that the model has: 1 N·m, damping 0.1 N·m·s/rad."""
     true = SCENE.replace(f'frictionloss="{FRICTION}"', f'frictionloss="{HELD}"')

@@ -97,6 +97,7 @@ def stated_and_true(motion: np.ndarray, hertz: int, sigma: float) -> tuple[np.nd
     return stated, true
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [2e-4, 2e-3])
 @pytest.mark.parametrize("hertz", [100, 200, 1000])
 @pytest.mark.parametrize("speed", [1, 3, 6])

@@ -42,6 +42,7 @@ def test_of_four_runs_in_which_the_joint_moves_one_is_held_out(tmp_path, rng):
     assert (held_out(measured, held), in_blocks(measured, held)) == ("run3.csv", False)
 
 
+@pytest.mark.slow
 def test_a_run_at_rest_is_none_of_the_four(tmp_path, rng):
     thrown(tmp_path, rng, 5, drag=0.02)
     time = np.arange(0, 2, 1 / RATE)
@@ -84,6 +85,7 @@ def test_where_nothing_is_missed_nothing_can_be_told(tmp_path, rng):
     assert "by no more than the noise even without it" in added_effect.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3, 12])
 def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, count):
     measured = thrown(tmp_path, rng, count, drag=0.02 if count < 4 else 0.1)
@@ -99,6 +101,7 @@ def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, c
         assert set(segments.run[out]) == {3, 7, 11} and len(held.folds) == 1
 
 
+@pytest.mark.slow
 def test_where_windows_held_out_tell_nothing_all_are_in_turn(tmp_path, rng):
     """An effect that acts where only the runs that are fitted went is not denied by the others."""
     measured = thrown(tmp_path, rng, 12, drag=0.1)

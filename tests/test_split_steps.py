@@ -89,6 +89,7 @@ ROUNDING = 0 if has(SPRING) else 1e-12
 """Before 3.3.6, MuJoCo's own friction too goes on a little differently after mj_forward."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @SIDES

@@ -555,6 +555,7 @@ def test_what_the_command_raises_in_the_child_is_raised(session, tmp_path):
         asyncio.run(asked)
 
 
+@pytest.mark.slow
 def test_runs_of_a_driven_joint_are_for_who_says_that_it_was_off(session, tmp_path):
     motor = '<actuator><motor name="servo" joint="lid"/></actuator></mujoco>'
     scene = tmp_path / "driven.xml"
@@ -638,6 +639,7 @@ def test_without_nicegui_it_says_what_to_install(tmp_path):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["joda", "joda.cli", "joda.commands.studio.session", "joda.commands.studio.work"]
 )

@@ -74,6 +74,7 @@ FORBIDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORBIDS)
 def test_what_the_scene_forbids_is_not_claimed(name, tmp_path):
     path = scene(tmp_path, ELEMENTS.get(name, ""), WIND if name == "wind" else "")

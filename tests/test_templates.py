@@ -107,6 +107,7 @@ def test_a_mistake_in_a_folder_is_one_sentence(folder):
     assert "bad.json: not JSON" in fails("templates", "--templates", folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAPER)
 def test_the_curves_are_the_prototypes(name):
     lines, band = cell(sheet(LIBRARY), name)
@@ -163,6 +164,7 @@ def test_the_librarys_sheet_is_about_1000_by_700_and_has_one_legend():
     assert not any(axes.get_legend() for axes in figure.axes)
 
 
+@pytest.mark.slow
 def test_the_picture_is_written_and_only_overwritten_when_told_to(tmp_path):
     command = ("templates", "-o", "sheet.png")
     result = joda(*command, cwd=tmp_path)

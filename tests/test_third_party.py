@@ -93,6 +93,7 @@ def test_all_profiles_are_read_back(scenes):
     assert list(read_profiles(output).values()) == profiles
 
 
+@pytest.mark.slow
 def test_all_else_of_the_model_is_as_it_was(scenes):
     before, output, _ = scenes
     after = load_model(output)
@@ -103,6 +104,7 @@ def test_all_else_of_the_model_is_as_it_was(scenes):
         assert (getattr(after, name)[others] == getattr(before, name)[others]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", [True, False], ids=["contact", "no contact"])
 def test_stable_for_a_minute_under_random_forces(scenes, contact):
     seed = int(os.environ.get("JODA_SEED", secrets.randbits(32)))

@@ -69,6 +69,7 @@ def test_of_a_known_law_the_size_is_as_uncertain_as_linear_least_squares_says():
     )
 
 
+@pytest.mark.slow
 def test_what_is_there_has_a_size_however_badly_it_is_known():
     """A latch at the low end that runs with positions only tell little of."""
     case, baseline, candidate = found(
@@ -81,6 +82,7 @@ def test_what_is_there_has_a_size_however_badly_it_is_known():
     assert abs(size - case.seal["magnitude"]) < 2 * said
 
 
+@pytest.mark.slow
 def test_a_pull_that_is_felt_all_over_may_be_the_far_end_of_any(seed=11):
     case, baseline, candidate = found(seed, "magnetic_return_to_high_end", forced=False)
     a, b = candidate.hypothesis.interval(candidate.x)
@@ -89,6 +91,7 @@ def test_a_pull_that_is_felt_all_over_may_be_the_far_end_of_any(seed=11):
     assert abs(candidate.hypothesis.magnitude(candidate.x) - case.seal["magnitude"]) < 2 * said
 
 
+@pytest.mark.slow
 def test_the_end_that_was_not_knocked_at_may_throw_back_too(seed=918226542):
     case = draw(seed, "end_stop_restitution", forced=False)
     baseline = fit_baseline(read(case)[0])
@@ -101,6 +104,7 @@ def test_the_end_that_was_not_knocked_at_may_throw_back_too(seed=918226542):
     assert abs(interval[1] - 1) < 2 * high
 
 
+@pytest.mark.slow
 def test_what_is_left_and_what_nobody_visited_make_it_less_sure():
     case, baseline, candidate = found(101, "magnetic_return_to_low_end", forced=False)
     size = candidate.hypothesis.magnitude(candidate.x)

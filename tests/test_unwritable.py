@@ -94,6 +94,7 @@ def check_refusal(ended: Ended, folder: Path, before: dict[str, str], reason: st
     assert files(after) == files(before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", WRITING)
 def test_a_folder_that_may_not_be_written(command, closed, forked):
     before = contents(closed)
@@ -126,6 +127,7 @@ def test_there_is_room_for_some_of_the_files_only(command, forked, tmp_path):
     check_refusal(ended, tmp_path, before, "File too large")
 
 
+@pytest.mark.slow
 def test_pictures_have_no_room(closed, full):
     for folder, reason in ((closed, "Permission denied"), (full, "No space left on device")):
         before = contents(folder)

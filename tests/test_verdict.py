@@ -91,6 +91,7 @@ def test_a_size_of_zero_is_no_effect(size, error, sized):
     assert replace(DETENT, magnitude=size, magnitude_error=error).sized == sized
 
 
+@pytest.mark.slow
 @pytest.mark.sweep(1)
 @pytest.mark.parametrize("none", [1, None])
 def test_what_has_no_size_is_not_named(none, tmp_path, monkeypatch):
@@ -209,6 +210,7 @@ def springy(folder, ways, extra=0.0, times=1.0):
     return diagnose(write_scene(folder, text, "m.xml"), "door", [folder / "curve.csv"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extra", [0.4, -0.4])
 def test_one_way_friction_and_a_force_are_both_named_if_neither_is_sure(extra, tmp_path):
     """A constant force looks like friction that is off where the joint was moved one way only."""
@@ -237,6 +239,7 @@ def test_an_error_of_all_the_force_is_not_called_small(times, way, tmp_path):
     assert re.search(r"up to \d+ times the measured one: see to its unit first", told.summary), told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [0.025, 0.033, 0.05])
 def test_a_ripple_that_is_another_on_the_way_back_clears_no_curve(period, tmp_path):
     """Between there and back it looks like noise of the gauge."""

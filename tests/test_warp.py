@@ -64,6 +64,7 @@ def test_random_profiles_move_as_with_the_plugin(integrator, cone):
     assert (error < CLOSE).mean() > 0.85 and np.median(error) < 1e-5, f"seed {seed}: {error}"
 
 
+@pytest.mark.slow
 def test_each_effect_alone_moves_as_with_the_plugin():
     """Each makes a difference, and the same one."""
     rng = np.random.default_rng(0)
@@ -85,6 +86,7 @@ def test_each_effect_alone_moves_as_with_the_plugin():
         assert large > 10 * CLOSE or name.startswith("added_inertia"), f"{name}: {large}"
 
 
+@pytest.mark.slow
 def test_soft_bristles_move_as_with_the_plugin():
     """To and fro beyond their break-away, however soft, all the way."""
     variants = [
@@ -106,6 +108,7 @@ def test_soft_bristles_move_as_with_the_plugin():
     assert (np.ptp(expected, axis=0) > 0.05).all()
 
 
+@pytest.mark.slow
 def test_motors_and_contacts_load_a_joint_as_with_the_plugin():
     """The arm hits the floor and its stop, the drawer the ball."""
     variants = [
@@ -120,6 +123,7 @@ def test_motors_and_contacts_load_a_joint_as_with_the_plugin():
     assert (expected[:, :2, 0].min(0) < RANGES["arm"][0] / SPANS[0]).all()
 
 
+@pytest.mark.slow
 def test_a_held_joint_does_not_creep():
     """At 80 % of its friction, for 2 s; MuJoCo's own friction row would creep."""
     m, d, _ = prepared([STEEL], option='><flag gravity="disable"/></option><option')
@@ -297,6 +301,7 @@ def test_what_does_not_fit_is_refused():
             joda.warp.put_fields(model, {"arm": STEEL["arm"].with_effect(effect)}, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -313,6 +318,7 @@ def test_without_a_fitting_mujoco_warp_one_sentence_says_what_to_install(change,
     assert said in run.stdout
 
 
+@pytest.mark.slow
 @older  # forgets the plugin's instances behind a <replicate>
 def test_the_example_of_the_docs(tmp_path):
     root = Path(__file__).parents[1]
