@@ -73,7 +73,7 @@ def test_of_a_known_law_the_size_is_as_uncertain_as_linear_least_squares_says():
 def test_what_is_there_has_a_size_however_badly_it_is_known():
     """A latch at the low end that runs with positions only tell little of."""
     case, baseline, candidate = found(
-        1720741344, "spring_loaded_snap_detent_to_low_end", forced=False
+        1720741350, "spring_loaded_snap_detent_to_low_end", forced=False
     )
     size = candidate.hypothesis.magnitude(candidate.x)
     assert from_data(fitted(baseline, candidate))[0] >= size  # by itself it may be none

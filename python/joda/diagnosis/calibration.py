@@ -44,6 +44,8 @@ LONGEST = 1.5
 """Length of the segments in which numbers are fitted at last, s."""
 BETWEEN = 0.04
 """Error of a delay, in samples: what the force is between two of them is not known."""
+ZERO = 0.001
+"""Error of a position's zero, in ranges: no better are the ends known, nor where gravity points."""
 LEVEL, FIRST = 1e5, 8
 """Mean square residual from which a segment counts as its logarithm in the first iterations of some
 fits, which then go where all segments are better, and how many these are."""
@@ -285,10 +287,11 @@ def _errors(found: _Search, own: Nuisances, fit: Fit, alike: Collection[Nuisance
     prior_std[base.count :][: len(own.names)] = ANYTHING
     covariance = estimator.covariance(wider.make, wider.unknowns, there, prior_std)
     errors = np.sqrt(np.diag(covariance))[base.count :][: len(own.names)]
-    late = [name == "time_delay" for name in own.names]
-    return np.hypot(
-        errors, BETWEEN * float(np.median(np.diff(estimator.segments.time))) * np.array(late)
-    )
+    floors = {
+        "time_delay": BETWEEN * float(np.median(np.diff(estimator.segments.time))),
+        "position_offset": ZERO * float(np.ptp(base.profile.joint.range)),
+    }
+    return np.hypot(errors, [floors.get(name, 0.0) for name in own.names])
 
 
 def _equivalent(baseline: Baseline) -> list[FittedHypothesis]:

@@ -183,7 +183,8 @@ def coarse(
 
     def best(point: InitialPoint, trials: Sequence[Array], kept: int) -> list[Fit]:
         starts = (np.concatenate([point.fit.x, x]) for x in trials)
-        fits = [_leaving(estimator, make, unknowns, x, point) for x in starts]
+        about = point.fit.start, ROUGH, point.cauchy_scale
+        fits = [estimator.fit(make, unknowns, x, *about) for x in starts]
         near = [
             replace(fit, loss=estimator.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in fits
         ]
@@ -199,16 +200,6 @@ def coarse(
         given = replace(first.fit, x=base.unknowns.mean, start=segments.start)
         found += best(replace(first, fit=given), balanced(segments, base, hypothesis), 1)
     return tuple(found)
-
-
-def _leaving(
-    estimator: SegmentEstimator, make: Make, unknowns: Unknowns, x: Array, point: InitialPoint
-) -> Fit:
-    """A rough fit; where no step from x is better as a whole, each segment's start stays if that is
-    better."""
-    line = make, unknowns, x, point.fit.start, ROUGH, point.cauchy_scale
-    fit = estimator.fit(*line)
-    return replace(estimator, apart=True).fit(*line) if np.array_equal(fit.x, x) else fit
 
 
 def refined(

@@ -122,13 +122,10 @@ class SegmentEstimator:
     Attributes:
         segments: of the runs.
         counts: which segments count, shape (m,).
-        apart: whether a segment's start follows the numbers only where that helps the segment, so
-            that one in which the joint sticks keeps no other from moving.
     """
 
     segments: Segments
     counts: NDArray[np.bool_]
-    apart: bool = False
 
     @property
     def samples(self) -> float:
@@ -271,6 +268,9 @@ class SegmentEstimator:
     ) -> Fit:
         """The numbers and starts with the least loss.
 
+        Where a step does not help as a whole, a segment's start follows the numbers only if that
+        helps the segment: one in which the joint sticks keeps no other from moving.
+
         Args:
             make: the joint with its numbers.
             unknowns: the numbers.
@@ -295,12 +295,12 @@ class SegmentEstimator:
             for _ in range(BACKTRACKS):
                 move = _step(H, gradient, damping, unknowns, x)
                 simulator, moved = make(x + move), start + segments.prior_std * about.follow(move)
-                trial = self.squares(simulator, moved)[1]
-                if self.apart:
+                trial, off = self.squares(simulator, moved)[1], unknowns.penalty(x + move)
+                if self.loss(trial, cauchy_scale) + off >= loss:
                     stayed = self.squares(simulator, start)[1]
                     moved = np.where((trial < stayed)[:, None], moved, start)
                     trial = np.minimum(trial, stayed)
-                new = self.loss(trial, cauchy_scale) + unknowns.penalty(x + move)
+                new = self.loss(trial, cauchy_scale) + off
                 if new < loss:
                     x, start, squares, loss = x + move, moved, trial, new
                     damping = max(damping / 10, 1e-6)

@@ -50,6 +50,8 @@ FAR = 20.0
 STEPS = {"factor": 0.01, "time_delay": 2e-4, "other": 0.05}
 """Of differences: of a logarithm, of a delay (s), of others in what they usually are."""
 
+NEAR_END = 0.1
+"""How near an end of the range runs come at least that may tell of a position's zero, in ranges."""
 LEAST, TENTH = {"factor": 0.02, "time_delay": 1e-3}, 0.1
 """By how much a logarithm or a delay (s) must be off to be worth a word; others by this part of
 what they usually are."""
@@ -190,7 +192,8 @@ class Nuisances:
 def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:
     """The numbers of a joint and its runs that may be off, and that runs can tell.
 
-    Those of a force only where one was recorded, those of gravity where there is some. None of
+    Those of a force only where one was recorded, those of gravity where there is some, the
+    position's zero where a force depends on the position or an end of the range was near. None of
     joints among others that move, nor of those that an actuator drives: there the actuator's gain
     and delay are the base's own.
     """
@@ -209,10 +212,20 @@ def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:
         "force_scale": bool(force.any()),
         "force_offset": bool(force.any()),
         "time_delay": bool(force.any()),
-        "position_offset": (weight > 0 and joint.type == "hinge") or shaped,
+        "position_offset": (weight > 0 and joint.type == "hinge") or shaped or _near_end(measured),
     }
     if measured.joint_model.servo or any(run.among for run in measured.runs):
         told = dict.fromkeys(told, False)
     widths = {name: measured.trust.width(name, usual[name]) for name in told}
     names = tuple(name for name, there in told.items() if there and widths[name] > 0)
     return Nuisances(base, names, tuple(widths[name] for name in names))
+
+
+def _near_end(measured: Measured) -> bool:
+    """Whether runs came near an end of the range."""
+    lo, hi = measured.profile.joint.range
+    far = NEAR_END * (hi - lo)
+    return any(
+        float(run.position.min()) < lo + far or float(run.position.max()) > hi - far
+        for run in measured.runs
+    )

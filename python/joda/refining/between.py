@@ -134,9 +134,7 @@ class Between:
         for length in LENGTHS:
             segments = self.shooting.engine.segments(length)
             clear = ~self._meet(segments, jumps, CLEAR)
-            estimator = self.shooting.engine.estimator(
-                segments, clear & (segments.count >= FEWEST), apart=True
-            )
+            estimator = self.shooting.engine.estimator(segments, clear & (segments.count >= FEWEST))
             if segments.count[estimator.counts].sum() > ENOUGH * segments.count.sum():
                 break
         return estimator

@@ -64,9 +64,7 @@ class Engine(Protocol):
         """The runs in segments of some length, s."""
         ...
 
-    def estimator(
-        self, segments: Segments, counts: NDArray[np.bool_], apart: bool = False
-    ) -> SegmentEstimator:
+    def estimator(self, segments: Segments, counts: NDArray[np.bool_]) -> SegmentEstimator:
         """Fits it to segments, see `SegmentEstimator`."""
         ...
 
@@ -122,8 +120,6 @@ class JointEngine:
             )
         return self._cut[length]
 
-    def estimator(
-        self, segments: Segments, counts: NDArray[np.bool_], apart: bool = False
-    ) -> SegmentEstimator:
+    def estimator(self, segments: Segments, counts: NDArray[np.bool_]) -> SegmentEstimator:
         """See `Engine`."""
-        return SegmentEstimator(segments, counts, apart)
+        return SegmentEstimator(segments, counts)

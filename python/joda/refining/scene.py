@@ -190,11 +190,9 @@ class SceneEngine:
             self._cut[length] = self._together(length)
         return self._cut[length]
 
-    def estimator(
-        self, segments: Segments, counts: NDArray[np.bool_], apart: bool = False
-    ) -> SceneJudge:
+    def estimator(self, segments: Segments, counts: NDArray[np.bool_]) -> SceneJudge:
         """See `Engine`."""
-        return SceneJudge(segments, counts, apart)
+        return SceneJudge(segments, counts)
 
     def _together(self, length: float) -> Segments:
         """Segments of the fitted joint, with the other joints' samples after its own."""

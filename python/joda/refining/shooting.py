@@ -40,7 +40,7 @@ class Shooting:
     def estimator(self, length: float) -> SegmentEstimator:
         """Of segments of some length, s."""
         segments = self.engine.segments(length)
-        return self.engine.estimator(segments, segments.count >= LEAST, apart=True)
+        return self.engine.estimator(segments, segments.count >= LEAST)
 
     def fit_windows(
         self,

@@ -7,6 +7,7 @@ import numpy as np
 
 from joda.component import Component
 from joda.diagnosis.hypotheses.base import (
+    FREE_CURVE,
     KNOWN_SHAPE,
     STRENGTH,
     TRIAL,
@@ -55,6 +56,11 @@ NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
 """Control points of a magnet, in units of its gap: there its force has fallen to 2 %."""
 SEEN = 0.05
 """What is left of its force where it is no longer felt."""
+SPRUNG = np.linspace(0, 1, 5)
+"""Control points of a spring."""
+BEND, USUAL_BEND = (-2.0, 2.0, 0.05), 0.7
+"""How much a spring at a lever, or of two rates, is off a straight line, in units of its force at
+the far end: four times that in the middle; and its doubt before the data."""
 POWER, USUAL_POWER = (1.0, 4.0, 0.05), (2.0, 0.5)
 """Of distance in a magnet's law: bounds and step; what it is before the data, and how surely:
 between plate and pole 2, of two poles up to 4, where a yoke leads the flux less than 2."""
@@ -181,29 +187,35 @@ def _magnet(units: Units, name: str) -> Hypothesis:
 
 
 def _spring(units: Units, name: str) -> Iterator[Hypothesis]:
-    """Its largest force, what part of that is preload, and how far it reaches."""
+    """Its force at the far end, what part of that is preload, how it bends, how far it reaches."""
     low = name.endswith("low_end")
     place = "low" if low else "high"
 
     def one(reach: str) -> Hypothesis:
         def write(profile: Profile, x: Array) -> Profile:
-            most = units.force * x[0]
-            # the force is largest at the far end
-            y = (-x[1] * most, -most) if low else (most, x[1] * most)
-            part = Component(label=name, interval=ends(reach, x), x=(0, 1), y=y)
+            away = SPRUNG if low else 1 - SPRUNG
+            line = x[1] + (1 - x[1]) * away
+            y = units.force * x[0] * np.maximum(line + x[2] * away * (1 - away), 0.0)
+            part = Component(
+                label=name,
+                interval=ends(reach, x),
+                x=tuple(SPRUNG),
+                y=tuple(-y if low else y),
+            )
             return profile.with_component("conservative", part)
 
         bounds, tries = places(reach)
         return Hypothesis(
             name,
             "both",
-            unknowns_of(STRENGTH, (0.0, 0.7, 0.02), *bounds),
-            np.array([(TRIAL, 0.25, *t) for t in tries]),
+            known(unknowns_of(STRENGTH, (0.0, 0.7, 0.02), BEND, *bounds), 2, 0.0, USUAL_BEND),
+            np.array([(TRIAL, 0.25, 0.0, *t) for t in tries]),
             write,
             lambda x: ends(reach, x),
             lambda x: units.force * float(x[0]),
             unit_of(units),
             len(bounds),
+            misfit_tolerance=FREE_CURVE,
         )
 
     yield one("whole")
