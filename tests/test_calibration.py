@@ -9,6 +9,7 @@ import joda
 from joda import JodaError
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibrator
+from joda.diagnosis.verdict import diagnosed
 from joda.estimation.nuisance import nuisances_of
 from joda.hidden import draw
 from joda.measured.reading import read_measured
@@ -212,3 +213,13 @@ def test_improve_writes_what_is_wrong_and_compare_reads_it(tmp_path, rng):
     before = joda.compare(tmp_path / "arm.xml", "arm", [unseen]).rmse_window
     after = joda.compare(new, "arm", [unseen], corrections=done.corrections).rmse_window
     assert after < 2 * SIGMA < 0.2 * before
+
+
+@pytest.mark.long
+def test_a_number_and_an_effect_that_hide_each_other_are_told_together(seed=286989642):
+    """A delay beside which no effect explains the runs, nor the delay without that effect."""
+    case = draw(seed, "constant_friction_hinge", True, None, "field")
+    found = diagnosed(read(case)[0]).diagnosis
+    assert found.effects[0].effect == case.seal["effect"] and found.effects[0].probability > 0.8
+    late = next(one for one in found.corrections if one.parameter == "time_delay")
+    assert abs(late.value - case.seal["wrong"]["time_delay"]) < 3 * late.error

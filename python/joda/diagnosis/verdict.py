@@ -102,6 +102,8 @@ AT_ENDS = (
     "(solreflimit), or a force close to the end, is not the joint's."
 )
 EITHER = "Either the model's own numbers are off ({}), or a force is missing"
+TURNS = 2
+"""How often numbers and effects are asked for in turns."""
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
 OUT_THERE = (
@@ -173,7 +175,29 @@ def diagnosed(
         looks = looked(found.righted.of(measured), exclude, progress)
         if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
             return _set_right(measured, found, looks)
+    if calibrate and plain.selection.verdict == "unexplained":
+        for found, looks in _in_turns(measured, plain.first[0], exclude, progress)[-1:]:
+            return _set_right(measured, found, looks)
     return replace(_concluded(measured, plain), looks=plain.evidence)
+
+
+def _in_turns(
+    measured: Measured, ranking: Ranking, exclude: Collection[str], progress: Progress
+) -> list[tuple[Calibration, HorizonSearch]]:
+    """Numbers that are off, and an effect that is missing once these are right, where neither alone
+    explains the runs: numbers beside the likeliest effect, effects with those set right, again."""
+    out: list[tuple[Calibration, HorizonSearch]] = []
+    while len(out) < TURNS and ranking.candidates:
+        likeliest = ranking.candidates[0].written(ranking.baseline.base)
+        other = measured.changed(profile=likeliest)
+        if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
+            break
+        looks = looked(found.righted.of(measured), exclude, progress)
+        if not looks.selection.likely:
+            break
+        out.append((found, looks))
+        ranking = looks.ranking
+    return out
 
 
 def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> Diagnosed:
