@@ -273,8 +273,8 @@ class SegmentEstimator:
     ) -> Fit:
         """The numbers and starts with the least loss.
 
-        Where a step does not help as a whole, a segment's start follows the numbers only if that
-        helps the segment: one in which the joint sticks keeps no other from moving.
+        A segment's start follows the numbers only where that helps the segment, so that one in
+        which the joint sticks keeps no other from moving.
 
         Args:
             make: the joint with its numbers.
@@ -300,12 +300,10 @@ class SegmentEstimator:
             for _ in range(BACKTRACKS):
                 move = _step(H, gradient, damping, unknowns, x)
                 simulator, moved = make(x + move), start + segments.prior_std * about.follow(move)
-                trial, off = self.squares(simulator, moved)[1], unknowns.penalty(x + move)
-                if self.loss(trial, cauchy_scale) + off >= loss:
-                    stayed = self.squares(simulator, start)[1]
-                    moved = np.where((trial < stayed)[:, None], moved, start)
-                    trial = np.minimum(trial, stayed)
-                new = self.loss(trial, cauchy_scale) + off
+                trial, stayed = (self.squares(simulator, at)[1] for at in (moved, start))
+                moved = np.where((trial < stayed)[:, None], moved, start)
+                trial = np.minimum(trial, stayed)
+                new = self.loss(trial, cauchy_scale) + unknowns.penalty(x + move)
                 if new < loss:
                     x, start, squares, loss = x + move, moved, trial, new
                     damping = max(damping / 10, 1e-6)
