@@ -34,10 +34,8 @@ class Problem:
     def __init__(self, estimator: SegmentEstimator, make, unknowns, x: Array) -> None:
         self.estimator, self.make, self.unknowns = estimator, make, unknowns
         self.segments, self.k = estimator.segments, len(x)
-        self.calls = 0
 
     def residuals(self, theta: Array) -> Array:
-        self.calls += 1
         start = self.start(theta)
         r, squares = self.estimator.squares(self.make(theta[: self.k]), start)
         room = CAUCHY_SCALE * np.maximum(self.segments.count, 1)
@@ -87,7 +85,7 @@ def compared(case: Case) -> tuple[float, float, float, float]:
         np.concatenate([np.clip(x, unknowns.low + 1e-9, unknowns.high - 1e-9), np.zeros(m * d)]),
         bounds=(np.append(unknowns.low, -free), np.append(unknowns.high, free)),
         x_scale=np.append(unknowns.step, np.ones(m * d)),
-        diff_step=np.append(np.full(len(x), 1e-4), np.full(m * d, 1e-4)),
+        diff_step=1e-4,
         jac_sparsity=problem.pattern,
         ftol=1e-6,
         xtol=1e-8,

@@ -175,19 +175,22 @@ def diagnosed(
         looks = looked(found.righted.of(measured), exclude, progress)
         if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
             return _set_right(measured, found, looks)
-    if calibrate and plain.selection.verdict == "unexplained":
-        for found, looks in _in_turns(measured, plain.first[0], exclude, progress)[-1:]:
-            return _set_right(measured, found, looks)
+    puzzled = calibrate and plain.selection.verdict == "unexplained"
+    if puzzled and (both := _in_turns(measured, plain.first[0], exclude, progress)):
+        return _set_right(measured, *both)
     return replace(_concluded(measured, plain), looks=plain.evidence)
 
 
 def _in_turns(
     measured: Measured, ranking: Ranking, exclude: Collection[str], progress: Progress
-) -> list[tuple[Calibration, HorizonSearch]]:
+) -> tuple[Calibration, HorizonSearch] | None:
     """Numbers that are off, and an effect that is missing once these are right, where neither alone
-    explains the runs: numbers beside the likeliest effect, effects with those set right, again."""
-    out: list[tuple[Calibration, HorizonSearch]] = []
-    while len(out) < TURNS and ranking.candidates:
+    explains the runs: numbers beside the likeliest effect, effects with those set right, again.
+    None if no effect is then likelier than not."""
+    both = None
+    for _ in range(TURNS):
+        if not ranking.candidates:
+            break
         likeliest = ranking.candidates[0].written(ranking.baseline.base)
         other = measured.changed(profile=likeliest)
         if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
@@ -195,9 +198,8 @@ def _in_turns(
         looks = looked(found.righted.of(measured), exclude, progress)
         if not looks.selection.likely:
             break
-        out.append((found, looks))
-        ranking = looks.ranking
-    return out
+        both, ranking = (found, looks), looks.ranking
+    return both
 
 
 def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> Diagnosed:
