@@ -217,7 +217,7 @@ def test_a_door_that_another_body_pushes_is_refined_in_its_scene(tmp_path):
     )  # fmt: skip
     (told,) = [note for note in done.notes if "whole scene" in note]
     assert "touches" in told
-    assert done.segments[1] < 1.5 * done.noise < 0.5 * done.segments[0]
+    assert done.windows[1] < 1.5 * done.noise < 0.5 * done.windows[0]
     found = read_profiles(tmp_path / "better.xml")["elbow"]
     s = np.linspace(0.4, 0.6, 21)
     a, b = (evaluate(p.channels.conservative, s)[0] for p in (found, TRUE))
