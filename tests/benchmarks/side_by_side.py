@@ -102,7 +102,7 @@ class Case:
 
 def boxes(parameters: Parameters) -> tuple[Array, Array]:
     """The least and largest value of each number: the constraints on one number alone."""
-    lo, hi = (parameters.start + sign * FAR * parameters.doubt for sign in (-1, 1))
+    lo, hi = (parameters.start + sign * FAR * parameters.prior_std for sign in (-1, 1))
     for row, least in zip(parameters.constraints.G, parameters.constraints.h, strict=True):
         one, *others = np.flatnonzero(row)
         if not others and row[one] > 0:
