@@ -566,9 +566,9 @@ def test_a_million_samples_stay_within_the_memory_for_them(door, tmp_path):
     code = (
         "import re, sys, joda\n"
         "from joda.diagnosis.outcome import read_runs\n"
-        "from joda.estimation.base_model import windows_for\n"
+        "from joda.estimation.base_model import segments_for\n"
         "scene, run = sys.argv[1:]\n"
-        "if run[0] == '-': windows_for(read_runs(scene, 'door', [run[1:]]))\n"
+        "if run[0] == '-': segments_for(read_runs(scene, 'door', [run[1:]]))\n"
         "else: joda.compare(scene, 'door', [run])\n"
         # ru_maxrss would count what pytest had before the child began
         "print(re.search(r'VmHWM:\\s*(\\d+)', open('/proc/self/status').read())[1])"

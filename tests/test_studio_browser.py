@@ -46,7 +46,7 @@ FLAGS = (
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
     "--window-size=1500,960",
 )  # fmt: skip
-PATIENCE = 90
+PATIENCE = 240
 EFFECT = "constant_friction_hinge"
 LID = """\
 <mujoco model="box">
