@@ -75,6 +75,12 @@ bool Remembers(const Effects* effects) { return effects && effects->learned.Reme
 
 bool HasLoad(const Effects* effects) { return effects && effects->backlash.load > 0; }
 
+// None where MuJoCo has not made the instance, as while it compiles a model and measures the length
+// of its muscles.
+JointDynamics* Instance(const mjData* d, int instance) {
+  return reinterpret_cast<JointDynamics*>(d->plugin_data[instance]);
+}
+
 }  // namespace
 
 int JointDynamics::FindFrictionRow(const mjData* d, const Joint& joint) {
@@ -283,21 +289,20 @@ void JointDynamics::Register() {
     }
   };
   plugin.destroy = +[](mjData* d, int instance) {
-    delete reinterpret_cast<JointDynamics*>(d->plugin_data[instance]);
+    delete Instance(d, instance);
     d->plugin_data[instance] = 0;
   };
   plugin.copy = +[](mjData* dest, const mjModel*, const mjData* src, int instance) {
-    *reinterpret_cast<JointDynamics*>(dest->plugin_data[instance]) =
-        *reinterpret_cast<const JointDynamics*>(src->plugin_data[instance]);
+    *Instance(dest, instance) = *Instance(src, instance);
   };
   plugin.reset = +[](const mjModel* m, mjtNum* state, void*, int instance) {
     std::fill_n(state, m->plugin_statenum[instance], 0);
   };
   plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
-    reinterpret_cast<JointDynamics*>(d->plugin_data[instance])->Compute(m, d, instance);
+    if (JointDynamics* own = Instance(d, instance)) own->Compute(m, d, instance);
   };
   plugin.advance = +[](const mjModel* m, mjData* d, int instance) {
-    reinterpret_cast<const JointDynamics*>(d->plugin_data[instance])->Advance(m, d, instance);
+    if (const JointDynamics* own = Instance(d, instance)) own->Advance(m, d, instance);
   };
   mjp_registerPlugin(&plugin);
 }
@@ -322,8 +327,7 @@ extern "C" int joda_set_profile(const mjModel* m, mjData* d, int joint, double l
       throw std::invalid_argument(
           "its body carries no joda.joint_dynamics; attach a profile first");
     }
-    reinterpret_cast<joda::JointDynamics*>(d->plugin_data[instance])
-        ->SetProfile(m, joint, joda::ParseProfile("", lo, hi, texts));
+    joda::Instance(d, instance)->SetProfile(m, joint, joda::ParseProfile("", lo, hi, texts));
     return 0;
   } catch (const std::exception& exception) {
     std::snprintf(error, error_size, "%s", exception.what());

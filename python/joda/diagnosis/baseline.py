@@ -23,6 +23,7 @@ from joda.diagnosis.impacts import Impacts, Rebound, ends_of, impacts_at, restit
 from joda.diagnosis.units import units_of
 from joda.estimation.base_model import BaseModel, base_of, joint_model_for, segments_for, usable
 from joda.estimation.estimator import Fit, SegmentEstimator, excess
+from joda.estimation.nuisance import corrected_base
 from joda.joints.joint_model import JointModel
 from joda.measured.reading import Measured
 from joda.profile import Profile
@@ -169,11 +170,15 @@ def fit_baseline(
     segments = segments_for(measured, length)
     estimator = SegmentEstimator(segments, usable(segments))
     joint_model, own = joint_model_for(measured, segments.h), measured.own_row
-    base = base_of(measured.profile, joint_model, segments.h, measured.trust)
+
+    def based(joint_model: JointModel) -> BaseModel:
+        plain = base_of(measured.profile, joint_model, segments.h, measured.trust)
+        return corrected_base(plain, measured.doubtful)
+
+    base = based(joint_model)
     fit, given = _fitted(estimator, base, near)
     if measured.runs and own and measured.profile.channels.friction.components:
-        other = replace(joint_model, friction_row=own)
-        yielding = base_of(measured.profile, other, segments.h, measured.trust)
+        yielding = based(replace(joint_model, friction_row=own))
         fit_so, given_so = _fitted(estimator, yielding, near)
         explained = (
             excess(fit_so.loss, max(estimator.samples, 1.0)) < CALM

@@ -20,6 +20,7 @@ from joda.diagnosis.hypothesis_fits import FittedHypothesis
 from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of
+from joda.measured.instability import longest_followed
 from joda.measured.reading import Measured
 
 Array = NDArray[np.float64]
@@ -38,8 +39,8 @@ CALM, PART = 0.05, 0.02
 CLEARLY = 3.0
 """How many of its errors, by the data alone, a number is off by at the least."""
 SURPRISE = 4.0
-"""How many of its widths a number may be off: a zero that is far off looks like a force beside a
-spring."""
+"""How many of its widths a number may be off where something is left: a zero that is far off looks
+like a force beside a spring."""
 LONGEST = 1.5
 """Length of the segments in which numbers are fitted at last, s."""
 BETWEEN = 0.04
@@ -49,6 +50,8 @@ ZERO = 0.001
 LEVEL, FIRST = 1e5, 8
 """Mean square residual from which a segment counts as its logarithm in the first iterations of some
 fits, which then go where all segments are better, and how many these are."""
+DRAWS = 6
+"""Numbers that are drawn within their errors, to tell how far these move a run."""
 HEAVIER = "added_inertia"
 """An effect that without gravity is a force of another scale but for what else resists: it is named
 where it is any likelier."""
@@ -66,7 +69,7 @@ class Calibration:
     Attributes:
         numbers: those that are off.
         fit: of the model with them.
-        errors: their standard errors, as they are fitted.
+        covariance: of their errors, as they are fitted, shape (k, k).
         loss: with the price of the numbers.
         alone: whether they leave nothing that an effect would explain better.
         others: of each number, those that the data cannot tell from it, with their values.
@@ -74,7 +77,7 @@ class Calibration:
 
     numbers: Nuisances
     fit: Fit
-    errors: Array
+    covariance: Array
     loss: float
     alone: bool
     others: tuple[tuple[tuple[NuisanceName, float], ...], ...]
@@ -85,9 +88,31 @@ class Calibration:
         return self.numbers.names
 
     @property
+    def errors(self) -> Array:
+        """Their standard errors, shape (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
     def righted(self) -> AppliedCorrections:
         """What is to be set right."""
-        return righted({str(name): x for name, x in self.numbers.values(self.fit.x).items()})
+        return self._righted(self.fit.x)
+
+    def of(self, measured: Measured) -> Measured:
+        """A joint and its runs with the numbers set right, which are known as well as that."""
+        left = {
+            str(name): float(error) for name, error in zip(self.names, self.errors, strict=True)
+        }
+        return replace(self.righted.of(measured), doubtful=left)
+
+    def drawn(self) -> list[AppliedCorrections]:
+        """The same with numbers that are as likely, within the errors of these."""
+        rng, count = np.random.default_rng(0), len(self.names)
+        off = rng.multivariate_normal(np.zeros(count), self.covariance, DRAWS, method="svd")
+        strengths = self.fit.x[:-count]
+        return [self._righted(np.append(strengths, self.fit.x[-count:] + one)) for one in off]
+
+    def _righted(self, x: Array) -> AppliedCorrections:
+        return righted({str(name): value for name, value in self.numbers.values(x).items()})
 
     def beats(
         self, baseline: Baseline, candidates: Sequence[FittedHypothesis], clearly: bool
@@ -141,7 +166,7 @@ class Calibrator:
 def _longer(measured: Measured, found: Calibration) -> Calibration:
     """The same fitted on in long segments, in which a small error shows; as it was where its
     numbers are others there."""
-    segments = segments_for(measured, LONGEST)
+    segments = segments_for(measured, longest_followed(found.righted.of(measured), LONGEST))
     estimator, old = SegmentEstimator(segments, usable(segments)), found.numbers.base
     joint_model = replace(
         joint_model_for(measured, segments.h), friction_row=old.joint_model.friction_row
@@ -175,7 +200,8 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
         return None
     own = every.only(names)
     widths = np.abs(best.x[baseline.base.count :]) / own.prior_stds
-    if np.any(widths > SURPRISE):  # it stands in for what is missing
+    if np.any(widths > SURPRISE) and excess(best.loss, count) > CALM:
+        # it stands in for what is missing
         surprising = {name for name, off in zip(names, widths, strict=True) if off > SURPRISE}
         rest = tuple(name for name in every.names if name not in surprising)
         return _calibrated(replace(found, every=every.only(rest)), beside) if rest else None
@@ -246,7 +272,9 @@ def _concluded(
     own = every.only(names)
     fit = estimator.fit(own.make, own.unknowns, coarse.x, coarse.start)
     fit = estimator.refit(own.make, own.unknowns, fit)
-    sure = np.abs(fit.x[baseline.base.count :]) > CLEARLY * _errors(found, own, fit, every.names)
+    sure = np.abs(fit.x[baseline.base.count :]) > CLEARLY * np.sqrt(
+        np.diag(_covariance(found, own, fit, every.names))
+    )
     if not sure.all():  # long steps asked for more
         kept = tuple(name for name, there in zip(names, sure, strict=True) if there)
         fewer = replace(fit, x=own.taken(fit.x, kept))
@@ -273,25 +301,25 @@ def _concluded(
             swapped.append(("mass", 1 / own.values(fit.x)["force_scale"]))
         others.append(tuple(swapped))
     alike = {name for one in others for name, _ in one}
-    return Calibration(own, fit, _errors(found, own, fit, alike), loss, alone, tuple(others))
+    return Calibration(own, fit, _covariance(found, own, fit, alike), loss, alone, tuple(others))
 
 
-def _errors(found: _Search, own: Nuisances, fit: Fit, alike: Collection[NuisanceName]) -> Array:
-    """Standard errors of numbers, shape (k,): by the data, and by how far off the others may be
-    that are not set free, but for those that are an alternative to one of these."""
+def _covariance(found: _Search, own: Nuisances, fit: Fit, alike: Collection[NuisanceName]) -> Array:
+    """Covariance of numbers, shape (k, k): by the data, and by how far off the others may be that
+    are not set free, but for those that are an alternative to one of these."""
     estimator, base = found.baseline.estimator, found.baseline.base
     rest = [name for name in found.every.names if name not in (*own.names, *alike)]
     wider = found.every.only((*own.names, *rest))
     there = replace(fit, x=np.append(fit.x, np.zeros(len(rest))))
     prior_std = wider.unknowns.prior_std
-    prior_std[base.count :][: len(own.names)] = ANYTHING
+    numbers = slice(base.count, base.count + len(own.names))
+    prior_std[numbers] = ANYTHING
     covariance = estimator.covariance(wider.make, wider.unknowns, there, prior_std)
-    errors = np.sqrt(np.diag(covariance))[base.count :][: len(own.names)]
     floors = {
         "time_delay": BETWEEN * float(np.median(np.diff(estimator.segments.time))),
         "position_offset": ZERO * float(np.ptp(base.profile.joint.range)),
     }
-    return np.hypot(errors, [floors.get(name, 0.0) for name in own.names])
+    return covariance[numbers, numbers] + np.diag([floors.get(one, 0.0) ** 2 for one in own.names])
 
 
 def _equivalent(baseline: Baseline) -> list[FittedHypothesis]:

@@ -1,5 +1,6 @@
 """Whole runs of a model with its own strengths fitted: how much they are missed by, and why."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -55,17 +56,22 @@ class Worst:
     whole: float
 
 
-def worst(measured: Measured, baseline: Baseline) -> Worst:
+def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = ()) -> Worst:
     """How far a model is off the whole runs.
 
     Args:
         measured: the joint and its runs.
         baseline: the model fitted to them.
+        others: the same with numbers of its body and of the measurement that are as likely.
     """
 
     @cache  # only a run that is missed by much asks for them
-    def others() -> list[Replayer]:
+    def drawn() -> list[Replayer]:
         return [_replayer(measured, baseline, x, finest) for x in _drawn(baseline)]
+
+    @cache
+    def righted() -> list[Replayer]:
+        return [_replayer(other, baseline, baseline.fit.x, finest) for other in others]
 
     @cache
     def fitted(finer: int) -> Replayer:
@@ -73,13 +79,14 @@ def worst(measured: Measured, baseline: Baseline) -> Worst:
 
     finest = FINER if measured.joint_model.servo else 1
 
-    def times(part: Run, sigma: float) -> float:
-        found = replayed(part, sigma, fitted(finest))
+    def times(number: int, part: Run) -> float:
+        found = replayed(number, part, fitted(finest))
         if found <= BEYOND or finest == FINER:
             return found
-        return min(found, replayed(part, sigma, fitted(FINER)))
+        return min(found, replayed(number, part, fitted(FINER)))
 
-    def replayed(part: Run, sigma: float, replayer: Replayer) -> float:
+    def replayed(number: int, part: Run, replayer: Replayer) -> float:
+        sigma = measured.sigma[number]
         if not (start := replayer.start(part, sigma)):
             return 0.0
         path = replayer.whole(part, start)
@@ -87,18 +94,24 @@ def worst(measured: Measured, baseline: Baseline) -> Worst:
         missed = rms(path[there] - part.position[there]) / sigma
         if missed <= BEYOND:
             return missed
-        moved = [other.whole(part, start)[there] - path[there] for other in others()]
+        moved = [other.whole(part, start)[there] - path[there] for other in drawn()]
+        for other, with_it in zip(righted(), others, strict=True):
+            run = with_it.runs[number]  # a delay leaves it without some of its samples
+            force = np.interp(part.time, run.time, run.force)
+            zero = float(np.median(np.interp(part.time, run.time, run.position) - part.position))
+            begun = replace(start, best=start.best + np.array([zero, 0.0]))
+            moved.append((other.whole(replace(part, force=force), begun) - zero - path)[there])
         apart = rms(np.concatenate(moved)) if moved else 0.0
         spread = [sigma, replayer.scatter(part, start), apart]
         return missed * sigma / float(np.linalg.norm(spread))
 
     told, whole = [], 0.0
-    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+    for number, (run, sigma) in enumerate(zip(measured.runs, measured.sigma, strict=True)):
         part = until_end(run, measured.profile.joint.range, CLEAR * sigma)
-        found = times(part, sigma)
+        found = times(number, part)
         if np.ptp(part.position) >= TRAVELLED * np.ptp(run.position):
             told.append(found)
-        whole = max(whole, found if len(part.time) == len(run.time) else times(run, sigma))
+        whole = max(whole, found if len(part.time) == len(run.time) else times(number, run))
     return Worst(max(told, default=whole), whole)
 
 

@@ -23,6 +23,7 @@ from joda.diagnosis.selection import (
     second_counts,
     shows,
 )
+from joda.measured.instability import longest_followed
 from joda.measured.reading import Measured
 
 LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5
@@ -111,11 +112,11 @@ def _unsure(ranking: Ranking, selection: Selection) -> bool:
 
 
 def _longer(measured: Measured, baseline: Baseline) -> Iterator[Baseline]:
-    """The model fitted to longer and longer segments, while runs are longer."""
+    """The model fitted to longer and longer segments, while runs are longer and it can follow."""
     segments = baseline.estimator.segments
-    length, many = segments.length, 0
-    while measured.runs and len(segments.at) != many and length * MUCH_LONGER < LONGEST:
-        length, many = min(LONGER * length, LONGEST), len(segments.at)
+    length, many, longest = segments.length, 0, longest_followed(measured, LONGEST)
+    while measured.runs and len(segments.at) != many and length * MUCH_LONGER < longest:
+        length, many = min(LONGER * length, longest), len(segments.at)
         baseline = fit_baseline(measured, length, baseline.fit.x)
         segments = baseline.estimator.segments
         if len(segments.at) < many:

@@ -1,6 +1,6 @@
 """What a model lacks: the verdict on a ranking, with probabilities, sizes and sentences."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -165,14 +165,14 @@ def diagnosed(
     calibrator = Calibrator(measured)
     found = calibrator.numbers(baseline) if calibrate else None
     if found and found.alone:
-        return _set_right(measured, found, looked(found.righted.of(measured), exclude, progress))
+        return _set_right(measured, found, looked(found.of(measured), exclude, progress))
     plain = looked(measured, exclude, progress, baseline)
     ranking, beside = plain.first[0], False
     if calibrate and found is None and plain.selection.verdict != "adequate":
         ranking, beside = plain.ranking, True
         found = calibrator.numbers(ranking.baseline, beside)
     if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
-        looks = looked(found.righted.of(measured), exclude, progress)
+        looks = looked(found.of(measured), exclude, progress)
         if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
             return _set_right(measured, found, looks)
     puzzled = calibrate and plain.selection.verdict == "unexplained"
@@ -195,7 +195,7 @@ def _in_turns(
         other = measured.changed(profile=likeliest)
         if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
             break
-        looks = looked(found.righted.of(measured), exclude, progress)
+        looks = looked(found.of(measured), exclude, progress)
         if not looks.selection.likely:
             break
         both, ranking = (found, looks), looks.ranking
@@ -204,7 +204,8 @@ def _in_turns(
 
 def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> Diagnosed:
     """What looking at a joint and runs says whose numbers were set right, with these."""
-    out = replace(_concluded(found.righted.of(measured), looks), looks=looks.evidence)
+    others = [one.of(measured) for one in found.drawn()]
+    out = replace(_concluded(found.of(measured), looks, others), looks=looks.evidence)
     numbers = found.corrections(measured)
     report = out.diagnosis
     summary = " ".join(
@@ -214,8 +215,10 @@ def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> 
     return replace(out, diagnosis=diagnosis, calibration=found)
 
 
-def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
-    """What looking at the measurements says."""
+def _concluded(
+    measured: Measured, looks: HorizonSearch, others: Sequence[Measured] = ()
+) -> Diagnosed:
+    """What looking at the measurements says; the others have numbers that are as likely."""
     ranking, selection = looks.ranking, looks.selection
     first_ranking, first_weighed = looks.first
     one_way = moved_one_way(measured)
@@ -225,7 +228,7 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
         return Diagnosed(_report(measured, "insufficient_data", why, (), None))
     suffice = not selection.likely and looks.free and looks.free.suffice
     if selection.verdict == "adequate" or suffice:
-        return _adequate(measured, ranking, looks.free)
+        return _adequate(measured, ranking, looks.free, others)
     held = Holdout(ranking.baseline, measured)
     named = range(min(NAMED, len(ranking.candidates)))
     every = {
@@ -251,7 +254,7 @@ def _concluded(measured: Measured, looks: HorizonSearch) -> Diagnosed:
     hardly |= far_off(first, measured.floor)
     if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
         # nor do segments held out know of anything
-        return _adequate(measured, first_ranking, looks.free)
+        return _adequate(measured, first_ranking, looks.free, others)
     verdict = selection.verdict if helps(first, measured.floor) else "unexplained"
     base, candidate = ranking.baseline.base, ranking.candidates[sized[0]]
     doubt = one_factor(base, candidate) or other_unit(measured)
@@ -292,7 +295,9 @@ def _driven(found: Diagnosed, baseline: Baseline) -> Diagnosed:
     return replace(found, diagnosis=diagnosis, corrected=right)
 
 
-def _adequate(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Diagnosed:
+def _adequate(
+    measured: Measured, ranking: Ranking, free: FreeRuns | None, others: Sequence[Measured]
+) -> Diagnosed:
     """No effect shows in segments: the model is adequate, unless whole runs or curves deny it."""
 
     def unexplained(summary: str, experiment: str | None) -> Diagnosed:
@@ -300,7 +305,7 @@ def _adequate(measured: Measured, ranking: Ranking, free: FreeRuns | None) -> Di
 
     if not measured.runs and _uneven(measured, ranking.baseline):
         return unexplained(_report_uneven(measured), GAUGE_AGAIN)
-    left = worst(measured, ranking.baseline)
+    left = worst(measured, ranking.baseline, others)
     if left.free > BEYOND:
         return unexplained(DRIFTING.format(left.free), AGAIN)
     if free and free.drifting:

@@ -1,6 +1,6 @@
 """Numbers of a joint's body and of its measurement that may be off, as numbers to be fitted."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -14,6 +14,7 @@ from joda.estimation.unknowns import Unknowns
 from joda.joints.joint_model import JointModel
 from joda.measured.reading import Measured
 from joda.measured.sensing import Sensing
+from joda.profile import Profile
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.intp]
@@ -122,17 +123,17 @@ class Nuisances:
     @property
     def make(self) -> Make:
         """The joint as it is seen, by the strengths and these numbers."""
+        return lambda x: self.with_profile(self.base.written(x), x)
 
-        def made(x: Array) -> JointSimulator:
-            base, h = self.base, self.base.h
-            own = self.body(base.own(x), x).stepped(h)
-            return MeasuredSimulator(own.simulator(base.written(x), h), self.sensing(x))  # type: ignore[return-value]
-
-        return made
+    def with_profile(self, profile: Profile, x: Array) -> JointSimulator:
+        """The joint with them, but another profile."""
+        h = self.base.h
+        own = self.body(self.base.own(x), x).stepped(h)
+        return MeasuredSimulator(own.simulator(profile, h), self.sensing(x))  # type: ignore[return-value]
 
     def values(self, x: Array) -> dict[NuisanceName, float]:
-        """Factors, and the other numbers in their units."""
-        own = zip(self.names, map(float, x[self.base.count :]), strict=True)
+        """Factors, and the other numbers in their units; more may follow in x."""
+        own = zip(self.names, map(float, x[self.base.count :]), strict=False)
         return {name: float(np.exp(v)) if name in FACTORS else v for name, v in own}
 
     def little(self, x: Array) -> list[bool]:
@@ -187,6 +188,31 @@ class Nuisances:
     def coarser(self) -> "Nuisances":
         """The same in longer steps, see `BaseModel.coarser`."""
         return replace(self, base=self.base.coarser())
+
+
+@dataclass(frozen=True)
+class CorrectedBase(BaseModel):
+    """A model with numbers of its body and of the measurement that were set right, and are fitted
+    besides its strengths within the errors that are left of them."""
+
+    nuisances: Nuisances
+
+    def coarser(self) -> "CorrectedBase":
+        """The same for longer steps."""
+        longer = self.nuisances.coarser()
+        return replace(self, h=longer.base.h, nuisances=longer)
+
+    def with_profile(self, profile: Profile, x: Array) -> JointSimulator:
+        """The joint with its numbers but another profile."""
+        return self.nuisances.with_profile(profile, x)
+
+
+def corrected_base(base: BaseModel, doubtful: Mapping[str, float]) -> BaseModel:
+    """A model whose numbers that were set right may be off by their errors; itself without such."""
+    names = tuple(name for name in USUAL if name in doubtful)
+    own = Nuisances(base, names, tuple(doubtful[name] for name in names))
+    plain = base.profile, base.joint_model, base.h, base.places
+    return CorrectedBase(*plain, own.unknowns, own) if names else base
 
 
 def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:

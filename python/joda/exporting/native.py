@@ -7,6 +7,8 @@ from pathlib import Path
 import mujoco
 
 from joda.exporting.nearest import Nearest
+from joda.plugin import PLUGIN
+from joda.scenes.engine import delete, set_strength
 from joda.scenes.mjcf import Source
 from joda.scenes.model import write_out
 from joda.scenes.scene import DAMPING_ROW, strip_plugin
@@ -26,16 +28,26 @@ def native(
     strip_plugin(spec)
     for equality in list(spec.equalities):
         if DAMPING_ROW.rstrip("_") in equality.name:
-            spec.delete(equality)
+            delete(spec, equality)
     hinge = mujoco.mjtJoint.mjJNT_HINGE
     for number, own in constants.items():
         joint = spec.joints[number]
-        joint.stiffness[:3] = own.stiffness
-        joint.damping[:3] = (*own.damping, 0.0)
+        set_strength(joint, "stiffness", *own.stiffness)
+        set_strength(joint, "damping", *own.damping, 0.0)
         joint.frictionloss = own.friction
         by_degree = spec.compiler.degree and joint.type == hinge
         joint.springref = degrees(own.reference) if by_degree else own.reference
     spec.compile()
     source = Source(path, write_out(spec, path))
+    _forget_plugin(source)
     source.relocate(folder)
     return source.render()
+
+
+def _forget_plugin(source: Source) -> None:
+    """Takes out that the scene needs the plugin, which MuJoCo writes though nothing has it."""
+    for section in source.root.children:
+        if section.tag == "extension":
+            ours = [one for one in section.children if one.attributes.get("plugin") == PLUGIN]
+            for element in [section] if len(ours) == len(section.own) else ours:
+                element.replace("")

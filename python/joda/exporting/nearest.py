@@ -21,11 +21,12 @@ from joda.effects import (
 from joda.field import evaluate
 from joda.field.table import resistance
 from joda.profile import Channel, Profile
+from joda.scenes.engine import HAS_POLYNOMIALS
 
 Array = NDArray[np.float64]
 Format = Literal["native", "urdf", "sdf", "usd"]
 
-SPRING = {"native": 3, "urdf": 0, "sdf": 1, "usd": 1}
+SPRING = {"native": 3 if HAS_POLYNOMIALS else 1, "urdf": 0, "sdf": 1, "usd": 1}
 """Degree of the spring that a format has."""
 SLACK = 0.01
 """Change over the range of a force that stands for a constant one, as a part of it."""
@@ -105,7 +106,7 @@ def nearest(profile: Profile, to: Format) -> Nearest:
     speed = hi - lo
     v = speed * np.array([-1.0, *(-k for k in SPEEDS[:-1]), *SPEEDS])[:, None]
     drag = _drag(profile, s, v)
-    damping = _damping(v, drag, squares=to == "native")
+    damping = _damping(v, drag, squares=to == "native" and HAS_POLYNOMIALS)
     damped = (damping[0] + damping[1] * np.abs(v)) * v
     errors = (
         _error("conservative force", unit, force - sprung, force),

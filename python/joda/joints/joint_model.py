@@ -91,6 +91,11 @@ class JointModel:
             return np.full(len(position), a)
         return np.asarray(a * np.cos(position) + b * np.sin(position))
 
+    def weight_slope(self, position: Array) -> Array:
+        """Its derivative by the position, N·m/rad or N/m; shape (n,)."""
+        a, b = self.weight if self.hinge else (0.0, 0.0)
+        return np.asarray(b * np.cos(position) - a * np.sin(position))
+
     def limits(self, profile: Profile, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Solver parameters of the ends of the range, solref and solimp, for steps of h (s).
 

@@ -75,6 +75,7 @@ class Measured:
         barred: the note on where the scene would not have let the joint; empty if there is none.
         trust: how far off its numbers, and those of the measurement, may be.
         templates: of effects that may be missing, by name.
+        doubtful: numbers that have been set right, and the errors that are left of them.
     """
 
     context: Context
@@ -92,6 +93,7 @@ class Measured:
     barred: str
     trust: Trust = USUAL
     templates: Mapping[str, Template] = field(default_factory=read_templates)
+    doubtful: Mapping[str, float] = field(default_factory=dict)
 
     def trusting(self, trust: Trust) -> "Measured":
         """The same joint and runs, whose numbers may be so far off."""

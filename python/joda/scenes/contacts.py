@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.profile import Joint
-from joda.scenes.engine import inertia_at
+from joda.scenes.engine import disable_bit, inertia_at
 from joda.scenes.model import geom_name, moves_with
 from joda.scenes.motion import at_home
 
@@ -33,7 +33,7 @@ FELT = 0.02
 """A contact resists if its force would move the joint by half this share of the range in 1 s."""
 FIRM = 1e-6
 """Part of its force on the joint that a contact may exert on others without moving them."""
-ALL_ELSE = ("GRAVITY", "ACTUATION", "SPRING", "DAMPER", "FRICTIONLOSS", "LIMIT", "EQUALITY")
+ALL_ELSE = ("gravity", "actuation", "spring", "damper", "frictionloss", "limit", "equality")
 """What acts on a joint besides contacts."""
 END = 0.01
 """A contact no farther from an end of the range than this share of it is that end's stop."""
@@ -207,7 +207,7 @@ class _Sweep:
         """Only contacts act: pulled away from one by anything else, the joint shows no force."""
         before = self.model.opt.disableflags
         for kind in ALL_ELSE:
-            self.model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{kind}"))
+            self.model.opt.disableflags |= disable_bit(kind)
         try:
             yield
         finally:

@@ -5,8 +5,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from joda.errors import JodaError
-
 VERSION = tuple(int(part) for part in mujoco.__version__.split(".")[:3])
 FORGETS_INSTANCES = (3, 3, 1) <= VERSION < (3, 16)
 """Whether a <replicate> makes MuJoCo forget the plugins' instances of all bodies behind it."""
@@ -30,18 +28,35 @@ def polynomial(model: mujoco.MjModel, field: str, index: int) -> list[float]:
     return [getattr(model, field)[index], *(() if higher is None else higher[index])]
 
 
+HAS_POLYNOMIALS = hasattr(mujoco.MjModel, "jnt_stiffnesspoly")
+"""Whether stiffness and damping of a joint may be polynomials, as they may in newer MuJoCo."""
+
+
 def is_on(model: mujoco.MjModel, flag: str) -> bool:
     """Whether what a flag of <option> can disable acts: "spring", "damper" (older MuJoCo:
     "passive"), "frictionloss", "limit", "equality"; without "constraint" rows none of the last
     three does."""
-    bits = {
-        name: int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}", 0))
-        for name in (flag, "passive", "constraint")
-    }
-    off = bits[flag] or bits["passive"]
+    off = disable_bit(flag)
     if flag in ("frictionloss", "limit", "equality"):
-        off |= bits["constraint"]
+        off |= disable_bit("constraint")
     return not model.opt.disableflags & off
+
+
+def disable_bit(flag: str) -> int:
+    """The bit that disables what a flag of <option> names; before MuJoCo 3.3.6 one bit disables
+    "spring" and "damper" together."""
+    bits = mujoco.mjtDisableBit
+    if not hasattr(bits, "mjDSBL_SPRING") and flag in ("spring", "damper"):
+        flag = "passive"
+    return int(getattr(bits, f"mjDSBL_{flag.upper()}"))
+
+
+def delete(spec: mujoco.MjSpec, element: Any) -> None:
+    """Takes an element out of a spec; before MuJoCo 3.3.4 elements do so themselves."""
+    if hasattr(spec, "delete"):
+        spec.delete(element)
+    else:
+        element.delete()
 
 
 def inertia_at(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:
@@ -52,25 +67,16 @@ def inertia_at(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:
     return float(column[dof])
 
 
-def set_strength(joint: Any, field: str, value: float) -> None:
-    """Gives a joint of an MjSpec a linear strength; from 3.9 on it begins a polynomial.
+def set_strength(joint: Any, field: str, *values: float) -> None:
+    """Gives a joint of an MjSpec a strength; in newer MuJoCo it begins a polynomial.
 
     Args:
         joint: an MjsJoint.
         field: "damping" or "stiffness".
-        value: N·m·s/rad or N·s/m; N·m/rad or N/m.
+        values: N·m·s/rad or N·s/m; N·m/rad or N/m; then those of higher powers, which older MuJoCo
+            does not have.
     """
     if np.ndim(getattr(joint, field)):
-        getattr(joint, field)[0] = value
+        getattr(joint, field)[: len(values)] = values
     else:
-        setattr(joint, field, value)
-
-
-def require(oldest: tuple[int, int, int], what: str) -> None:
-    """Raises JodaError if MuJoCo is older than what something needs."""
-    if oldest > VERSION:
-        needed = ".".join(map(str, oldest))
-        raise JodaError(
-            f"{what} needs MuJoCo {needed} or newer, and {mujoco.__version__} is installed; run: "
-            f"pip install 'mujoco>={needed}'"
-        )
+        setattr(joint, field, values[0])

@@ -7,6 +7,7 @@ import mujoco
 from joda.errors import JodaError
 from joda.plugin import PLUGIN, set_texts, slot
 from joda.profile import ATTRIBUTES, Profile
+from joda.scenes.engine import delete
 from joda.scenes.model import describe_joint, find_joint, load_model
 
 TRACE = "1e-12"
@@ -80,7 +81,7 @@ def strip_plugin(spec: mujoco.MjSpec) -> None:
             body.plugin.active = False
     for plugin in list(spec.plugins):
         if plugin.plugin_name == PLUGIN:
-            spec.delete(plugin)
+            delete(spec, plugin)
 
 
 def read_profiles(path: str | Path) -> dict[str, Profile]:

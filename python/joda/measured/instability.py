@@ -1,0 +1,61 @@
+"""How fast a joint runs away from where it is: where its force pushes it on, errors of a start, or
+of a number, soon are as large as the range."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from joda.field.reference import evaluate
+from joda.measured.reading import Measured
+
+Array = NDArray[np.float64]
+
+GROWN = 0.03
+"""Part of the range to which an error of a position, its noise, may grow in a segment: so far the
+slopes hold by which a fit goes."""
+NEARLY_ALL = 0.9
+"""Part of all segments in which they grow by no more."""
+AT_END = 0.01
+"""How near an end of the range, in ranges, the stop holds a joint."""
+SHORTER = 0.8
+"""Factor by which segments become shorter until that holds."""
+
+
+def longest_followed(measured: Measured, most: float) -> float:
+    """How long segments may be (s) for a model to follow them; at most `most`."""
+    if not measured.runs:
+        return most
+    span, length = float(np.ptp(measured.profile.joint.range)), most
+    by = float(np.log(max(GROWN * span / float(np.median(measured.sigma)), 2.0)))
+    while _grown(measured, length) > by:
+        length *= SHORTER
+    return length
+
+
+def divergence_rate(measured: Measured, position: Array) -> Array:
+    """How fast two motions of the model diverge at positions, 1/s, shape (n,); 0 where they do not.
+
+    The larger root of I r² + c r = k, with the inertia I, the damping c, and k by which the
+    force towards larger positions grows with the position (Lyapunov's indirect method).
+    """
+    profile, joint_model = measured.profile, measured.joint_model
+    lo, hi = profile.joint.range
+    s = (position - lo) / (hi - lo)
+    k = evaluate(profile.channels.conservative, s)[1] / (hi - lo)
+    k = k + joint_model.weight_slope(position)
+    if joint_model.servo is not None:
+        k = k - joint_model.servo.stiffness
+    k = np.where(np.abs(s - 0.5) < 0.5 - AT_END, np.maximum(k, 0.0), 0.0)
+    c, inertia = evaluate(profile.channels.damping, s)[0], joint_model.inertia
+    return np.asarray((np.sqrt(c**2 + 4 * inertia * k) - c) / (2 * inertia))
+
+
+def _grown(measured: Measured, length: float) -> float:
+    """Logarithm of the factor by which errors grow in nearly all stretches of such a length (s)."""
+    found = []
+    for run in measured.runs:
+        rates = divergence_rate(measured, run.position)
+        gaps = np.diff(run.time)
+        grown = np.concatenate([[0.0], np.cumsum(gaps * (rates[1:] + rates[:-1]) / 2)])
+        begins = run.time[: max(int(np.searchsorted(run.time, run.time[-1] - length)), 1)]
+        found.append(np.interp(begins + length, run.time, grown) - grown[: len(begins)])
+    return float(np.quantile(np.concatenate(found), NEARLY_ALL))
