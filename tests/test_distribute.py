@@ -1,6 +1,7 @@
 """Many joints at once: what is made is what the commands make one by one, wherever it is made."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from distributed_cases import make
 
 import joda
 from joda import distribute
+from joda.distributed.pool import by_processes
+from joda.distributed.task import Task
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -76,7 +79,7 @@ def test_resume_does_what_is_not_there_or_has_changed(cases, diagnosed, tmp_path
     shutil.copytree(cases, tmp_path / "cases")
     shutil.rmtree(tmp_path / "cases" / "bad")
     shutil.rmtree(tmp_path / "cases" / "deep")
-    (tmp_path / "out" / "door_0001" / "diagnosis.html").unlink()
+    (tmp_path / "out" / "door_0001" / "diagnosis.html").write_text("another")
     before = contents(tmp_path / "out")
     with pytest.raises(joda.JodaError, match="go on with --resume"):
         distribute("diagnose", tmp_path / "cases", tmp_path / "out")
@@ -115,6 +118,27 @@ def test_generate_does_every_joint_as_by_itself(tmp_path):
     joda.generate(tmp_path / "models" / "knob.xml", "knob", direct, proposer="offline")
     for name in ("composed.json", "proposal.json", "scene.xml", "profile.png"):
         assert (one.folder / name).read_bytes() == (direct / name).read_bytes()
+
+
+class Deadly:
+    """Ends the process that is handed it, as a fault in a library does."""
+
+    def __reduce__(self):
+        return os._exit, (1,)
+
+
+def test_of_a_process_that_dies_only_its_own_task_is_lost(tmp_path):
+    knob = (Path(__file__).parents[1] / "models" / "knob.xml").read_bytes()
+
+    def task(name, content):
+        return Task("generate", name, "knob.xml", "knob", (), "out", {"knob.xml": content}, {})
+
+    tasks = [task("a", knob), task("b", Deadly()), task("c", knob), task("d", b"<mujoco")]
+    done = {one.label: result for one, result in by_processes(tasks, 2)}
+    assert sorted(done) == ["a", "b", "c", "d"]
+    assert [done[name].failed for name in "abcd"] == [False, True, False, True]
+    assert "process that did it died before it was done" in done["b"].told
+    assert "knob.xml" in done["d"].told
 
 
 def test_mistakes_are_one_sentence(cases, tmp_path):
@@ -157,3 +181,7 @@ def test_a_joint_must_be_named_where_there_are_several(cases, tmp_path):
     (case / "door.xml").write_text(two)
     (one,) = distribute("diagnose", tmp_path / "cases", tmp_path / "out", workers=1)
     assert one.failed and "2 hinges and slides with a range ('door', 'b'); name one" in one.told
+    command = ["distribute", "diagnose", tmp_path / "cases", "-o", tmp_path / "again"]
+    run = subprocess.run([sys.executable, "-m", "joda", *command], capture_output=True, text=True)
+    assert run.returncode == 2 and "name one with --joint" in run.stdout
+    assert "1 of 1 joints have no result; see above." in run.stderr

@@ -144,6 +144,7 @@ def mass_matrix(model, q, less=0.0):
 def test_native_makes_the_error_that_it_tells(scene, model, tmp_path):
     """Force by force against the plugin, over the range; it needs no plugin."""
     told = {one.joint: one for one in export(scene, "native", tmp_path / "n.xml").joints}
+    assert "extension" not in (text := (tmp_path / "n.xml").read_text()) and "joda" not in text
     other = mujoco.MjModel.from_xml_path(str(tmp_path / "n.xml"))
     assert (other.nplugin, other.neq, other.njnt) == (0, 0, model.njnt)
     assert other.dof_armature[0] == pytest.approx(0.01)

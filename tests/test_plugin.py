@@ -6,11 +6,14 @@ import subprocess
 import sys
 
 import mujoco
+import numpy as np
 import pytest
 from joints import component, flat, load, scene
 
 import joda
 from joda import plugin
+from joda.component import Component
+from joda.profile import Channels, Joint, Profile, Resistance
 
 TWO_JOINTS = """
 <mujoco><extension><plugin plugin="joda.joint_dynamics">
@@ -184,3 +187,21 @@ def test_hand_edited_text_is_read_generously():
         data.qpos[0] = position
         mujoco.mj_forward(model, data)
         assert data.qfrc_passive[0] == pytest.approx(force)
+
+
+def test_a_model_whose_muscles_are_measured_while_it_compiles_loads(tmp_path):
+    """MuJoCo steps the model then, before any plugin is initialised."""
+    (tmp_path / "arm.xml").write_text(
+        '<mujoco><worldbody><body><joint name="elbow" range="0 90"/>'
+        '<geom size=".1" pos=".3 0 0" mass="1"/></body></worldbody>'
+        '<actuator><muscle joint="elbow"/></actuator></mujoco>'
+    )
+    rubs = Resistance(components=(Component(interval=(0, 1), x=(0, 1), y=(0.3, 0.3)),))
+    joint = Joint(name="elbow", type="hinge", range=(0, np.pi / 2), unit="rad")
+    profile = Profile(joint=joint, channels=Channels(friction=rubs))
+    joda.attach(tmp_path / "arm.xml", profile, tmp_path / "rubs.xml")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "rubs.xml"))
+    assert model.actuator_lengthrange[0] == pytest.approx((0, np.pi / 2), abs=0.05)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 10)
+    assert model.nplugin == 1 and np.isfinite(data.qpos).all()

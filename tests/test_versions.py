@@ -111,6 +111,30 @@ def test_the_plugins_physics(python):
 
 
 @pytest.mark.slow
+def test_commands_run_in_each(python, tmp_path):
+    model, profile, scene = (tmp_path / name for name in ("lid.xml", "lid.json", "scene.xml"))
+    model.write_text(
+        '<mujoco><worldbody><body><joint name="lid" range="0 90" damping="0.1"/>'
+        '<geom size=".1" pos=".3 0 0" mass="1" contype="0"/></body></worldbody>'
+        '<actuator><muscle joint="lid"/></actuator></mujoco>'
+    )
+    joint = {"name": "lid", "type": "hinge", "range": [0, 1.5708], "unit": "rad"}
+    curve = {"interval": [0, 1], "x": [0, 0.5, 1], "y": [0.2, 0.5, 0.1]}
+    channels = {"conservative": {"components": [curve]}, "friction": {"components": [curve]}}
+    profile.write_text(json.dumps({"joint": joint, "channels": channels}))
+    for command in (
+        ["attach", model, profile, "-o", scene],
+        ["simulate", scene, "--joint", "lid", "--release", "1.0", "-o", tmp_path / "run.csv"],
+        ["compare", scene, tmp_path / "run.csv", "--joint", "lid"],
+        ["export", scene, "--to", "native", "-o", tmp_path / "native.xml"],
+        ["generate", model, "-o", tmp_path / "made", "--proposer", "offline"],
+    ):
+        result = python("-m", "joda", *command)
+        assert result.returncode == 0, result.stderr
+    assert "extension" not in (tmp_path / "native.xml").read_text()
+
+
+@pytest.mark.slow
 def test_what_a_version_lacks_is_refused_in_a_sentence(python, tmp_path):
     if python.version == "3.17.0":
         pytest.skip("it has all that joda needs")

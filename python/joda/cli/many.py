@@ -74,14 +74,16 @@ def distribute(
             what, cases, output, joint=joint, passive=passive, describe=describe, ray=ray,
             workers=workers, resume=resume, force=force, progress=bar,
         )  # fmt: skip
+    failed = sum(one.failed for one in done)
     if as_json:
         print_json([{**asdict(one), "folder": str(one.folder)} for one in done])
-        return
-    for one in done:
-        state = "failed: " if one.failed else "kept: " if one.kept else ""
-        say(f"{one.label}: {state}{one.told}")
-    failed = sum(one.failed for one in done)
-    say(f"{len(done) - failed} of {len(done)} done; {output}")
+    else:
+        for one in done:
+            state = "failed: " if one.failed else "kept: " if one.kept else ""
+            say(f"{one.label}: {state}{one.told}")
+        say(f"{len(done) - failed} of {len(done)} done; {output}")
+    if failed:
+        raise JodaError(f"{failed} of {len(done)} joints have no result; see above.")
 
 
 def evaluate(

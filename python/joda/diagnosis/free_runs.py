@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from joda.diagnosis.baseline import Baseline
+from joda.measured.instability import followed
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
 from joda.measured.replay import Replayer
@@ -106,7 +107,8 @@ def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = (
         return missed * sigma / float(np.linalg.norm(spread))
 
     told, whole = [], 0.0
-    for number, (run, sigma) in enumerate(zip(measured.runs, measured.sigma, strict=True)):
+    for number, (whole_run, sigma) in enumerate(zip(measured.runs, measured.sigma, strict=True)):
+        run = followed(measured, whole_run, sigma)
         part = until_end(run, measured.profile.joint.range, CLEAR * sigma)
         found = times(number, part)
         if np.ptp(part.position) >= TRAVELLED * np.ptp(run.position):

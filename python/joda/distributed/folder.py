@@ -9,7 +9,7 @@ from typing import Any
 
 from joda.commands.generate_all import MODELS, find_jobs
 from joda.distributed.pool import by_processes, by_ray
-from joda.distributed.task import Result, Task, What, folder_of
+from joda.distributed.task import Result, Task, What, digest, folder_of
 from joda.errors import JodaError
 from joda.files import make_folder, occupied, write_together
 
@@ -206,8 +206,8 @@ def _kept(folder: Path, task: Task) -> str | None:
     """What the folder's result tells, if it is of this task; None: there is none."""
     try:
         told = json.loads((folder / RESULT).read_text("utf-8"))
-        there = all((folder / name).exists() for name in told["files"])
-        same = there and told["task"] == task.digest
+        there = {name: digest((folder / name).read_bytes()) for name in told["files"]}
+        same = there == told["files"] and told["task"] == task.digest
         return str(told["told"]) if same else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
@@ -215,7 +215,8 @@ def _kept(folder: Path, task: Task) -> str | None:
 
 def _write(folder: Path, task: Task, result: Result) -> None:
     """Writes all files of a result, or none; what says that they are there comes last."""
-    told = {"task": task.digest, "told": result.told, "files": sorted(result.files)}
+    files = {name: digest(content) for name, content in sorted(result.files.items())}
+    told = {"task": task.digest, "told": result.told, "files": files}
     for name in result.files:
         make_folder((folder / name).parent)
     make_folder(folder)

@@ -3,7 +3,8 @@
 import os
 import socket
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import Any
 
@@ -14,6 +15,13 @@ HERE = "local"
 """In the place of a cluster's address: Ray on this machine."""
 PATIENCE = 10
 """Within which a cluster must answer, s."""
+DIED = Result(
+    {},
+    "the process that did it died before it was done: it lacked memory, or MuJoCo or one of its "
+    "plugins has a fault; try that model by itself.",
+    True,
+)
+"""What a task comes to whose process dies."""
 AHEAD = 4
 """Tasks per worker that are handed out before one is done: their files wait in memory."""
 
@@ -21,27 +29,57 @@ AHEAD = 4
 def by_processes(tasks: Iterable[Task], workers: int | None) -> Iterator[tuple[Task, Result]]:
     """Runs tasks in processes of this machine; yields them as they are done.
 
+    Where a process dies its pool is lost with all that it was doing: those tasks are done once
+    more, each by itself, so that only the one fails that it died of.
+
     Args:
         tasks: made as they are needed.
         workers: processes, by default one per core.
     """
-    count = workers or os.cpu_count() or 1
+    count, rest, lost = workers or os.cpu_count() or 1, iter(tasks), list[Task]()
+    while True:
+        yield from _side_by_side(rest, count, lost)
+        if not lost:
+            return
+        for task in lost:
+            alone = list(_side_by_side([task], 1, []))
+            yield from alone or [(task, DIED)]
+        lost.clear()
+
+
+def _side_by_side(
+    tasks: Iterable[Task], count: int, lost: list[Task]
+) -> Iterator[tuple[Task, Result]]:
+    """The same in one pool; ends early where one of its processes dies, and adds what is then
+    `lost`."""
     with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-        waiting: dict[Any, Task] = {}
+        waiting: dict[Future[Result], Task] = {}
         try:
             for task in tasks:
-                waiting[pool.submit(run, task)] = task
+                waiting[_submitted(pool, task)] = task
                 if len(waiting) >= AHEAD * count:
                     yield _next(waiting)
             while waiting:
                 yield _next(waiting)
+        except BrokenProcessPool:
+            lost += waiting.values()
         finally:
             pool.shutdown(cancel_futures=True)
 
 
-def _next(waiting: dict[Any, Task]) -> tuple[Task, Result]:
+def _submitted(pool: ProcessPoolExecutor, task: Task) -> Future[Result]:
+    try:
+        return pool.submit(run, task)
+    except BrokenProcessPool as error:
+        gone: Future[Result] = Future()
+        gone.set_exception(error)
+        return gone
+
+
+def _next(waiting: dict[Future[Result], Task]) -> tuple[Task, Result]:
     first = next(as_completed(waiting))
-    return waiting.pop(first), first.result()
+    result = first.result()
+    return waiting.pop(first), result
 
 
 def by_ray(
@@ -75,7 +113,13 @@ def by_ray(
 
         def done() -> tuple[Task, Result]:
             (first,), _ = ray.wait(list(waiting), num_returns=1)
-            return waiting.pop(first), ray.get(first)
+            task = waiting.pop(first)
+            try:
+                return task, ray.get(first)
+            except ray.exceptions.RayTaskError:
+                raise
+            except ray.exceptions.RayError:
+                return task, DIED
 
         for task in tasks:
             waiting[remote(task)] = task

@@ -47,12 +47,10 @@ class Task:
     @property
     def digest(self) -> str:
         """Of all that the result depends on but joda's version and where the folders are."""
-        told = json.dumps([self.what, self.joint, dict(self.options)], sort_keys=True)
-        digest, here = hashlib.sha256(told.encode()), posixpath.dirname(self.model)
-        for path, content in sorted(self.files.items()):
-            digest.update(posixpath.relpath(path, here).encode() + b"\0")
-            digest.update(hashlib.sha256(content).digest())
-        return digest.hexdigest()
+        here = posixpath.dirname(self.model)
+        files = {posixpath.relpath(path, here): digest(own) for path, own in self.files.items()}
+        told = [self.what, self.joint, dict(self.options), files]
+        return digest(json.dumps(told, sort_keys=True).encode())
 
     @property
     def size(self) -> int:
@@ -78,6 +76,11 @@ class Result:
     def size(self) -> int:
         """Bytes of its files."""
         return sum(map(len, self.files.values()))
+
+
+def digest(content: bytes) -> str:
+    """By which content is known again."""
+    return hashlib.sha256(content).hexdigest()
 
 
 def run(task: Task) -> Result:

@@ -3,9 +3,11 @@ of a number, soon are as large as the range."""
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from joda.field.reference import evaluate
 from joda.measured.reading import Measured
+from joda.measured.runs import Run
 
 Array = NDArray[np.float64]
 
@@ -24,11 +26,16 @@ def longest_followed(measured: Measured, most: float) -> float:
     """How long segments may be (s) for a model to follow them; at most `most`."""
     if not measured.runs:
         return most
-    span, length = float(np.ptp(measured.profile.joint.range)), most
-    by = float(np.log(max(GROWN * span / float(np.median(measured.sigma)), 2.0)))
+    length, by = most, _bearable(measured, float(np.median(measured.sigma)))
     while _grown(measured, length) > by:
         length *= SHORTER
     return length
+
+
+def followed(measured: Measured, run: Run, sigma: float) -> Run:
+    """A run as far as a model can follow it from its begin, which its noise of `sigma` tells."""
+    end = np.searchsorted(_growth(measured, run), _bearable(measured, sigma), side="right")
+    return run.part(slice(0, int(end)))
 
 
 def divergence_rate(measured: Measured, position: Array) -> Array:
@@ -49,13 +56,23 @@ def divergence_rate(measured: Measured, position: Array) -> Array:
     return np.asarray((np.sqrt(c**2 + 4 * inertia * k) - c) / (2 * inertia))
 
 
+def _bearable(measured: Measured, sigma: float) -> float:
+    """Logarithm of the factor by which an error of the noise may grow."""
+    span = float(np.ptp(measured.profile.joint.range))
+    return float(np.log(max(GROWN * span / sigma, 2.0)))
+
+
+def _growth(measured: Measured, run: Run) -> Array:
+    """Logarithm of the factor by which errors have grown since the run began, shape (n,)."""
+    rates = divergence_rate(measured, run.position)
+    return np.asarray(cumulative_trapezoid(rates, run.time, initial=0.0))
+
+
 def _grown(measured: Measured, length: float) -> float:
-    """Logarithm of the factor by which errors grow in nearly all stretches of such a length (s)."""
+    """The same over nearly all stretches of such a length (s)."""
     found = []
     for run in measured.runs:
-        rates = divergence_rate(measured, run.position)
-        gaps = np.diff(run.time)
-        grown = np.concatenate([[0.0], np.cumsum(gaps * (rates[1:] + rates[:-1]) / 2)])
+        grown = _growth(measured, run)
         begins = run.time[: max(int(np.searchsorted(run.time, run.time[-1] - length)), 1)]
         found.append(np.interp(begins + length, run.time, grown) - grown[: len(begins)])
     return float(np.quantile(np.concatenate(found), NEARLY_ALL))
