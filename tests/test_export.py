@@ -221,6 +221,9 @@ def test_a_force_that_pushes_away_becomes_a_constant_one(tmp_path):
     for q in (-0.4, 0.5, 1.4):
         assert -told.stiffness[0] * (q - told.reference) == pytest.approx(2, rel=0.011)
     assert told.errors[0].rms == pytest.approx(2 / np.sqrt(12), rel=0.03)
+    (told,) = export(tmp_path / "scene.xml", "usd", tmp_path / "o.usda").joints
+    assert told.reference == pytest.approx(2 * np.pi)  # PhysX takes no angle beyond
+    assert -told.stiffness[0] * (0.5 - told.reference) == pytest.approx(2, rel=1e-6)
 
 
 def test_the_sdf_is_the_scene(scene, model, tmp_path):

@@ -30,6 +30,8 @@ SPRING = {"native": 3 if HAS_POLYNOMIALS else 1, "urdf": 0, "sdf": 1, "usd": 1}
 """Degree of the spring that a format has."""
 SLACK = 0.01
 """Change over the range of a force that stands for a constant one, as a part of it."""
+FARTHEST = 2 * np.pi
+"""Largest angle, rad, to which PhysX drives a hinge: it refuses a target beyond."""
 POINTS = 501
 SPEEDS = (0.25, 0.5, 1.0)
 """At which damping is compared, in ranges per second."""
@@ -94,7 +96,8 @@ def nearest(profile: Profile, to: Format) -> Nearest:
     q = lo + s * (hi - lo)
 
     force = _force(profile, s, q)
-    stiffness, reference = _spring(q, force, SPRING[to])
+    farthest = FARTHEST if to == "usd" and profile.joint.type == "hinge" else np.inf
+    stiffness, reference = _spring(q, force, SPRING[to], farthest)
     x = q - reference
     sprung = -x * (stiffness[0] + x * (stiffness[1] + x * stiffness[2]))
 
@@ -178,12 +181,14 @@ def _drag(profile: Profile, s: Array, v: Array) -> Array:
     return rate * v + beside
 
 
-def _spring(q: Array, force: Array, degree: int) -> tuple[tuple[float, float, float], float]:
-    """Coefficients and zero of the nearest spring."""
+def _spring(
+    q: Array, force: Array, degree: int, farthest: float
+) -> tuple[tuple[float, float, float], float]:
+    """Coefficients and zero of the nearest spring, which of a line is no farther than that."""
     middle, width = float(q[0] + q[-1]) / 2, float(q[-1] - q[0])
     if degree == 0 or not force.any():
         return (0.0, 0.0, 0.0), middle
-    line = _line(q, force, middle, width)
+    line = _line(q, force, middle, width, farthest)
     if degree == 1:
         return line
     u = (q - middle) / width
@@ -201,12 +206,13 @@ def _spring(q: Array, force: Array, degree: int) -> tuple[tuple[float, float, fl
 
 
 def _line(
-    q: Array, force: Array, middle: float, width: float
+    q: Array, force: Array, middle: float, width: float, farthest: float
 ) -> tuple[tuple[float, float, float], float]:
     """A linear spring, which must not push away; a constant force is a weak one from afar."""
     slope, _ = np.polyfit(q - middle, force, 1)
     mean = float(force.mean())
-    least = SLACK * abs(mean) / width
+    away = max(farthest - float(np.sign(mean)) * middle, width)
+    least = max(SLACK / width, 1 / away) * abs(mean)
     k = max(-float(slope), least)
     return (k, 0.0, 0.0), middle + mean / k if k else middle
 
