@@ -37,7 +37,7 @@ USUAL: dict[NuisanceName, float] = {
     "gravity": 0.03,
     "center_of_mass": 0.0,
     "force_scale": 0.3,
-    "force_offset": 0.05,
+    "force_offset": 0.1,
     "time_delay": 0.02,
     "position_offset": 0.02,
 }
