@@ -310,6 +310,12 @@ def test_what_does_not_fit_is_refused():
             "import importlib.metadata as told; told.version = lambda name: '3.9.1'",
             "joda.warp works with mujoco-warp 3.11, 3.17 and 4.0 and found 3.9.1",
         ),
+        (
+            "import mujoco; del mujoco.mjtSolver",
+            f"does not go with mujoco {mujoco.__version__} (module 'mujoco' has no attribute "
+            "'mjtSolver'); give both the same of the versions 3.11, 3.17 and 4.0, e.g. run: "
+            "pip install 'mujoco==4.0.*' 'mujoco-warp==4.0.*'",
+        ),
     ],
 )
 def test_without_a_fitting_mujoco_warp_one_sentence_says_what_to_install(change, said):
@@ -329,6 +335,21 @@ def test_the_example_of_the_docs(tmp_path):
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     assert run.stdout.endswith("(16, 1)\n")
+
+
+@pytest.mark.parametrize(
+    ("option", "worlds", "said"),
+    [
+        ('solver="PGS"', 1, "(worlds: 1): mjSOL_PGS is unsupported."),
+        ('><flag override="enable"/></option><option', 1, "mjENBL_OVERRIDE is unsupported."),
+        ("", 10**9, "MuJoCo Warp refuses the scene (worlds: 1000000000): "),
+    ],
+)
+def test_the_bench_says_what_mujoco_warp_refuses(option, worlds, said, tmp_path):
+    path = tmp_path / "scene.xml"
+    path.write_text(warp_parity.scene(STEEL, option=option))
+    with pytest.raises(joda.JodaError, match=re.escape(said)):
+        bench(path, worlds=[worlds])
 
 
 def test_the_bench_counts_steps_and_kernels():
