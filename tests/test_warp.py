@@ -281,14 +281,25 @@ def test_what_does_not_fit_is_refused():
         joda.warp.attach(m, d, fields)
     with pytest.raises(joda.JodaError, match="same joints in the same order"):
         joda.warp.put_fields(model, [STEEL, {"arm": STEEL["arm"]}], 2)
-    with pytest.raises(joda.JodaError, match=r"mask has the shape \(3,\)"):
-        fields.reset([True] * 3)
+    for mask, is_it in (
+        ([True] * 3, "mask is of bool and has the shape (3,); give booleans of the shape (2,)"),
+        ([0, 1], "mask is of int64 and has the shape (2,); give booleans"),
+        (wp.array([1, 0], dtype=int), "mask is of int32 and has the shape (2,); give booleans"),
+    ):
+        with pytest.raises(joda.JodaError, match=re.escape(is_it)):
+            fields.reset(mask)
     elsewhere = SimpleNamespace(nworld=2, qpos=SimpleNamespace(device="cuda:0"))
     fields = joda.warp.put_fields(model, STEEL, 2, device="cpu")
     with pytest.raises(joda.JodaError, match="the data are on cuda:0 and the fields on cpu"):
         joda.warp.attach(m, elsewhere, fields)
-    with pytest.raises(joda.JodaError, match="at least one world"):
-        joda.warp.put_fields(model, STEEL, 0)
+    for nworld in (0, 2.5):
+        with pytest.raises(joda.JodaError, match=f"nworld is {nworld}; give a whole number, at le"):
+            joda.warp.put_fields(model, STEEL, nworld)
+    for nothing in ({}, []):
+        with pytest.raises(joda.JodaError, match="there is no profile; give that of at least one"):
+            joda.warp.put_fields(model, nothing, 4)
+    with pytest.raises(joda.JodaError, match="'arm' is a hinge and its profile that of a slide; "):
+        joda.warp.put_fields(model, {"arm": STEEL["drawer"]}, 4)
     other.dof_frictionloss[:] = 0
     with pytest.raises(joda.JodaError, match="no friction row"):
         joda.warp.put_fields(other, {"arm": STEEL["arm"]}, 2)
