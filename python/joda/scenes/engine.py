@@ -53,7 +53,7 @@ def inertia_at(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:
 
 
 def set_strength(joint: Any, field: str, value: float) -> None:
-    """Gives a joint of an MjSpec a linear strength; from 3.9 on it begins a polynomial.
+    """Gives a joint of an MjSpec a linear strength; from 3.7 on it begins a polynomial.
 
     Args:
         joint: an MjsJoint.
