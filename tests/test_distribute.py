@@ -3,16 +3,18 @@
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from distributed_cases import make
 
 import joda
 from joda import distribute
-from joda.distributed.pool import by_processes
+from joda.distributed.pool import by_processes, by_ray
 from joda.distributed.task import Task
 
 
@@ -166,6 +168,21 @@ def test_a_cluster_that_does_not_answer_is_one_sentence(cases, tmp_path):
     pytest.importorskip("ray")
     with pytest.raises(joda.JodaError, match=r"no Ray cluster answers at 127\.0\.0\.1:1;"):
         distribute("diagnose", cases, tmp_path / "out", ray="127.0.0.1:1")
+
+
+@pytest.mark.parametrize("error", [ConnectionError, RuntimeError, ValueError, KeyError])
+def test_what_answers_and_is_no_cluster_that_can_be_used_is_one_sentence(error, monkeypatch):
+    def init(address, **_):
+        raise error("no token")
+
+    ray = SimpleNamespace(init=init, exceptions=SimpleNamespace(RayError=KeyError))
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    monkeypatch.setenv("RAY_NUM_REDIS_GET_RETRIES", "1")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        told = rf"no Ray cluster can be used at {address} \('?no token'?\); does `ray start"
+        with pytest.raises(joda.JodaError, match=told):
+            next(by_ray([], address, None))
 
 
 def test_a_joint_must_be_named_where_there_are_several(cases, tmp_path):

@@ -13,6 +13,7 @@ import mujoco
 import pytest
 
 import joda
+from joda import plugin
 from joda.commands import doctor
 
 
@@ -79,6 +80,32 @@ def test_a_plugin_that_is_no_library(package):
     plugin = checks("plugin()", PYTHONPATH=str(package.parent))["plugin"]
     assert (plugin["state"], plugin["fatal"]) == ("broken", True)
     assert "does not load" in plugin["found"]
+
+
+def test_a_plugin_that_was_compiled_here_and_is_damaged(tmp_path, monkeypatch):
+    """Reinstalling would not help: the cache stays."""
+    damaged = tmp_path / "joda" / "plugins" / "libjoda_plugin.so"
+    damaged.parent.mkdir(parents=True)
+    damaged.write_text("not a library")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for module in (plugin, doctor):
+        monkeypatch.setattr(module, "plugin_path", lambda: damaged)
+    told = r"\.so: cannot be loaded \(.*\); delete it, so that it is compiled anew\.$"
+    with pytest.raises(joda.JodaError, match=told):
+        plugin._library.__wrapped__(mujoco.__version__)
+    monkeypatch.setattr(doctor, "_child", lambda code: (False, "file too short"))
+    [check] = doctor._plugin()
+    assert (check.state, check.remedy) == ("broken", f"run: rm {damaged}")
+
+
+def test_no_compiler(monkeypatch):
+    def none():
+        raise joda.JodaError("joda has no plugin and cannot compile it.")
+
+    monkeypatch.setattr(doctor, "plugin_path", none)
+    monkeypatch.setattr(doctor, "compiler", list)
+    [check] = doctor._plugin()
+    assert check.remedy.endswith("apt-get install g++, or install a wheel of joda")
 
 
 def test_a_plugin_with_a_wrong_answer(monkeypatch):

@@ -29,7 +29,6 @@ ELSEWHERE = {
     " cannot be used: it was taken just now.",  # between the look and the use
     ": MuJoCo wrote ",  # it would be at fault
     " has no folder; run: pip install mujoco==",  # needs an environment without MuJoCo
-    "); reinstall joda with pip.",  # needs a library that is damaged
 }
 
 

@@ -281,14 +281,25 @@ def test_what_does_not_fit_is_refused():
         joda.warp.attach(m, d, fields)
     with pytest.raises(joda.JodaError, match="same joints in the same order"):
         joda.warp.put_fields(model, [STEEL, {"arm": STEEL["arm"]}], 2)
-    with pytest.raises(joda.JodaError, match=r"mask has the shape \(3,\)"):
-        fields.reset([True] * 3)
+    for mask, is_it in (
+        ([True] * 3, "mask is of bool and has the shape (3,); give booleans of the shape (2,)"),
+        ([0, 1], "mask is of int64 and has the shape (2,); give booleans"),
+        (wp.array([1, 0], dtype=int), "mask is of int32 and has the shape (2,); give booleans"),
+    ):
+        with pytest.raises(joda.JodaError, match=re.escape(is_it)):
+            fields.reset(mask)
     elsewhere = SimpleNamespace(nworld=2, qpos=SimpleNamespace(device="cuda:0"))
     fields = joda.warp.put_fields(model, STEEL, 2, device="cpu")
     with pytest.raises(joda.JodaError, match="the data are on cuda:0 and the fields on cpu"):
         joda.warp.attach(m, elsewhere, fields)
-    with pytest.raises(joda.JodaError, match="at least one world"):
-        joda.warp.put_fields(model, STEEL, 0)
+    for nworld in (0, 2.5):
+        with pytest.raises(joda.JodaError, match=f"nworld is {nworld}; give a whole number, at le"):
+            joda.warp.put_fields(model, STEEL, nworld)
+    for nothing in ({}, []):
+        with pytest.raises(joda.JodaError, match="there is no profile; give that of at least one"):
+            joda.warp.put_fields(model, nothing, 4)
+    with pytest.raises(joda.JodaError, match="'arm' is a hinge and its profile that of a slide; "):
+        joda.warp.put_fields(model, {"arm": STEEL["drawer"]}, 4)
     other.dof_frictionloss[:] = 0
     with pytest.raises(joda.JodaError, match="no friction row"):
         joda.warp.put_fields(other, {"arm": STEEL["arm"]}, 2)
@@ -310,6 +321,12 @@ def test_what_does_not_fit_is_refused():
             "import importlib.metadata as told; told.version = lambda name: '3.9.1'",
             "joda.warp works with mujoco-warp 3.11, 3.17 and 4.0 and found 3.9.1",
         ),
+        (
+            "import mujoco; del mujoco.mjtSolver",
+            f"does not go with mujoco {mujoco.__version__} (module 'mujoco' has no attribute "
+            "'mjtSolver'); give both the same of the versions 3.11, 3.17 and 4.0, e.g. run: "
+            "pip install 'mujoco==4.0.*' 'mujoco-warp==4.0.*'",
+        ),
     ],
 )
 def test_without_a_fitting_mujoco_warp_one_sentence_says_what_to_install(change, said):
@@ -329,6 +346,21 @@ def test_the_example_of_the_docs(tmp_path):
     run = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     assert run.stdout.endswith("(16, 1)\n")
+
+
+@pytest.mark.parametrize(
+    ("option", "worlds", "said"),
+    [
+        ('solver="PGS"', 1, "(worlds: 1): mjSOL_PGS is unsupported."),
+        ('><flag override="enable"/></option><option', 1, "mjENBL_OVERRIDE is unsupported."),
+        ("", 10**9, "MuJoCo Warp refuses the scene (worlds: 1000000000): "),
+    ],
+)
+def test_the_bench_says_what_mujoco_warp_refuses(option, worlds, said, tmp_path):
+    path = tmp_path / "scene.xml"
+    path.write_text(warp_parity.scene(STEEL, option=option))
+    with pytest.raises(joda.JodaError, match=re.escape(said)):
+        bench(path, worlds=[worlds])
 
 
 def test_the_bench_counts_steps_and_kernels():

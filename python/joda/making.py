@@ -43,8 +43,8 @@ def make(sources: Path, version: str) -> Path:
             f"{missing}{mujoco} has no headers and no library to link with, or {sources} no "
             "sources; install a wheel of joda."
         )
-    compiler = _compiler()
-    if not compiler:
+    command = compiler()
+    if not command:
         raise JodaError(
             f"{missing}there is no C++ compiler (on Debian or Ubuntu: apt-get install g++)."
         )
@@ -55,7 +55,7 @@ def make(sources: Path, version: str) -> Path:
             made = Path(folder) / target.name
             include = [f"-I{sources}", "-isystem", str(mujoco / "include")]
             link = [str(library[0]), f"-Wl,-rpath,{mujoco}", "-o", str(made)]
-            _run([*compiler, *FLAGS, *include, *files, *link], missing)
+            _run([*command, *FLAGS, *include, *files, *link], missing)
             if sys.platform == "darwin":  # the library names a framework that it is not in
                 framework = f"@rpath/mujoco.framework/Versions/A/{library[0].name}"
                 change = ["-change", framework, str(library[0]), str(made)]
@@ -84,7 +84,7 @@ def _place(sources: Path, mujoco: Path) -> Path:
     return cache_folder() / "plugins" / what.hexdigest()[:16]
 
 
-def _compiler() -> list[str]:
+def compiler() -> list[str]:
     """The command of $CXX, or of the first compiler that is there; empty if there is none."""
     if asked := shlex.split(os.environ.get("CXX", "")):
         return asked

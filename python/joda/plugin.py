@@ -13,6 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 from joda.errors import JodaError
+from joda.files import cache_folder
 from joda.making import make
 
 PLUGIN = "joda.joint_dynamics"
@@ -39,6 +40,11 @@ def plugin_path() -> Path:
     folder = Path(__file__).resolve().parent
     found = sorted((folder / "plugins").glob(f"*joda_plugin-{version}.*"))
     return found[0] if found else make(folder / "cpp", version)
+
+
+def made_here(path: Path) -> bool:
+    """Whether a library was compiled into the user's cache, which outlives an installation."""
+    return cache_folder() in path.parents
 
 
 def load_into_older() -> None:
@@ -72,7 +78,8 @@ def _library(running: str) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
-        raise JodaError(f"{path}: cannot be loaded ({error}); reinstall joda with pip.") from None
+        remedy = "delete it, so that it is compiled anew" if made_here(path) else "reinstall joda"
+        raise JodaError(f"{path}: cannot be loaded ({error}); {remedy}.") from None
 
 
 def slot() -> int:

@@ -20,7 +20,8 @@ from typing import Literal
 
 from joda.errors import JodaError
 from joda.files import cache_folder
-from joda.plugin import PLUGIN, plugin_path
+from joda.making import compiler
+from joda.plugin import PLUGIN, made_here, plugin_path
 
 State = Literal["ok", "missing", "broken"]
 
@@ -106,6 +107,8 @@ def _pip(*arguments: str) -> str:
 
 REINSTALL = f"in a clone of joda, {_pip('--force-reinstall', '--no-deps', '.')}"
 
+COMPILER = "on Debian or Ubuntu, run: apt-get install g++, or install a wheel of joda"
+
 
 def doctor() -> list[Check]:
     """Looks at everything that joda uses; takes some seconds."""
@@ -150,13 +153,15 @@ def _plugin() -> list[Check]:
     try:
         path = plugin_path()
     except JodaError as error:
-        return [Check("plugin", "missing", str(error).rstrip("."), REINSTALL, needed=True)]
+        remedy = REINSTALL if compiler() else COMPILER
+        return [Check("plugin", "missing", str(error).rstrip("."), remedy, needed=True)]
+    remedy = f"run: {shlex.join(['rm', str(path)])}" if made_here(path) else REINSTALL
     works, told = _child(PLUGIN_CODE)
     if not works:
-        return [Check("plugin", "broken", f"{path} does not load: {told}", REINSTALL, needed=True)]
+        return [Check("plugin", "broken", f"{path} does not load: {told}", remedy, needed=True)]
     if abs(float(told) - FORCE) > 1e-12:
         told = f"{path} gives a force of {told} N·m where {FORCE} is right"
-        return [Check("plugin", "broken", told, REINSTALL, needed=True)]
+        return [Check("plugin", "broken", told, remedy, needed=True)]
     return [Check("plugin", "ok", f"{path} loads and gives the right force", needed=True)]
 
 

@@ -93,9 +93,11 @@ def by_ray(
         workers: at most so many tasks at a time, by default one per core of the cluster.
 
     Raises:
-        JodaError: Ray is not installed, or no cluster answers.
+        JodaError: Ray is not installed, or no cluster that can be used answers.
     """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is sent to its makers unasked
+    if address != HERE:  # else it would try for a quarter of an hour
+        os.environ.setdefault("RAY_NUM_REDIS_GET_RETRIES", "1")
     try:
         import ray
     except ImportError:
@@ -105,7 +107,13 @@ def by_ray(
         ray.init(address=HERE, num_cpus=workers, include_dashboard=False, **quiet)
     else:
         _check_answers(address)
-        ray.init(address=address, **quiet)
+        try:
+            ray.init(address=address, **quiet)
+        except (OSError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
+            raise JodaError(
+                f"no Ray cluster can be used at {address} ({error}); does `ray start --head` run "
+                "there, with this Ray's version and authentication token?"
+            ) from None
     try:
         remote: Callable[..., Any] = ray.remote(num_cpus=1, max_retries=2)(run).remote
         count = workers or int(ray.cluster_resources().get("CPU", 1))

@@ -68,7 +68,7 @@ def inertia_at(model: mujoco.MjModel, data: mujoco.MjData, dof: int) -> float:
 
 
 def set_strength(joint: Any, field: str, *values: float) -> None:
-    """Gives a joint of an MjSpec a strength; in newer MuJoCo it begins a polynomial.
+    """Gives a joint of an MjSpec a strength; from MuJoCo 3.7 on it begins a polynomial.
 
     Args:
         joint: an MjsJoint.

@@ -15,6 +15,9 @@ from importlib.metadata import version
 
 from joda.errors import JodaError
 
+TESTED = ("3.11", "3.17", "4.0")
+"""Of mujoco-warp: other versions may have other arrays than the kernel reads and writes."""
+
 try:
     import_module("warp")
     import_module("mujoco_warp")
@@ -22,9 +25,12 @@ except ImportError as error:
     raise JodaError(
         f'joda.warp needs MuJoCo Warp (no module {error.name}); run: pip install ".[warp]"'
     ) from None
-
-TESTED = ("3.11", "3.17", "4.0")
-"""Of mujoco-warp: other versions may have other arrays than the kernel reads and writes."""
+except AttributeError as error:  # of a MuJoCo that it was not made for
+    raise JodaError(
+        f"mujoco-warp {version('mujoco-warp')} does not go with mujoco {version('mujoco')} "
+        f"({error}); give both the same of the versions {', '.join(TESTED[:-1])} and {TESTED[-1]}, "
+        f"e.g. run: pip install 'mujoco=={TESTED[-1]}.*' 'mujoco-warp=={TESTED[-1]}.*'"
+    ) from None
 
 if ".".join(version("mujoco-warp").split(".")[:2]) not in TESTED:
     raise JodaError(

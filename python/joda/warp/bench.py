@@ -12,6 +12,7 @@ import mujoco_warp
 import numpy as np
 import warp as wp
 
+from joda.errors import JodaError
 from joda.profile import Profile
 from joda.scenes.hinges import hinges, hinges_text, without_plugin
 from joda.scenes.scene import read_profiles
@@ -66,8 +67,8 @@ def bench(
         the table's rows.
 
     Raises:
-        JodaError: the scene cannot be loaded, carries no profile or has options that `attach`
-            refuses.
+        JodaError: the scene cannot be loaded, carries no profile or has options that `attach` or
+            MuJoCo Warp refuses, or there are more worlds than fit.
     """
     models, profiles = _models(scene)
     rows = []
@@ -104,8 +105,12 @@ class _Run:
     """A model in so many worlds, swinging from the middle of its joints' ranges."""
 
     def __init__(self, model: mujoco.MjModel, worlds: int, profiles: dict[str, Profile]) -> None:
-        self.m = mujoco_warp.put_model(model)
-        self.d = mujoco_warp.make_data(model, nworld=worlds)
+        try:
+            self.m = mujoco_warp.put_model(model)
+            self.d = mujoco_warp.make_data(model, nworld=worlds)
+        except (MemoryError, RuntimeError, ValueError) as error:  # what it lacks is a RuntimeError
+            told = str(error).rstrip(".")
+            raise JodaError(f"MuJoCo Warp refuses the scene (worlds: {worlds}): {told}.") from None
         if profiles:
             attach(self.m, self.d, put_fields(model, profiles, worlds))
         start = model.qpos0.copy()

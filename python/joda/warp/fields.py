@@ -11,7 +11,7 @@ import warp as wp
 from joda.effects import ON_FRICTION, Backlash
 from joda.errors import JodaError
 from joda.profile import Profile
-from joda.scenes.model import find_joint
+from joda.scenes.model import find_joint, joint_type
 from joda.scenes.scene import damping_equality
 from joda.warp.law import Profiles, forget, launch
 from joda.warp.learned import make_tables
@@ -56,14 +56,18 @@ class Fields:
                 on its device, so that this can be captured in a graph.
 
         Raises:
-            JodaError: the mask has another shape.
+            JodaError: the mask is another one.
         """
         device = self.friction.device
+        if mask is None:
+            mask = np.ones(self.nworld, bool)
         if not isinstance(mask, wp.array):
-            chosen = np.ones(self.nworld, bool) if mask is None else np.asarray(mask, bool)
-            mask = wp.array(chosen, dtype=bool, device=device)
-        if mask.shape != (self.nworld,):
-            raise JodaError(f"mask has the shape {mask.shape}; it must be ({self.nworld},).")
+            mask = wp.array(np.asarray(mask), device=device)
+        if mask.dtype != wp.bool or mask.shape != (self.nworld,):
+            raise JodaError(
+                f"mask is of {mask.dtype.__name__} and has the shape {mask.shape}; give booleans "
+                f"of the shape ({self.nworld},), one for each world."
+            )
         dim = (self.nworld, len(self.joints))
         wp.launch(forget, dim=dim, inputs=[mask, self._profiles], device=device)
 
@@ -88,12 +92,14 @@ def put_fields(
         the fields; all worlds with strengths of 1.
 
     Raises:
-        JodaError: a joint does not exist or lacks what its profile needs, or the variants are not
-            of the same joints.
+        JodaError: there is no profile or no world, a joint does not exist, is of another type or
+            lacks what its profile needs, or the variants are not of the same joints.
     """
     variants = [profiles] if isinstance(profiles, Mapping) else list(profiles)
-    if nworld < 1 or not variants:
-        raise JodaError("there must be at least one world and one mapping of profiles.")
+    if not isinstance(nworld, int | np.integer) or nworld < 1:
+        raise JodaError(f"nworld is {nworld}; give a whole number, at least 1.")
+    if not variants or not variants[0]:
+        raise JodaError("there is no profile; give that of at least one joint.")
     joints = tuple(variants[0])
     for variant in variants:
         if tuple(variant) != joints:
@@ -216,6 +222,11 @@ def _check_options(m: Any) -> None:
 
 def _check(model: mujoco.MjModel, joint: int, name: str, profile: Profile) -> None:
     """Raises JodaError where the plugin would refuse the profile."""
+    if (kind := joint_type(model, joint)) != profile.joint.type:
+        raise JodaError(
+            f"joint '{name}' is a {kind} and its profile that of a {profile.joint.type}; give it "
+            f"the profile of a {kind}."
+        )
     dof = int(model.jnt_dofadr[joint])
     rubs = profile.channels.friction.components or any(
         effect.effect in ON_FRICTION for effect in profile.effects
