@@ -11,7 +11,6 @@ import pytest
 
 import joda
 from joda import JodaError, making
-from joda.scenes.engine import require
 
 SOURCES = Path(joda.__file__).parent / "cpp"
 VERSION = mujoco.__version__
@@ -82,9 +81,3 @@ def test_a_cache_that_cannot_be_written(cache, monkeypatch):
 def test_no_sources(cache, tmp_path):
     with pytest.raises(joda.JodaError, match="install a wheel of joda"):
         making.make(tmp_path / "nothing", VERSION)
-
-
-def test_what_needs_a_newer_mujoco_says_so():
-    with pytest.raises(JodaError, match=r"fields needs MuJoCo 99\.0\.0 or newer, and"):
-        require((99, 0, 0), "fields")
-    require((3, 3, 0), "anything")
