@@ -10,7 +10,7 @@ import mujoco
 import pytest
 
 import joda
-from joda import JodaError, making
+from joda import making
 
 SOURCES = Path(joda.__file__).parent / "cpp"
 VERSION = mujoco.__version__
