@@ -41,6 +41,8 @@ CLEARLY = 3.0
 SURPRISE = 4.0
 """How many of its widths a number may be off where something is left: a zero that is far off looks
 like a force beside a spring."""
+EARLIER: dict[NuisanceName, float] = {"force_offset": float(np.sqrt(ALIKE))}
+"""The same, whatever is left, of a number that is an effect where it surprises: a constant force."""
 LONGEST = 1.5
 """Length of the segments in which numbers are fitted at last, s."""
 BETWEEN = 0.04
@@ -200,10 +202,10 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
         return None
     own = every.only(names)
     widths = np.abs(best.x[baseline.base.count :]) / own.prior_stds
-    if np.any(widths > SURPRISE) and excess(best.loss, count) > CALM:
-        # it stands in for what is missing
-        surprising = {name for name, off in zip(names, widths, strict=True) if off > SURPRISE}
-        rest = tuple(name for name in every.names if name not in surprising)
+    most = SURPRISE if excess(best.loss, count) > CALM else np.inf
+    far = {name for name, off in zip(names, widths, strict=True) if off > EARLIER.get(name, most)}
+    if far:  # they stand in for what is missing
+        rest = tuple(name for name in every.names if name not in far)
         return _calibrated(replace(found, every=every.only(rest)), beside) if rest else None
     return _concluded(found, names, best, whole)
 
