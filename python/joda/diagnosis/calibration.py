@@ -42,7 +42,7 @@ SURPRISE = 4.0
 """How many of its widths a number may be off where something is left: a zero that is far off looks
 like a force beside a spring."""
 EARLIER: dict[NuisanceName, float] = {"force_offset": float(np.sqrt(ALIKE))}
-"""The same, whatever is left, of a number that is an effect where it surprises: a constant force."""
+"""The same, whatever is left, of a number that is an effect where it surprises: a constant one."""
 LONGEST = 1.5
 """Length of the segments in which numbers are fitted at last, s."""
 BETWEEN = 0.04
