@@ -321,6 +321,22 @@ def test_what_has_no_mass_weighs_next_to_nothing(beside, tmp_path):
     assert len(masses) == 5 and sum(masses) == pytest.approx(whole) and all(m > 0 for m in masses)
 
 
+def test_in_urdf_a_pad_without_mass_makes_nothing_heavier(tmp_path):
+    """A link that collides and has no <inertial> weighs what its shapes make of it."""
+    pad = '<body pos=".1 0 0"><geom type="box" size=".05 .01 .02" mass="0"/></body>'
+    (tmp_path / "plain.xml").write_text(
+        '<mujoco><compiler angle="radian"/><worldbody><body><joint name="lid" range="-.4 1.4"/>'
+        f'<inertial pos="0 0 0" mass=".02" diaginertia="1e-5 1e-5 1e-5"/>{pad}</body>'
+        "</worldbody></mujoco>"
+    )
+    joda.attach(
+        tmp_path / "plain.xml", LID.model_copy(update={"effects": ()}), tmp_path / "scene.xml"
+    )
+    export(tmp_path / "scene.xml", "urdf", tmp_path / "o.urdf")
+    other = mujoco.MjModel.from_xml_path(str(tmp_path / "o.urdf"))
+    assert other.body_mass.sum() == pytest.approx(0.02, rel=1e-6)
+
+
 def test_a_joint_without_a_profile_keeps_what_the_scene_gives_it(beside, tmp_path):
     told = export(beside, "urdf", tmp_path / "o.urdf")
     assert [one.joint for one in told.joints] == ["lid"]  # errors are those of profiles

@@ -52,6 +52,13 @@ class HorizonSearch:
     free: FreeRuns | None = None
 
 
+def ranked(needs: Needs, model: Baseline, exclude: Collection[str], progress: Progress) -> Ranking:
+    """What a model may lack that needs no more force than the measurements can."""
+    return rank(
+        model, exclude, progress, possible=lambda *one: not needs.exceeded(needs.exerted(*one))
+    )
+
+
 def looked(
     measured: Measured,
     exclude: Collection[str],
@@ -68,14 +75,7 @@ def looked(
         baseline: the model fitted to them, in usual segments; None: it is fitted.
     """
     needs = Needs(measured)
-
-    def ranked(model: Baseline) -> Ranking:
-        """What may be missing and needs no more force than the measurements can."""
-        return rank(
-            model, exclude, progress, possible=lambda *one: not needs.exceeded(needs.exerted(*one))
-        )
-
-    ranking = ranked(baseline or fit_baseline(measured))
+    ranking = ranked(needs, baseline or fit_baseline(measured), exclude, progress)
     strictness = LOOSELY if moved_one_way(measured) else 1.0
     found = [evidence(ranking)]
     selection = decide(found[0], strictness)
@@ -86,7 +86,7 @@ def looked(
         drifts = bool(free and free.drifting)
         other = _shown(longer, first, drifts) if measured.runs else _noisier(measured, first)
         if other is not None:
-            again = ranked(other)
+            again = ranked(needs, other, exclude, progress)
             found.append(evidence(again))
             if measured.runs:
                 anew = decide(found[-1], SETTINGS.strictly, wholly=True)

@@ -25,16 +25,26 @@ from joda.diagnosis.experiments import Model, means_of, next_experiment, there_a
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
-from joda.diagnosis.horizons import HorizonSearch, looked
+from joda.diagnosis.horizons import HorizonSearch, looked, ranked
 from joda.diagnosis.hypothesis_fits import joined
 from joda.diagnosis.phrases import explained
-from joda.diagnosis.plausible import unseen_place
+from joda.diagnosis.plausible import Needs, unseen_place
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.search import Progress, Ranking
-from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection, weigh
+from joda.diagnosis.selection import (
+    LITTLE,
+    MUCH,
+    SURE,
+    Evidence,
+    Selection,
+    decide,
+    evidence,
+    weigh,
+)
 from joda.diagnosis.summary import BOUNCY, FALLEN, SAME, far_off, helps, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
-from joda.estimation.base_model import segments_for, usable
+from joda.estimation.base_model import BaseModel, segments_for, usable
+from joda.estimation.nuisance import nuisances_of
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
 from joda.measured.misfit import rms
@@ -102,8 +112,6 @@ AT_ENDS = (
     "(solreflimit), or a force close to the end, is not the joint's."
 )
 EITHER = "Either the model's own numbers are off ({}), or a force is missing"
-TURNS = 2
-"""How often numbers and effects are asked for in turns."""
 NAMED, WORTH_NAMING = 5, 0.01
 """How many effects are named, and only those of at least some probability."""
 OUT_THERE = (
@@ -176,30 +184,29 @@ def diagnosed(
         if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
             return _set_right(measured, found, looks)
     puzzled = calibrate and plain.selection.verdict == "unexplained"
-    if puzzled and (both := _in_turns(measured, plain.first[0], exclude, progress)):
+    base = plain.first[0].baseline.base
+    if puzzled and (both := _together(measured, base, exclude, progress)):
         return _set_right(measured, *both)
     return replace(_concluded(measured, plain), looks=plain.evidence)
 
 
-def _in_turns(
-    measured: Measured, ranking: Ranking, exclude: Collection[str], progress: Progress
+def _together(
+    measured: Measured, base: BaseModel, exclude: Collection[str], progress: Progress
 ) -> tuple[Calibration, HorizonSearch] | None:
     """Numbers that are off, and an effect that is missing once these are right, where neither alone
-    explains the runs: numbers beside the likeliest effect, effects with those set right, again.
-    None if no effect is then likelier than not."""
-    both = None
-    for _ in range(TURNS):
-        if not ranking.candidates:
-            break
-        likeliest = ranking.candidates[0].written(ranking.baseline.base)
-        other = measured.changed(profile=likeliest)
-        if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
-            break
-        looks = looked(found.of(measured), exclude, progress)
-        if not looks.selection.likely:
-            break
-        both, ranking = (found, looks), looks.ranking
-    return both
+    explains the runs: every effect is asked with all numbers free beside it, then the numbers
+    beside the likeliest, then all effects with these set right. None if none is then likelier than
+    not."""
+    every = nuisances_of(measured, base)
+    free = replace(measured, doubtful=dict(zip(every.names, every.prior_stds, strict=True)))
+    ranking = ranked(Needs(measured), fit_baseline(free), exclude, progress)
+    if not every.names or not decide(evidence(ranking)).likely:
+        return None
+    other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
+    if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
+        return None
+    looks = looked(found.of(measured), exclude, progress)
+    return (found, looks) if looks.selection.likely else None
 
 
 def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> Diagnosed:
