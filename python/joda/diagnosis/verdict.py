@@ -198,9 +198,12 @@ def _together(
     beside the likeliest, then all effects with these set right. None if none is then likelier than
     not."""
     every = nuisances_of(measured, base)
-    free = replace(measured, doubtful=dict(zip(every.names, every.prior_stds, strict=True)))
+    widths = {str(name): std for name, std in zip(every.names, every.prior_stds, strict=True)}
+    if "mass" in widths:  # then all is told in units of the force as it was recorded
+        widths.pop("force_scale", None)
+    free = replace(measured, doubtful=widths)
     ranking = ranked(Needs(measured), fit_baseline(free), exclude, progress)
-    if not every.names or not decide(evidence(ranking)).likely:
+    if not widths or not decide(evidence(ranking)).likely:
         return None
     other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
     if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
