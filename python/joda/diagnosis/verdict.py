@@ -201,9 +201,11 @@ def _together(
     widths = {str(name): std for name, std in zip(every.names, every.prior_stds, strict=True)}
     if "mass" in widths:  # then all is told in units of the force as it was recorded
         widths.pop("force_scale", None)
+    if not (measured.runs and widths):
+        return None
     free = replace(measured, doubtful=widths)
     ranking = ranked(Needs(measured), fit_baseline(free), exclude, progress)
-    if not widths or not decide(evidence(ranking)).likely:
+    if not decide(evidence(ranking)).likely:
         return None
     other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
     if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
