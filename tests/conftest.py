@@ -50,6 +50,7 @@ def pytest_report_header(config):
 
 
 def pytest_collection_modifyitems(config, items):
+    items.sort(key=lambda item: item.path.stem != "test_versions")  # as no other file takes so long
     if config.getoption("--whole"):
         return
     sweeps, long, slow = defaultdict(list), defaultdict(list), defaultdict(list)
