@@ -1,6 +1,8 @@
 """How fast a joint runs away from where it is: where its force pushes it on, errors of a start, or
 of a number, soon are as large as the range."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
@@ -26,8 +28,9 @@ def longest_followed(measured: Measured, most: float) -> float:
     """How long segments may be (s) for a model to follow them; at most `most`."""
     if not measured.runs:
         return most
+    growths = [(run.time, _growth(measured, run)) for run in measured.runs]
     length, by = most, _bearable(measured, float(np.median(measured.sigma)))
-    while _grown(measured, length) > by:
+    while _grown(growths, length) > by:
         length *= SHORTER
     return length
 
@@ -68,11 +71,10 @@ def _growth(measured: Measured, run: Run) -> Array:
     return np.asarray(cumulative_trapezoid(rates, run.time, initial=0.0))
 
 
-def _grown(measured: Measured, length: float) -> float:
-    """The same over nearly all stretches of such a length (s)."""
+def _grown(growths: Sequence[tuple[Array, Array]], length: float) -> float:
+    """The same over nearly all stretches of such a length (s), by each run's times and growth."""
     found = []
-    for run in measured.runs:
-        grown = _growth(measured, run)
-        begins = run.time[: max(int(np.searchsorted(run.time, run.time[-1] - length)), 1)]
-        found.append(np.interp(begins + length, run.time, grown) - grown[: len(begins)])
+    for time, grown in growths:
+        begins = time[: max(int(np.searchsorted(time, time[-1] - length)), 1)]
+        found.append(np.interp(begins + length, time, grown) - grown[: len(begins)])
     return float(np.quantile(np.concatenate(found), NEARLY_ALL))

@@ -8,6 +8,8 @@ import numpy as np
 VERSION = tuple(int(part) for part in mujoco.__version__.split(".")[:3])
 FORGETS_INSTANCES = (3, 3, 1) <= VERSION < (3, 16)
 """Whether a <replicate> makes MuJoCo forget the plugins' instances of all bodies behind it."""
+HAS_POLYNOMIALS = hasattr(mujoco.MjModel, "jnt_stiffnesspoly")
+"""Whether stiffness and damping of a joint may be polynomials, as they may in newer MuJoCo."""
 
 
 def is_discrete(model: mujoco.MjModel) -> bool:
@@ -28,14 +30,9 @@ def polynomial(model: mujoco.MjModel, field: str, index: int) -> list[float]:
     return [getattr(model, field)[index], *(() if higher is None else higher[index])]
 
 
-HAS_POLYNOMIALS = hasattr(mujoco.MjModel, "jnt_stiffnesspoly")
-"""Whether stiffness and damping of a joint may be polynomials, as they may in newer MuJoCo."""
-
-
 def is_on(model: mujoco.MjModel, flag: str) -> bool:
-    """Whether what a flag of <option> can disable acts: "spring", "damper" (older MuJoCo:
-    "passive"), "frictionloss", "limit", "equality"; without "constraint" rows none of the last
-    three does."""
+    """Whether what a flag of <option> can disable acts: "spring", "damper", "frictionloss",
+    "limit", "equality"; without "constraint" rows none of the last three does."""
     off = disable_bit(flag)
     if flag in ("frictionloss", "limit", "equality"):
         off |= disable_bit("constraint")
