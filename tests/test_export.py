@@ -437,29 +437,105 @@ def test_the_usd_is_the_scene(scene, model, tmp_path):
     assert not stage.GetPrimAtPath("/o/world").HasAPI(UsdPhysics.RigidBodyAPI)
 
 
-SEVERAL = """<mujoco><compiler angle="radian"/><worldbody>
-  <body name="two"><joint name="lid" range="-.4 1.4" limited="true"/>
-  {other}<geom size=".1"/></body></worldbody></mujoco>"""
+BALL = """<mujoco><compiler angle="radian"/><worldbody>
+  <body name="one"><joint name="lid" range="-.4 1.4" limited="true"/><geom size=".1"/></body>
+  <body><joint name="c" type="ball"/><geom size=".1"/></body></worldbody></mujoco>"""
 
 
-@pytest.mark.parametrize(
-    ("other", "said"),
-    [
-        ('<joint name="b" type="slide"/>', "body 'two' has 2 joints, which only MJCF"),
-        (
-            '<geom size=".1"/></body><body><joint name="c" type="ball"/>',
-            "joint 'c' is a ball joint; only hinges",
-        ),
-    ],
-)
-def test_what_no_other_format_can_say_is_refused(tmp_path, other, said):
-    (tmp_path / "plain.xml").write_text(SEVERAL.format(other=other))
+def test_what_no_other_format_can_say_is_refused(tmp_path):
+    (tmp_path / "plain.xml").write_text(BALL)
     profile = LID.model_copy(update={"effects": ()})
     joda.attach(tmp_path / "plain.xml", profile, tmp_path / "scene.xml")
-    with pytest.raises(joda.JodaError, match=said):
+    with pytest.raises(joda.JodaError, match="joint 'c' is a ball joint; only hinges"):
         export(tmp_path / "scene.xml", "urdf", tmp_path / "o.urdf")
     assert not (tmp_path / "o.urdf").exists()
     export(tmp_path / "scene.xml", "native", tmp_path / "n.xml")
+
+
+SEVERAL = """<mujoco><compiler angle="radian"/><worldbody>
+  <body name="base" pos=".1 0 .2" euler=".3 0 .2"><geom size=".1" pos="0 0 -.1"/>
+    <joint name="root" axis="0 0 1" pos=".05 0 0"/>
+    <body name="two" pos="0 .3 0" euler="0 .4 0">
+      <joint name="out" type="slide" axis="1 .5 0" ref=".07" pos=".3 .1 0" armature=".01"/>
+      <joint name="lid" axis="0 1 1" range="-.4 1.4" limited="true" pos=".1 .2 .05" ref=".2"/>
+      <joint axis="1 0 0" pos="-.1 0 .1" damping=".4"/>
+      <geom type="box" size=".1 .05 .02" pos=".1 0 0"/>
+      <body name="tip" pos="0 0 .2"><joint name="last" axis="0 1 0" pos="0 0 -.02"/>
+        <geom size=".03"/></body>
+    </body>
+  </body></worldbody></mujoco>"""
+"""A body with three joints, which act about different points and have references."""
+
+
+@pytest.fixture(scope="module")
+def several(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("several")
+    (folder / "plain.xml").write_text(SEVERAL)
+    profile = LID.model_copy(update={"effects": ()})
+    joda.attach(folder / "plain.xml", profile, folder / "scene.xml")
+    return folder / "scene.xml"
+
+
+def test_a_body_with_several_joints_is_a_chain(several, tmp_path):
+    """As MuJoCo itself reads URDF: centres of mass in the world, the mass matrix, the numbers."""
+    written = export(several, "urdf", tmp_path / "o.urdf")
+    model = mujoco.MjModel.from_xml_path(str(several))
+    other = mujoco.MjModel.from_xml_path(str(tmp_path / "o.urdf"))
+    assert any("two has 3 joints" in note for note in written.notes)
+    q = np.array([0.4, 0.15, 0.9, -0.6, 0.3])  # root, out, lid, without a name, last
+    assert other.nq == model.nq == len(q)
+    full = []
+    for one in (model, other):
+        data = mujoco.MjData(one)
+        data.qpos[:] = q
+        mujoco.mj_forward(one, data)
+        mass = np.zeros((one.nv, one.nv))
+        mujoco.mj_fullM(one, data, mass)
+        full.append((data.body("tip").xipos, data.body("two").xipos, mass))
+    full[0][2][1, 1] -= 0.01  # armature, which URDF has no word for
+    for ours, theirs in zip(*full, strict=True):
+        assert np.allclose(ours, theirs, atol=1e-6)
+    told = {one.joint: one for one in written.joints}["lid"]
+    assert other.dof_frictionloss[2] == pytest.approx(told.friction, rel=1e-6)
+    assert other.dof_damping[3] == pytest.approx(0.4)
+    assert np.allclose(other.jnt_range[2], (-0.4, 1.4))
+
+
+@pytest.mark.parametrize("to", ["sdf", "usd"])
+def test_a_chain_stands_where_the_body_is(several, tmp_path, to):
+    """Where the joints of the body are, and their axes, with all joints at 0."""
+    model = mujoco.MjModel.from_xml_path(str(several))
+    written = tmp_path / f"o.{to}"
+    export(several, to, written)
+    names = ("root", "out", "lid", "last")
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0
+    mujoco.mj_kinematics(model, data)
+    for name in names:
+        anchor, axis = data.joint(name).xanchor, data.joint(name).xaxis
+        place, along = joint_frame(written, to, name)
+        if name != "out":  # a slide is the same anywhere on its line
+            assert np.allclose(place, anchor, atol=1e-6)
+        assert np.allclose(along, axis, atol=1e-6)
+
+
+def joint_frame(path: Path, to: str, name: str):
+    """Where the moved side of a joint is in the world, and its axis there."""
+    if to == "sdf":
+        root = ET.parse(path).getroot().find("model")
+        element = root.find(f"joint[@name='{name}']")
+        position, turn = sdf_frame(root, element.findtext("child"))
+        return position, turn @ np.array(element.findtext("axis/xyz").split(), float)
+    Usd = pytest.importorskip("pxr.Usd")
+    from pxr import UsdGeom, UsdPhysics
+
+    stage = Usd.Stage.Open(str(path))
+    joint = UsdPhysics.Joint(stage.GetPrimAtPath(f"/o/joint_{name}"))
+    body = joint.GetBody1Rel().GetTargets()[0]
+    frame = UsdGeom.XformCache().GetLocalToWorldTransform(stage.GetPrimAtPath(body))
+    turn = joint.GetLocalRot1Attr().Get()
+    along = frame.TransformDir(turn.Transform((0, 0, 1)))
+    return frame.Transform(joint.GetLocalPos1Attr().Get()), along
 
 
 def test_mistakes_are_one_sentence(scene, tmp_path):

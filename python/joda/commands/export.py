@@ -71,15 +71,11 @@ def export(scene: str | Path, to: Format, output: str | Path, *, force: bool = F
         return Exported((output,), told, tuple(_lost(told)))
 
     links, left = links_of(model)
-    movable = [link.kind in ("hinge", "slide") for link in links]
-    scene_own = [
-        plain(model, joint, links[body].joint)
-        for joint, body in enumerate(model.jnt_bodyid)
-        if movable[body] and joint not in own
-    ]
+    moved = {link.number: link.joint for link in links if link.kind in ("hinge", "slide")}
+    scene_own = [plain(model, joint, name) for joint, name in moved.items() if joint not in own]
     notes = [*left, *_lacking(links, to), *lacking(scene_own, to), *_lost(told)]
     by_name = {one.joint: one for one in scene_own}
-    by_name |= {links[model.jnt_bodyid[joint]].joint: one for joint, one in own.items()}
+    by_name |= {moved[joint]: one for joint, one in own.items()}
     name = file_name(output.stem)
     if to == "usd":
         write_together({output: usd(model, name, links, by_name, notes)})

@@ -1,7 +1,7 @@
 """A scene as links and joints, the frames of which are where other formats want them."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -47,59 +47,96 @@ class Shape:
 
 @dataclass(frozen=True)
 class Link:
-    """A body. Its frame is in the joint that moves it.
+    """A body, or what moves between two joints of a body. Its frame is in the joint that moves it.
 
     Attributes:
         name: of letters, digits, '_', '.' and '-'; no two have the same.
         parent: its place in the list, -1: it is the world.
         joint: name of the joint that moves it, or fixes it.
+        number: id of that joint in the model, -1: it has none.
         kind: fixed, free, hinge or slide.
         axis: of the joint, in the link's frame.
         limits: rad or m, None: there are none.
         position, turn: of the frame in the parent's, where the joint is at 0.
+        armature: kg·m² or kg.
         mass: kg.
         centre, principal, moments: centre of mass, quaternion of the principal axes, and the
             moments of inertia about them, kg·m².
-        armature: kg·m² or kg.
         shapes: its geoms.
     """
 
     name: str
     parent: int
     joint: str
+    number: int
     kind: str
     axis: Array
     limits: tuple[float, float] | None
     position: Array
     turn: Array
-    mass: float
-    centre: Array
-    principal: Array
-    moments: Array
     armature: float
-    shapes: tuple[Shape, ...]
+    mass: float = 0.0
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    principal: Array = field(default_factory=lambda: np.eye(4)[0])
+    moments: Array = field(default_factory=lambda: np.zeros(3))
+    shapes: tuple[Shape, ...] = ()
 
 
 def links_of(model: mujoco.MjModel) -> tuple[list[Link], list[str]]:
     """The links of a scene, parents first, and what was left out, one sentence each.
 
+    A body with several joints is a chain, as MuJoCo moves it: the links before its last joint have
+    no mass and no shape.
+
     Raises:
-        JodaError: a body has several joints, or a ball joint.
+        JodaError: a body has a ball joint.
     """
-    names = unique(
-        [model.body(k).name or f"body_{k}" if k else "world" for k in range(model.nbody)]
+    moved = [_moved(model, body) for body in range(model.nbody)]
+    bodies = [model.body(k).name or f"body_{k}" if k else "world" for k in range(model.nbody)]
+    between = [
+        f"{bodies[body]}_{model.joint(joint).name or number}"
+        for body, joints in enumerate(moved)
+        for number, joint in enumerate(joints[:-1])
+    ]
+    names = unique([*bodies, *between])
+    spare = iter(names[model.nbody :])
+    chains = [[*(next(spare) for _ in joints[1:]), names[k]] for k, joints in enumerate(moved)]
+    called = iter(
+        unique(
+            [
+                (model.joint(joint).name if joint >= 0 else "") or f"{link}_joint"
+                for joints, chain in zip(moved, chains, strict=True)
+                for joint, link in zip(joints, chain, strict=True)
+            ]
+        )
     )
+    out: list[Link] = []
     left: list[str] = []
-    joints = unique([_joint_name(model, body, names[body]) for body in range(model.nbody)])
-    anchors = [_anchor(model, body) for body in range(model.nbody)]
-    out = [_link(model, k, names[k], joints[k], anchors, left) for k in range(model.nbody)]
-    for what, number in (
+    ends: list[tuple[int, Array]] = []  # of each body: the link that it is, and its last anchor
+    for body, (joints, chain) in enumerate(zip(moved, chains, strict=True)):
+        parent, before = ends[model.body_parentid[body]] if body else (-1, np.zeros(3))
+        for number, (joint, link) in enumerate(zip(joints, chain, strict=True)):
+            anchor = _anchor(model, joint)
+            position, turn = anchor - before, np.eye(4)[0]
+            if number == 0:
+                turn = model.body_quat[body].copy()
+                position = model.body_pos[body] - before + rotated(turn, anchor)
+            out.append(_joined(model, joint, parent, link, next(called), position, turn))
+            parent, before = len(out) - 1, anchor
+        if len(joints) > 1:
+            left.append(
+                f"{chain[-1]} has {len(joints)} joints, so it is a chain of links; without mass: "
+                + ", ".join(chain[:-1])
+            )
+        out[-1] = _filled(model, body, out[-1], before, left)
+        ends.append((parent, before))
+    for what, amount in (
         ("equality constraint", _equalities(model)),
         ("actuator", model.nu),
         ("tendon", model.ntendon),
     ):
-        if number:
-            left.append(left_out(number, what))
+        if amount:
+            left.append(left_out(amount, what))
     return out, left
 
 
@@ -139,40 +176,35 @@ def _equalities(model: mujoco.MjModel) -> int:
     return sum("joda_damping" not in model.equality(k).name for k in range(model.neq))
 
 
-def _joint(model: mujoco.MjModel, body: int) -> int:
-    number = model.body_jntnum[body]
-    if number > 1:
-        raise JodaError(
-            f"body '{model.body(body).name or body}' has {number} joints, which only MJCF can say "
-            "of one body; put a body between them."
-        )
-    joint = int(model.body_jntadr[body]) if number else -1
-    if joint >= 0 and model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_BALL):
-        raise JodaError(
-            f"joint '{model.joint(joint).name or joint}' is a ball joint; only hinges, slides and "
-            "free joints can be exported."
-        )
-    return joint
+def _moved(model: mujoco.MjModel, body: int) -> list[int]:
+    """The joints that move a body, in their order; [-1]: none does."""
+    first = int(model.body_jntadr[body])
+    joints = list(range(first, first + int(model.body_jntnum[body])))
+    for joint in joints:
+        if model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_BALL):
+            raise JodaError(
+                f"joint '{model.joint(joint).name or joint}' is a ball joint; only hinges, slides "
+                "and free joints can be exported."
+            )
+    return joints or [-1]
 
 
-def _joint_name(model: mujoco.MjModel, body: int, link: str) -> str:
-    joint = _joint(model, body)
-    return (model.joint(joint).name if joint >= 0 else "") or f"{link}_joint"
-
-
-def _anchor(model: mujoco.MjModel, body: int) -> Array:
-    joint = _joint(model, body)
+def _anchor(model: mujoco.MjModel, joint: int) -> Array:
     free = joint >= 0 and model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_FREE)
     return np.zeros(3) if joint < 0 or free else model.jnt_pos[joint].copy()
 
 
-def _link(
-    model: mujoco.MjModel, body: int, name: str, called: str, anchors: list[Array], left: list[str]
+def _joined(
+    model: mujoco.MjModel,
+    joint: int,
+    parent: int,
+    name: str,
+    called: str,
+    position: Array,
+    turn: Array,
 ) -> Link:
-    joint, anchor, parent = _joint(model, body), anchors[body], int(model.body_parentid[body])
+    """A link without mass and shapes; it lies at the position and turn where the scene is made."""
     kind, axis, limits, armature = "fixed", np.array([1.0, 0, 0]), None, 0.0
-    turn = model.body_quat[body].copy()
-    position = model.body_pos[body] - anchors[parent] + rotated(turn, anchor)
     if joint >= 0:
         kinds = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
         kind = kinds.get(int(model.jnt_type[joint]), "hinge")
@@ -188,24 +220,21 @@ def _link(
             turn = product(turn, back)
         if model.jnt_limited[joint]:
             limits = (float(model.jnt_range[joint][0]), float(model.jnt_range[joint][1]))
+    return Link(name, parent, called, joint, kind, axis, limits, position, turn, armature)
+
+
+def _filled(model: mujoco.MjModel, body: int, link: Link, anchor: Array, left: list[str]) -> Link:
+    """The link with the body's mass and geoms."""
     first = int(model.body_geomadr[body])
     geoms = range(first, first + int(model.body_geomnum[body])) if first >= 0 else ()
-    shapes = [_shape(model, geom, anchor, name, left) for geom in geoms]
-    return Link(
-        name,
-        parent if body else -1,
-        called,
-        kind,
-        axis,
-        limits,
-        position,
-        turn,
-        float(model.body_mass[body]),
-        model.body_ipos[body] - anchor,
-        model.body_iquat[body].copy(),
-        model.body_inertia[body].copy(),
-        armature,
-        tuple(shape for shape in shapes if shape),
+    shapes = [_shape(model, geom, anchor, link.name, left) for geom in geoms]
+    return replace(
+        link,
+        mass=float(model.body_mass[body]),
+        centre=model.body_ipos[body] - anchor,
+        principal=model.body_iquat[body].copy(),
+        moments=model.body_inertia[body].copy(),
+        shapes=tuple(shape for shape in shapes if shape),
     )
 
 

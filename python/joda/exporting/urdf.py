@@ -39,7 +39,8 @@ def urdf(
 
 def _link(root: ET.Element, link: Link, meshes: Mapping[int, str]) -> None:
     element = child(root, "link", name=link.name)
-    if link.mass > 0 or (link.parent >= 0 and link.shapes):  # else its shapes are taken to weigh
+    if link.mass > 0 or link.kind != "fixed" or (link.parent >= 0 and link.shapes):
+        # else its shapes are taken to weigh, and what moves must not weigh nothing
         inertial = child(element, "inertial")
         _origin(inertial, link.centre, link.principal)
         child(inertial, "mass", value=text(max(link.mass, LEAST_MASS)))
