@@ -108,6 +108,44 @@ def test_no_compiler(monkeypatch):
     assert check.remedy.endswith("apt-get install g++, or install a wheel of joda")
 
 
+def test_a_compiler_that_fails(monkeypatch):
+    """Reinstalling would call it again."""
+
+    def fails():
+        raise joda.JodaError("joda has no plugin and cannot compile it: g++ failed.")
+
+    monkeypatch.setattr(doctor, "plugin_path", fails)
+    monkeypatch.setattr(doctor, "compiler", lambda: ["g++"])
+    [check] = doctor._plugin()
+    assert check.remedy.startswith("name a C++17 compiler that works with CXX")
+
+
+@pytest.mark.parametrize(
+    ("extra", "installed", "said"),
+    [
+        ("mjx", "3.11.2", "'mujoco-mjx==3.11.*' mujoco==3.11.2"),
+        ("mjx", "4.0.0", "'mujoco-mjx==3.17.*' mujoco==4.0.0"),
+        ("mjx", "3.3.7", "in an environment of its own: it goes with MuJoCo 3.11, 3.12"),
+        ("warp", "3.17.0", "'mujoco-warp==3.17.*' mujoco==3.17.0"),
+        ("warp", "3.13.0", "goes with MuJoCo 3.11, 3.17, 4.0, and here is 3.13.0"),
+    ],
+)
+def test_no_remedy_lifts_mujoco(monkeypatch, extra, installed, said):
+    version = metadata.version
+    monkeypatch.setattr(
+        doctor.metadata, "version", lambda name: installed if name == "mujoco" else version(name)
+    )
+    assert said in doctor._extra_remedy(extra)
+
+
+def test_it_knows_what_goes_with_mjx_and_warp():
+    joda_mjx, joda_warp = pytest.importorskip("joda.mjx"), pytest.importorskip("joda.warp")
+    told = {extra: versions for extra, (_, versions) in doctor.COMPANIONS.items()}
+    assert [".".join(map(str, one)) for one in told["warp"]] == list(joda_warp.TESTED)
+    assert told["mjx"][0] == joda_mjx.OLDEST
+    assert told["mjx"][-2] == joda_mjx.NEWEST == doctor.NEWEST_MJX
+
+
 def test_a_plugin_with_a_wrong_answer(monkeypatch):
     monkeypatch.setattr(doctor, "FORCE", 1.4)
     [plugin] = doctor._plugin()
@@ -138,7 +176,7 @@ def test_every_library_that_joda_requires_is_tried():
 
 
 def test_it_says_which_joda_this_is():
-    found = {check.what: check.found for check in doctor._versions()}
+    found = {check.what: check.found for check in doctor._here(doctor._mujoco())}
     assert found["joda"] == f"{joda.__version__}, {Path(joda.__file__).resolve().parent}"
 
 
@@ -172,8 +210,14 @@ def test_renderers_that_are_asked_for_and_do_not_work():
     pictures = checks("renderers()", MUJOCO_GL="disabled")["pictures: MUJOCO_GL=disabled"]
     assert (pictures["state"], pictures["fatal"]) == ("broken", True)
     assert "unset MUJOCO_GL" in pictures["remedy"]
-    unknown = checks("versions()", MUJOCO_GL="nonsense")["MuJoCo"]
-    assert (unknown["state"], unknown["remedy"]) == (
-        "broken",
-        "unset MUJOCO_GL, which is 'nonsense'",
-    )
+
+
+def test_without_a_mujoco_that_works_nothing_else_is_blamed():
+    result = python("from joda.cli import main; main()", "doctor", "--json", MUJOCO_GL="nonsense")
+    assert (result.returncode, result.stderr) == (1, "")
+    found = {check["what"]: check for check in json.loads(result.stdout)["checks"]}
+    assert found["MuJoCo"]["state"] == "broken"
+    assert found["MuJoCo"]["remedy"] == "unset MUJOCO_GL, which is 'nonsense'"
+    broken = [what for what, check in found.items() if check["needed"] and check["state"] != "ok"]
+    assert broken == ["MuJoCo"]
+    assert "extra: mjx" not in found and "extra: studio" in found

@@ -10,6 +10,7 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from ctypes.util import find_library
 from dataclasses import dataclass
@@ -26,8 +27,8 @@ from joda.plugin import PLUGIN, made_here, plugin_path
 State = Literal["ok", "missing", "broken"]
 
 EXTRAS = {
-    "mjx": ("jax", "mujoco.mjx"),
-    "warp": ("warp", "mujoco_warp"),
+    "mjx": ("jax", "mujoco.mjx", "joda.mjx"),
+    "warp": ("warp", "mujoco_warp", "joda.warp"),
     "vlm": ("anthropic", "openai"),
     "studio": ("nicegui",),
     "import": ("pyarrow", "rosbags"),
@@ -35,6 +36,13 @@ EXTRAS = {
     "ray": ("ray",),
 }
 """What each extra lets one import."""
+COMPANIONS = {
+    "mjx": ("mujoco-mjx", [(3, minor) for minor in range(11, 18)] + [(4, 0)]),
+    "warp": ("mujoco-warp", [(3, 11), (3, 17), (4, 0)]),
+}
+"""Of the extras that are of MuJoCo's own version: the package, and the versions that joda takes."""
+NEWEST_MJX = 3, 17
+"""Goes with MuJoCo 4.0 too, for which there is no other."""
 LIBRARIES = "numpy", "scipy", "pydantic", "matplotlib", "PIL", "rich", "threadpoolctl", "typer"
 RENDERERS = {
     "egl": ("pictures: EGL", "EGL", "libegl1 libgl1-mesa-dri"),
@@ -42,6 +50,10 @@ RENDERERS = {
     "glfw": ("window: GLX", "GL", "libgl1"),
 }
 """Of each: what it makes, its library, and Debian's packages."""
+SOURCES = Path(__file__).resolve().parents[1] / "cpp"
+"""Of the plugin, which a wheel has not."""
+NAMED = "joda.errors.JodaError: "
+"""How Python begins the line of an error of joda's own."""
 PATIENCE = 120.0
 """For a child, s."""
 FORCE = 1.3
@@ -108,20 +120,31 @@ def _pip(*arguments: str) -> str:
 REINSTALL = f"in a clone of joda, {_pip('--force-reinstall', '--no-deps', '.')}"
 
 COMPILER = "on Debian or Ubuntu, run: apt-get install g++, or install a wheel of joda"
+ANOTHER = (
+    "name a C++17 compiler that works with CXX, or a folder that can be written with "
+    "XDG_CACHE_HOME, or install a wheel of joda"
+)
 
 
 def doctor() -> list[Check]:
-    """Looks at everything that joda uses; takes some seconds."""
-    parts = _versions, _plugin, _libraries, _renderers, _extras, _key, _cache
+    """Looks at everything that joda uses; takes some seconds. What needs MuJoCo is not tried where
+    that does not work."""
+    engine = _mujoco()
+    parts: list[Callable[[], list[Check]]] = [_libraries, _key, _cache]
+    if engine.fatal:
+        parts.insert(1, lambda: _extras([extra for extra in EXTRAS if extra not in COMPANIONS]))
+    else:
+        parts = [_plugin, _libraries, _renderers, _extras, _key, _cache]
     with ThreadPoolExecutor() as pool:
-        return [check for checks in pool.map(lambda part: part(), parts) for check in checks]
+        found = pool.map(lambda part: part(), parts)
+        return [*_here(engine), *(check for checks in found for check in checks)]
 
 
-def _versions() -> list[Check]:
+def _here(engine: Check) -> list[Check]:
     return [
         Check("Python", "ok", f"{platform.python_version()}, {sys.executable}"),
         Check("joda", "ok", f"{metadata.version('joda')}, {Path(__file__).resolve().parents[1]}"),
-        _mujoco(),
+        engine,
         Check("cores", "ok", str(_cores())),
     ]
 
@@ -153,7 +176,9 @@ def _plugin() -> list[Check]:
     try:
         path = plugin_path()
     except JodaError as error:
-        remedy = REINSTALL if compiler() else COMPILER
+        remedy = ANOTHER if compiler() else COMPILER
+        if not SOURCES.is_dir():
+            remedy = REINSTALL
         return [Check("plugin", "missing", str(error).rstrip("."), remedy, needed=True)]
     remedy = f"run: {shlex.join(['rm', str(path)])}" if made_here(path) else REINSTALL
     works, told = _child(PLUGIN_CODE)
@@ -200,8 +225,8 @@ def _renderer(backend: str, remedy: str = "") -> Check:
     return Check(title, "broken", "renders a black picture" if works else told, remedy)
 
 
-def _extras() -> list[Check]:
-    return [_extra(extra, modules) for extra, modules in EXTRAS.items()]
+def _extras(extras: Iterable[str] = EXTRAS) -> list[Check]:
+    return [_extra(extra, EXTRAS[extra]) for extra in extras]
 
 
 def _extra(extra: str, modules: tuple[str, ...]) -> Check:
@@ -210,8 +235,27 @@ def _extra(extra: str, modules: tuple[str, ...]) -> Check:
     if works:
         return Check(f"extra: {extra}", "ok", ", ".join(modules))
     state: State = "missing" if told.startswith("ModuleNotFoundError") else "broken"
-    remedy = f"only if you want it, {_pip(*_required(extra))}"
-    return Check(f"extra: {extra}", state, told, remedy)
+    return Check(f"extra: {extra}", state, told.removeprefix(NAMED), _extra_remedy(extra))
+
+
+def _extra_remedy(extra: str) -> str:
+    """How to install an extra; the MuJoCo that is there stays."""
+    if extra not in COMPANIONS:
+        return f"only if you want it, {_pip(*_required(extra))}"
+    package, versions = COMPANIONS[extra]
+    installed = metadata.version("mujoco")
+    major, minor = map(int, installed.split(".")[:2])
+    if (major, minor) not in versions:
+        listed = ", ".join(f"{a}.{b}" for a, b in versions)
+        return (
+            f"only if you want it, in an environment of its own: it goes with MuJoCo {listed}, "
+            f"and here is {installed}"
+        )
+    if extra == "mjx":
+        major, minor = min((major, minor), NEWEST_MJX)
+    others = [one for one in _required(extra) if not one.startswith(package)]
+    kept = f"{package}=={major}.{minor}.*", f"mujoco=={installed}"
+    return f"only if you want it, {_pip(*others, *kept)}"
 
 
 def _key() -> list[Check]:
