@@ -162,6 +162,29 @@ def test_a_fit_takes_a_windows_start_anew_where_that_is_better():
     assert freed.start[3] == pytest.approx(segments.start[3], abs=5 * segments.prior_std[3].max())
 
 
+def test_starts_are_sought_from_those_of_a_fit_nearby_where_these_miss_less():
+    """A segment moves as measured from one side of an edge; its measured start is on the other."""
+    segments = cut(0.5 + 0.2 * np.sin(3 * STEP * np.arange(2000)))
+    estimator = SegmentEstimator(segments, np.ones(len(segments.count), bool))
+    near = segments.start.copy()
+    near[3] += 4 * segments.prior_std[3]
+
+    class Edge:
+        """As measured, but where it starts as segment 3 was measured to."""
+
+        def replay(self, force, at, start, fresh, h, command):
+            path = np.interp(h * np.arange(len(force) + 1), segments.time, segments.position)
+            lost = np.abs(start[:, 0] - segments.start[3, 0]) < 2 * segments.prior_std[3, 0]
+            window = np.searchsorted(at, np.arange(len(force) + 1), side="right") - 1
+            moved = path + np.where(lost[window], 0.1 * np.sin(0.3 * np.arange(len(path))), 0.0)
+            return moved[:-1], moved[1:]
+
+    alone, helped = estimator.started(Edge()), estimator.started(Edge(), near=near)
+    assert helped.squares[3] < 0.1 * alone.squares[3]
+    others = np.arange(len(near)) != 3
+    assert np.array_equal(helped.start[others], alone.start[others])
+
+
 def test_a_good_fit_stays_as_it_is(tmp_path):
     found = measured(tmp_path, 0.2 + 0.5 * (1 - np.exp(-STEP * np.arange(1000))))
     base = base_of(found.profile, joint_model_for(found, STEP), STEP)

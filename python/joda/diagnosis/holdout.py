@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from joda.diagnosis.baseline import RESTITUTION, Baseline
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.diagnosis.split import held_segments
-from joda.estimation.estimator import Make, SegmentEstimator
+from joda.estimation.estimator import Fit, Make, SegmentEstimator
 from joda.estimation.segments import Segments
 from joda.estimation.unknowns import Unknowns
 from joda.measured.misfit import rms
@@ -33,7 +33,7 @@ class Holdout:
         counts = baseline.estimator.counts
         held = held_segments(measured, baseline.estimator.segments)
         self.folds = [counts & held]
-        own = baseline.base.simulator, baseline.base.unknowns, baseline.fit.x
+        own = baseline.base.simulator, baseline.base.unknowns, baseline.fit
         self.before = self._error(*own) if self.folds[0].any() else 0.0
         every = np.flatnonzero(counts)
         silent = self.before < measured.floor or np.count_nonzero(self.folds[0]) < FEW
@@ -51,22 +51,23 @@ class Holdout:
         make, unknowns = joined(base, found.hypothesis)
         if found.hypothesis.effect == RESTITUTION:
             impacts = segments.impacts & (segments.count > 0)
-            without = _misfit(segments, base.simulator, self.baseline.fit.x, impacts)
-            return rms(without), rms(_misfit(segments, make, found.fit.x, impacts))
-        return self.before, self._error(make, unknowns, found.fit.x)
+            without = _misfit(segments, base.simulator, self.baseline.fit, impacts)
+            return rms(without), rms(_misfit(segments, make, found.fit, impacts))
+        return self.before, self._error(make, unknowns, found.fit)
 
-    def _error(self, make: Make, unknowns: Unknowns, x: Array) -> float:
-        estimator, start, missed = self.baseline.estimator, self.baseline.fit.start, []
+    def _error(self, make: Make, unknowns: Unknowns, fit: Fit) -> float:
+        estimator, missed = self.baseline.estimator, []
         for held in self.folds:
             train = replace(estimator, counts=estimator.counts & ~held)
-            near = train.fit(make, unknowns, x, start, 6)
-            missed.append(_misfit(estimator.segments, make, near.x, held))
+            near = train.fit(make, unknowns, fit.x, fit.start, 6)
+            missed.append(_misfit(estimator.segments, make, near, held))
         return rms(np.concatenate(missed))
 
 
-def _misfit(segments: Segments, make: Make, x: Array, counts: NDArray[np.bool_]) -> Array:
+def _misfit(segments: Segments, make: Make, fit: Fit, counts: NDArray[np.bool_]) -> Array:
     """Misfit of some segments from their best starts, rad or m."""
-    fit = SegmentEstimator(segments, counts).started(make(x))
-    misfit = segments.misfit(make(x), fit.start)
+    simulator = make(fit.x)
+    best = SegmentEstimator(segments, counts).started(simulator, near=fit.start)
+    misfit = segments.misfit(simulator, best.start)
     rows = segments.rows[counts]
     return np.asarray(misfit[rows[rows >= 0]])

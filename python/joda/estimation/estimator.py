@@ -232,11 +232,22 @@ class SegmentEstimator:
         S = (found[:, :, len(tried) :] - r[:, :, None]) / STATE_STEP
         return J, S
 
-    def started(self, simulator: Simulator, iterations: int = 8) -> Fit:
-        """Starts fitted to a joint, each segment by itself: where one is stuck, others go on."""
+    def started(self, simulator: Simulator, iterations: int = 8, near: Array | None = None) -> Fit:
+        """Starts fitted to a joint, each segment by itself: where one is stuck, others go on.
+
+        Args:
+            simulator: the joint.
+            iterations: at most.
+            near: starts of a fit nearby, shape (m, d); each segment begins there or at the measured
+                one, whichever it misses less from.
+        """
         segments = self.segments
         start = segments.start
         squares = self.squares(simulator, start)[1]
+        if near is not None:
+            from_near = self.squares(simulator, near)[1]
+            start = np.where((from_near < squares)[:, None], near, start)
+            squares = np.minimum(from_near, squares)
         damping, unit = np.full(len(start), 1e-3), np.eye(start.shape[1])
         for _ in range(iterations):
             about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
