@@ -142,6 +142,8 @@ Raises:
       .def_property_readonly("coefficients", &Coefficients,
                              "c0..c3 of each piece about its left knot, shape (4, n).");
 
+  module.def("stop_rebound", &joda::Rebound, py::arg("damping"),
+             "Restitution of an end stop with this damping, times the timestep; 0 <= it <= 1.");
   module.def("stop_damping", &joda::StopDamping, py::arg("restitution"),
              "Damping, times the timestep, of an end stop with this restitution, 0 <= it < 1.");
 

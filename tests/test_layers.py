@@ -17,7 +17,7 @@ LAYERS = [
     {"plain", "threads"},
     {"errors", "_core", "component"},
     {"files", "effects"},
-    {"making"},
+    {"making", "companions"},
     {"plugin"},
     {"profile"},
     {"field", "template", "proposal"},

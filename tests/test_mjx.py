@@ -399,7 +399,7 @@ def test_without_jax_the_error_says_what_to_install(missing):
     assert done.returncode
     last = done.stderr.strip().splitlines()[-1]
     assert last.startswith("joda.errors.JodaError: joda.mjx needs JAX and MJX")
-    assert last.endswith('run: pip install ".[mjx]"')
+    assert last.endswith(f"run: pip install 'mujoco-mjx==3.17.*' 'mujoco=={mujoco.__version__}'.")
 
 
 @pytest.mark.slow

@@ -22,9 +22,10 @@ from warp_parity import CLOSE, CONFIGURATIONS, RANGES, SPANS, by_plugin, by_warp
 
 import joda.warp  # noqa: E402
 from joda.component import Component  # noqa: E402
-from joda.effects import LoadDependentFriction, PreslidingFriction  # noqa: E402
+from joda.effects import EndStopRestitution, LoadDependentFriction, PreslidingFriction  # noqa: E402
 from joda.profile import Channel, Channels, Joint, Profile, Resistance  # noqa: E402
 from joda.warp.bench import bench  # noqa: E402
+from joda.warp.numbers import Number  # noqa: E402
 
 WHOLE = (0.0, 1.0)
 
@@ -148,6 +149,50 @@ def test_each_world_has_its_own_strengths():
     actual = by_warp(m, d, pushes)
     assert (np.abs(actual - expected)[-1] < CLOSE * SPANS).all()
     assert (np.ptp(expected[-1], axis=0) > 20 * CLOSE * SPANS).all()  # the worlds do differ
+
+
+def test_each_world_has_its_own_restitutions():
+    """As the plugin throws back with profiles that have them; below 0 a stop is the scene's."""
+    ends = (0.0, 0.2, 0.5, 0.85)
+    m, d, fields = prepared([STEEL], nworld=5)
+    for end in ("low", "high"):
+        fields.numbers[f"end_stop_restitution.{end}"].assign(
+            np.tile([[-1], *([e] for e in ends)], 2)
+        )
+    pushes = warp_parity.forces(0.6) * [8.0, 3.0]
+    variants = [STEEL] + [
+        {name: profile.model_copy(update={"effects": bouncy(e)}) for name, profile in STEEL.items()}
+        for e in ends
+    ]
+    expected = by_plugin(variants, pushes)
+    actual = by_warp(m, d, pushes)
+    assert (np.abs(actual - expected)[-1] < CLOSE * SPANS).all()
+    assert (np.ptp(expected[-1], axis=0) > 20 * CLOSE * SPANS).all()
+
+
+def bouncy(restitution):
+    return tuple(EndStopRestitution(restitution=restitution, end=end) for end in ("low", "high"))
+
+
+def test_an_effect_needs_no_curve():
+    """A profile without channels acts as with the plugin."""
+    variants = [
+        {name: flat(name, effects=(effect,)) for name in RANGES}
+        for effect in (
+            PreslidingFriction(stiffness=30.0),
+            LoadDependentFriction(coefficient=0.1),
+            *bouncy(0.6),
+        )
+    ]
+    pushes = 2 * warp_parity.forces(0.6)
+    expected = by_plugin(variants, pushes)
+    m, d, _ = prepared(variants)
+    assert (np.abs(by_warp(m, d, pushes) - expected)[-1] < CLOSE * SPANS).all()
+
+
+def test_the_docs_list_every_number():
+    page = (Path(__file__).parents[1] / "docs" / "warp.md").read_text()
+    assert [one.title for one in Number if f"`{one.title}`" not in page] == []
 
 
 def put_back(d, qpos) -> None:
@@ -312,20 +357,30 @@ def test_what_does_not_fit_is_refused():
             joda.warp.put_fields(model, {"arm": STEEL["arm"].with_effect(effect)}, 1)
 
 
+MINOR = ".".join(mujoco.__version__.split(".")[:2])
+PINNED = f"run: pip install 'mujoco-warp=={MINOR}.*' 'mujoco=={mujoco.__version__}'."
+"""What leaves MuJoCo where it is."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("import sys; sys.modules['mujoco_warp'] = None", 'run: pip install ".[warp]"'),
+        ("import sys; sys.modules['mujoco_warp'] = None", f"no module mujoco_warp); {PINNED}"),
         (
             "import importlib.metadata as told; told.version = lambda name: '3.9.1'",
-            "joda.warp works with mujoco-warp 3.11, 3.17 and 4.0 and found 3.9.1",
+            "does not take mujoco-warp 3.9.1 beside mujoco 3.9.1; it goes with MuJoCo 3.11, 3.17 "
+            "and 4.0, and here is 3.9.1; use another environment for it.",
+        ),
+        (
+            "import importlib.metadata as told; own = told.version; "
+            "told.version = lambda name: '3.11.0' if name == 'mujoco-warp' else own(name)",
+            f"does not take mujoco-warp 3.11.0 beside mujoco {mujoco.__version__}; {PINNED}",
         ),
         (
             "import mujoco; del mujoco.mjtSolver",
             f"does not go with mujoco {mujoco.__version__} (module 'mujoco' has no attribute "
-            "'mjtSolver'); give both the same of the versions 3.11, 3.17 and 4.0, e.g. run: "
-            "pip install 'mujoco==4.0.*' 'mujoco-warp==4.0.*'",
+            f"'mjtSolver'); {PINNED}",
         ),
     ],
 )

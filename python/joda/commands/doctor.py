@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
+from joda.companions import MJX, WARP
 from joda.errors import JodaError
 from joda.files import cache_folder
 from joda.making import compiler
@@ -36,13 +37,8 @@ EXTRAS = {
     "ray": ("ray",),
 }
 """What each extra lets one import."""
-COMPANIONS = {
-    "mjx": ("mujoco-mjx", [(3, minor) for minor in range(11, 18)] + [(4, 0)]),
-    "warp": ("mujoco-warp", [(3, 11), (3, 17), (4, 0)]),
-}
-"""Of the extras that are of MuJoCo's own version: the package, and the versions that joda takes."""
-NEWEST_MJX = 3, 17
-"""Goes with MuJoCo 4.0 too, for which there is no other."""
+COMPANIONS = {"mjx": MJX, "warp": WARP}
+"""The extras whose packages go with one MuJoCo only."""
 LIBRARIES = "numpy", "scipy", "pydantic", "matplotlib", "PIL", "rich", "threadpoolctl", "typer"
 RENDERERS = {
     "egl": ("pictures: EGL", "EGL", "libegl1 libgl1-mesa-dri"),
@@ -242,20 +238,12 @@ def _extra_remedy(extra: str) -> str:
     """How to install an extra; the MuJoCo that is there stays."""
     if extra not in COMPANIONS:
         return f"only if you want it, {_pip(*_required(extra))}"
-    package, versions = COMPANIONS[extra]
-    installed = metadata.version("mujoco")
-    major, minor = map(int, installed.split(".")[:2])
-    if (major, minor) not in versions:
-        listed = ", ".join(f"{a}.{b}" for a, b in versions)
-        return (
-            f"only if you want it, in an environment of its own: it goes with MuJoCo {listed}, "
-            f"and here is {installed}"
-        )
-    if extra == "mjx":
-        major, minor = min((major, minor), NEWEST_MJX)
-    others = [one for one in _required(extra) if not one.startswith(package)]
-    kept = f"{package}=={major}.{minor}.*", f"mujoco=={installed}"
-    return f"only if you want it, {_pip(*others, *kept)}"
+    companion = COMPANIONS[extra]
+    pins = companion.pins()
+    if not pins:
+        return f"only if you want it, in another environment: {companion.elsewhere()}"
+    others = [one for one in _required(extra) if not one.startswith(companion.package)]
+    return f"only if you want it, {_pip(*others, *pins)}"
 
 
 def _key() -> list[Check]:

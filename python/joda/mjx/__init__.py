@@ -19,6 +19,7 @@ backlash and a learned force need state beyond `mjx.Data`: `put_state` makes roo
 from importlib import import_module
 from importlib.metadata import version
 
+from joda.companions import MJX, dotted, minor
 from joda.errors import JodaError
 
 try:
@@ -26,22 +27,24 @@ try:
     import_module("mujoco.mjx")
 except ImportError as error:
     raise JodaError(
-        f'joda.mjx needs JAX and MJX (no module {error.name}); run: pip install ".[mjx]"'
+        f"joda.mjx needs JAX and MJX (no module {error.name}); {MJX.remedy()}."
+    ) from None
+except AttributeError as error:  # of a MuJoCo that it was not made for
+    raise JodaError(
+        f"mujoco-mjx {version('mujoco-mjx')} does not go with mujoco {version('mujoco')} "
+        f"({error}); {MJX.remedy()}."
     ) from None
 
-OLDEST, NEWEST = (3, 11), (3, 17)
-"""Of mujoco-mjx: other versions may have other internals than `pipeline` is composed of."""
-
-if not OLDEST <= tuple(map(int, version("mujoco-mjx").split(".")[:2])) <= NEWEST:
+if minor("mujoco-mjx") not in MJX.versions:  # internals that `pipeline` is composed of
     raise JodaError(
-        f"joda.mjx works with mujoco-mjx {OLDEST[0]}.{OLDEST[1]} to {NEWEST[0]}.{NEWEST[1]} and "
-        f"found {version('mujoco-mjx')}; run: pip install 'mujoco-mjx=={NEWEST[0]}.{NEWEST[1]}.*'"
+        f"joda.mjx works with mujoco-mjx {dotted(MJX.versions[0])} to {dotted(MJX.versions[-1])} "
+        f"and found {version('mujoco-mjx')}; {MJX.remedy()}."
     )
 
-from joda._core import stop_damping  # noqa: E402
-from joda.mjx.fields import Field, Fields, Place, Prepared, prepare, put_fields  # noqa: E402
-from joda.mjx.simulate import rollout, step  # noqa: E402
-from joda.mjx.state import put_state  # noqa: E402
+from joda._core import stop_damping
+from joda.mjx.fields import Field, Fields, Place, Prepared, prepare, put_fields
+from joda.mjx.simulate import rollout, step
+from joda.mjx.state import put_state
 
 __all__ = [
     "Field",

@@ -13,32 +13,29 @@ rows per joint that the plugin sets (docs/physics.md).
 from importlib import import_module
 from importlib.metadata import version
 
+from joda.companions import WARP, minor
 from joda.errors import JodaError
-
-TESTED = ("3.11", "3.17", "4.0")
-"""Of mujoco-warp: other versions may have other arrays than the kernel reads and writes."""
 
 try:
     import_module("warp")
     import_module("mujoco_warp")
 except ImportError as error:
     raise JodaError(
-        f'joda.warp needs MuJoCo Warp (no module {error.name}); run: pip install ".[warp]"'
+        f"joda.warp needs MuJoCo Warp (no module {error.name}); {WARP.remedy()}."
     ) from None
 except AttributeError as error:  # of a MuJoCo that it was not made for
     raise JodaError(
         f"mujoco-warp {version('mujoco-warp')} does not go with mujoco {version('mujoco')} "
-        f"({error}); give both the same of the versions {', '.join(TESTED[:-1])} and {TESTED[-1]}, "
-        f"e.g. run: pip install 'mujoco=={TESTED[-1]}.*' 'mujoco-warp=={TESTED[-1]}.*'"
+        f"({error}); {WARP.remedy()}."
     ) from None
 
-if ".".join(version("mujoco-warp").split(".")[:2]) not in TESTED:
+if minor("mujoco-warp") != WARP.fitting(minor("mujoco")):  # arrays that the kernel knows
     raise JodaError(
-        f"joda.warp works with mujoco-warp {', '.join(TESTED[:-1])} and {TESTED[-1]} and found "
-        f"{version('mujoco-warp')}; run: pip install 'mujoco-warp=={TESTED[-1]}.*'"
+        f"joda.warp does not take mujoco-warp {version('mujoco-warp')} beside mujoco "
+        f"{version('mujoco')}; {WARP.remedy()}."
     )
 
-from joda.warp.fields import Fields, attach, put_fields  # noqa: E402
-from joda.warp.scene import open_scene, quiet, take_profiles  # noqa: E402
+from joda.warp.fields import Fields, attach, put_fields
+from joda.warp.scene import open_scene, quiet, take_profiles
 
 __all__ = ["Fields", "attach", "open_scene", "put_fields", "quiet", "take_profiles"]

@@ -16,7 +16,7 @@ from joda.scenes.scene import damping_equality
 from joda.warp.law import Profiles, forget, launch
 from joda.warp.learned import make_tables
 from joda.warp.numbers import Number, Place, Row, State
-from joda.warp.table import make_curves, numbers_of
+from joda.warp.table import make_curves, numbers_of, rebounds
 
 INTEGRATORS = ("EULER", "IMPLICIT", "IMPLICITFAST")
 """That keep the rows as they are set."""
@@ -34,7 +34,8 @@ class Fields:
         numbers: arrays on the device, shape (nworld, joints), by name; what is written into them
             acts from the next step on. `conservative.strength` and all other strengths are factors
             on the curve of that name, at least 0; `range.lo` and `range.hi` are the joint's
-            position at s = 0 and s = 1; the others are the effects' numbers, in their units.
+            position at s = 0 and s = 1; the others are the effects' numbers, in their units: see
+            docs/warp.md.
         friction: that of the last step, N·m or N, shape (nworld, joints); not to be written.
         size: nv and njnt of the model.
     """
@@ -96,7 +97,7 @@ def put_fields(
             lacks what its profile needs, or the variants are not of the same joints.
     """
     variants = [profiles] if isinstance(profiles, Mapping) else list(profiles)
-    if not isinstance(nworld, int | np.integer) or nworld < 1:
+    if not isinstance(nworld, int | np.integer) or isinstance(nworld, bool) or nworld < 1:
         raise JodaError(f"nworld is {nworld}; give a whole number, at least 1.")
     if not variants or not variants[0]:
         raise JodaError("there is no profile; give that of at least one joint.")
@@ -134,6 +135,7 @@ def put_fields(
     out.state = wp.array(state, dtype=float, device=device)
     out.rows = wp.full((len(Row), *shape), -1, dtype=int, device=device)
     out.places = wp.array(places, dtype=int, device=device)
+    out.rebounds = wp.array(rebounds(), dtype=float, device=device)
     inertia = [model.dof_M0[model.jnt_dofadr[joint]] for joint in ids]
     out.inertia = wp.array(np.array(inertia, np.float32), dtype=float, device=device)
     named = {number.title: out.numbers[int(number)] for number in Number}

@@ -45,6 +45,7 @@ class Profiles:
         rows: of the last step, -1: none; shape (rows, worlds, joints), by `Row`.
         places: shape (joints, places), by `Place`.
         inertia: as MuJoCo's dof_M0, kg·m² or kg, shape (joints,).
+        rebounds: restitution of an end stop by its damping, see `laws.stop_damping`.
     """
 
     curves: Curves
@@ -54,6 +55,7 @@ class Profiles:
     rows: wp.array3d[int]
     places: wp.array2d[int]
     inertia: wp.array[float]
+    rebounds: wp.array[float]
 
 
 @wp.struct
@@ -438,8 +440,9 @@ def act(
     if damping_row >= 0:
         efc_D[w, damping_row] = implicit
         efc_aref[w, damping_row] = -v / h
-    damping = wp.where(side > 0.0, low, high)
-    if stop >= 0 and damping >= 0.0:
+    restitution = wp.where(side > 0.0, low, high)
+    if stop >= 0 and restitution >= 0.0:
+        damping = laws.stop_damping(profiles.rebounds, restitution)
         efc_D[w, stop] = laws.STOP_IMPEDANCE / (1.0 - laws.STOP_IMPEDANCE) * inertia
         efc_aref[w, stop] = (
             -damping / (laws.STOP_IMPEDANCE * h) * side * v - laws.STOP_STIFFNESS / (h * h) * depth

@@ -43,6 +43,27 @@ def sign(x: float) -> float:
 
 
 @wp.func
+def stop_damping(rebounds: wp.array[float], restitution: float) -> float:
+    """Damping of an end stop, times the timestep: as StopDamping in cpp/end_stop.h.
+
+    `rebounds` has the restitution of a damping of 0 to 1 in equal steps; it falls.
+    """
+    last = rebounds.shape[0] - 1
+    if restitution <= rebounds[last]:
+        return 1.0
+    below = int(0)
+    above = int(last)
+    while above - below > 1:
+        middle = (below + above) / 2
+        if rebounds[middle] > restitution:
+            below = middle
+        else:
+            above = middle
+    share = (rebounds[below] - restitution) / (rebounds[below] - rebounds[above])
+    return (float(below) + wp.max(share, 0.0)) / float(last)
+
+
+@wp.func
 def stribeck_friction(excess: float, velocity: float, exponent: float, v: float) -> float:
     """Friction above Coulomb's that fades as the joint moves at v, N·m."""
     if excess <= 0.0:

@@ -1,7 +1,7 @@
 """Profiles as the arrays that the kernel reads."""
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 
 SCENES = -1.0
 """Of an end stop whose restitution is the scene's."""
+DAMPINGS = 1025
+"""Of end stops, whose restitution is listed."""
 SIDED = {
     "direction_dependent_damping": Curve.DAMPING_UP,
     "quadratic_damping": Curve.QUADRATIC_UP,
@@ -71,9 +73,9 @@ def numbers_of(profile: Profile) -> Array:
                 gain = Number.LEARNED_FORCE_STIFFNESS if position else Number.LEARNED_FORCE_CHANGE
                 out[gain] = effect.gain
             case EndStopRestitution(end="low"):
-                out[Number.END_STOP_RESTITUTION_LOW] = core.stop_damping(effect.restitution)
+                out[Number.END_STOP_RESTITUTION_LOW] = effect.restitution
             case EndStopRestitution(end="high"):
-                out[Number.END_STOP_RESTITUTION_HIGH] = core.stop_damping(effect.restitution)
+                out[Number.END_STOP_RESTITUTION_HIGH] = effect.restitution
     return out
 
 
@@ -148,7 +150,7 @@ def _joint(curves: Mapping[Curve, tuple[str, str]]) -> dict[str, Array]:
     """A joint's part of each list of `Curves`."""
     channels = [_merged(*text) for text in curves.values()]
     knots = np.unique(np.concatenate([[0.0, 1.0], *(channel.knots for channel in channels)]))
-    at = np.array([channel(knots)[0] for channel in channels]).reshape(len(channels), -1)
+    at = np.array([channel(knots)[0] for channel in channels]).reshape(len(channels), len(knots))
     cubics = np.array([_about(channel, knots) for channel in channels]).reshape(*at.shape, 4)
     begins = np.arange(BUCKETS) / BUCKETS
     starts = np.searchsorted(knots.astype(np.float32), begins, side="right") - 1
@@ -162,6 +164,12 @@ def _joint(curves: Mapping[Curve, tuple[str, str]]) -> dict[str, Array]:
         "at": at.T.ravel(),
         "cubics": cubics.swapaxes(0, 1).reshape(-1, 4),
     }
+
+
+@cache
+def rebounds() -> Array:
+    """Restitution of an end stop with a damping of 0 to 1, in equal steps; it falls."""
+    return np.array([core.stop_rebound(damping) for damping in np.linspace(0, 1, DAMPINGS)])
 
 
 @lru_cache(maxsize=4096)
