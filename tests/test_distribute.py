@@ -3,9 +3,11 @@
 import json
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +15,7 @@ import pytest
 from distributed_cases import make
 
 import joda
+import joda.distributed.folder as folder_module
 from joda import distribute
 from joda.distributed.pool import by_processes, by_ray
 from joda.distributed.task import Task
@@ -141,6 +144,128 @@ def test_of_a_process_that_dies_only_its_own_task_is_lost(tmp_path):
     assert [done[name].failed for name in "abcd"] == [False, True, False, True]
     assert "process that did it died before it was done" in done["b"].told
     assert "knob.xml" in done["d"].told
+
+
+def knob_in(folder: Path) -> Path:
+    """A model of one joint, which `generate` is done with in seconds."""
+    folder.mkdir(parents=True)
+    return Path(shutil.copy(Path(__file__).parents[1] / "models" / "knob.xml", folder))
+
+
+def test_what_is_reached_through_a_link_stays_there(tmp_path, monkeypatch):
+    """Nothing is written but below the output, and the model is left alone."""
+    knob = knob_in(tmp_path / "disk" / "deep" / "models" / "knob")
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "data").symlink_to(tmp_path / "disk" / "deep", target_is_directory=True)
+    before, time = contents(tmp_path / "disk"), knob.stat().st_mtime_ns
+    monkeypatch.chdir(tmp_path / "home")
+    (done,) = distribute("generate", "data/models", tmp_path / "disk" / "many", workers=1)
+    assert not done.failed
+    made = {name for name in contents(tmp_path) if not name.startswith("disk/many/")}
+    assert made == {f"disk/{name}" for name in before}  # a link's folder is not walked
+    assert knob.stat().st_mtime_ns == time
+
+
+def test_runs_are_known_by_any_spelling_of_their_ending(cases, tmp_path):
+    shutil.copytree(cases / "door_0000", tmp_path / "up" / "door")
+    for run in (tmp_path / "up" / "door").glob("*.csv"):
+        run.rename(run.with_suffix(".CSV"))
+    (done,) = distribute("diagnose", tmp_path / "up", tmp_path / "out", workers=1)
+    assert not done.failed
+    task = next(
+        folder_module._cases("diagnose", tmp_path / "up", tmp_path / "out", None, False, "", [])
+    )
+    assert len(task.runs) == len(list((cases / "door_0000").glob("*.csv")))
+
+
+def test_what_fails_anew_leaves_no_result_that_says_otherwise(cases, tmp_path):
+    """Neither a run that is none, nor two models, nor a model that does not load."""
+    failing = tmp_path / "cases"
+    for name in ("bad", "deep"):
+        shutil.copytree(cases / name, failing / name)
+        (tmp_path / "out" / name / "two").mkdir(parents=True)
+    old = [tmp_path / "out" / name / "result.json" for name in ("bad", "deep/two")]
+    for path in old:
+        path.write_text("{}")
+    done = distribute("diagnose", failing, tmp_path / "out", workers=1, resume=True)
+    assert [one.failed for one in done] == [True, True]
+    assert not any(path.exists() for path in old)
+    for name in ("a", "b"):
+        knob_in(tmp_path / "models" / name)
+    out = tmp_path / "made"
+    first, second = distribute("generate", tmp_path / "models", out, workers=2)
+    (tmp_path / "models" / "a" / "knob.xml").write_text("<mujoco")
+    distribute("generate", tmp_path / "models", out, workers=1, resume=True)
+    assert not (first.folder / "result.json").exists()
+    assert (second.folder / "result.json").is_file()
+
+
+def test_a_result_that_cannot_be_written_is_told_and_the_others_go_on(tmp_path):
+    for name in ("a", "b"):
+        knob_in(tmp_path / "models" / name)
+    out = tmp_path / "out"
+    done = distribute("generate", tmp_path / "models", out, workers=1)
+    blocked = done[0].folder / "composed.json"
+    before = contents(out)
+    blocked.unlink()
+    blocked.mkdir()
+    again = distribute("generate", tmp_path / "models", out, workers=1, force=True)
+    assert [one.failed for one in again] == [True, False]
+    assert "composed.json: cannot be written" in again[0].told
+    kept = {name: own for name, own in before.items() if "/composed.json" not in name}
+    assert {name: contents(out).get(name) for name in kept} | {
+        name: None for name in kept if name.endswith("result.json")
+    } == kept | {name: None for name in kept if name.endswith("result.json")}
+
+
+INTERRUPTED = """
+import os, sys, time
+from joda.distributed import pool
+
+def slow(task):
+    open(os.path.join(task, f"begun {os.getpid()} {time.time()}"), "w").close()
+    try:
+        time.sleep(60)
+    finally:
+        open(os.path.join(task, f"left {os.getpid()}"), "w").close()
+
+pool.run = slow
+if __name__ == "__main__":
+    list(pool.by_processes([sys.argv[1]] * 6, 2))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_begins_nothing_more_and_no_worker_outlives_its_pool(tmp_path, how):
+    """Tasks that are begun leave properly, the others are not begun, nothing is printed by them."""
+    (tmp_path / "many.py").write_text(INTERRUPTED)
+    folder = tmp_path / "told"
+    folder.mkdir()
+    run = subprocess.Popen(
+        [sys.executable, tmp_path / "many.py", folder], stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    waited_for(lambda: len(list(folder.glob("begun *"))) == 2)
+    if how == signal.SIGINT:
+        os.killpg(run.pid, how)  # as a terminal does
+    else:
+        run.send_signal(how)
+    _, errors = run.communicate(timeout=30)
+    waited_for(lambda: len(list(folder.glob("left *"))) == 2)
+    assert len(list(folder.glob("begun *"))) == 2
+    workers = [int(path.name.split()[1]) for path in folder.glob("begun *")]
+    waited_for(lambda: not any(Path(f"/proc/{worker}").exists() for worker in workers))
+    if how == signal.SIGINT:
+        assert errors.count("Traceback") <= 3 and errors.rstrip().endswith("KeyboardInterrupt")
+
+
+def waited_for(condition, seconds=30.0):
+    """Fails if the condition does not come true."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 def test_mistakes_are_one_sentence(cases, tmp_path):

@@ -538,6 +538,59 @@ def joint_frame(path: Path, to: str, name: str):
     return frame.Transform(joint.GetLocalPos1Attr().Get()), along
 
 
+CHILD = """<mujoco model="child">{unit}<worldbody><body name="door">
+  <joint name="lid" axis="0 0 1" range="{range}"/>
+  <geom type="box" size=".2 .01 .3" pos=".2 0 0" mass="4"/></body></worldbody></mujoco>"""
+PARENT = """<mujoco model="parent"><compiler angle="{unit}"/>
+  <asset><model name="c" file="child_p.xml"/></asset>
+  <worldbody><attach model="c" body="door" prefix="L_"/></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("child", "limits", "parent"),
+    [("", "-20 80", "radian"), ('<compiler angle="radian"/>', "-.35 1.4", "degree")],
+    ids=["degrees in radians", "radians in degrees"],
+)
+def test_native_keeps_the_unit_of_a_file_that_is_attached(child, limits, parent, tmp_path):
+    """A line of force is exact in both, wherever the angle's unit is set."""
+    (tmp_path / "child.xml").write_text(CHILD.format(unit=child, range=limits))
+    line = Channel(components=(Component(interval=(0, 1), x=(0, 1), y=(2.0, -1.0)),))
+    profile = LID.model_copy(update={"channels": Channels(conservative=line), "effects": ()})
+    joda.attach(tmp_path / "child.xml", profile, tmp_path / "child_p.xml")
+    (tmp_path / "parent.xml").write_text(PARENT.format(unit=parent))
+    export(tmp_path / "parent.xml", "native", tmp_path / "n.xml")
+    forces = []
+    for name in ("parent", "n"):
+        one = mujoco.MjModel.from_xml_path(str(tmp_path / f"{name}.xml"))
+        data = mujoco.MjData(one)
+        data.qpos[0] = 0.5
+        mujoco.mj_forward(one, data)
+        forces.append(data.qfrc_passive[0])
+    assert forces[1] == pytest.approx(forces[0], rel=1e-5) and forces[0] > 0.4
+
+
+def test_in_usd_no_body_has_the_name_of_a_joint(tmp_path):
+    Usd = pytest.importorskip("pxr.Usd")
+    from pxr import UsdPhysics
+
+    (tmp_path / "plain.xml").write_text(
+        '<mujoco><worldbody><body name="joint_lid" gravcomp="1"><joint name="lid" '
+        'range="-20 80"/><geom size=".1"/></body></worldbody></mujoco>'
+    )
+    joda.attach(tmp_path / "plain.xml", ONLY_LID, tmp_path / "scene.xml")
+    written = export(tmp_path / "scene.xml", "usd", tmp_path / "o.usda")
+    assert "1 gravity compensation is left out" in written.notes
+    stage = Usd.Stage.Open(str(tmp_path / "o.usda"))
+    kinds = {
+        prim.GetName(): prim.GetTypeName()
+        for prim in stage.Traverse()
+        if prim.GetName().startswith("joint_lid")
+    }
+    assert kinds == {"joint_lid": "Xform", "joint_lid_2": "PhysicsRevoluteJoint"}
+    joint = UsdPhysics.Joint(stage.GetPrimAtPath("/o/joint_lid_2"))
+    assert joint.GetBody1Rel().GetTargets() == ["/o/joint_lid"]
+
+
 def test_mistakes_are_one_sentence(scene, tmp_path):
     (tmp_path / "plain.xml").write_text(SCENE)
     with pytest.raises(joda.JodaError, match="carries no profile; attach one first"):

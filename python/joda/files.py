@@ -4,6 +4,7 @@ import os
 import re
 import tempfile
 from collections.abc import Iterable, Mapping
+from errno import EISDIR
 from io import BytesIO, TextIOWrapper
 from itertools import count
 from pathlib import Path
@@ -148,6 +149,9 @@ def write_together(contents: Mapping[Path, bytes | str]) -> None:
     written: dict[Path, Path] = {}
     path = Path()
     try:
+        for path in contents:
+            if path.is_dir():  # which would be found out in the midst
+                raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
         for path, content in contents.items():
             descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
             written[path] = Path(name)

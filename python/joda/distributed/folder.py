@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,6 +93,8 @@ def distribute(
         raise JodaError(
             f"{source}: holds no folder with a model (XML or URDF) and runs (CSV) beside it."
         )
+    for one in done:
+        _forget(one.folder)
     make_folder(target)
     total, folders = len(places) + len(done), {make.label: make.folder for make in places}
 
@@ -107,9 +110,12 @@ def distribute(
     running = by_processes(pending(), workers) if ray is None else by_ray(pending(), ray, workers)
     for task, result in running:
         folder = folders[task.label]
-        if not result.failed:
+        told, failed = result.told, result.failed
+        try:
             _write(folder, task, result)
-        done.append(Distributed(task.label, folder, result.told, result.failed))
+        except JodaError as error:
+            told, failed = str(error), True
+        done.append(Distributed(task.label, folder, told, failed))
         progress(len(done), total, task.label)
     return sorted(done, key=lambda one: one.label)
 
@@ -132,7 +138,7 @@ class _Place:
         """With the files."""
         files = {}
         for path in sorted(self.model.parent.rglob("*")):
-            log = path.suffix.lower() == ".csv" and path not in self.runs
+            log = _is_run(path) and path not in self.runs
             if path.is_file() and not log and self.made not in path.resolve().parents:
                 files[folder_of(path, self.root)] = path.read_bytes()
         return Task(
@@ -148,8 +154,12 @@ class _Place:
 
 
 def _root(source: Path, target: Path) -> Path:
-    """What both are below."""
-    return Path(os.path.commonpath([source.resolve(), target.resolve()]))
+    """What both are below, as they are written: what is below a link stays below it."""
+    return Path(os.path.commonpath([os.path.abspath(source), os.path.abspath(target)]))
+
+
+def _is_run(path: Path) -> bool:
+    return path.suffix.lower() == ".csv"
 
 
 def _cases(
@@ -165,7 +175,7 @@ def _cases(
     if describe:
         raise JodaError("--describe is of generate.")
     made = target.resolve()
-    for folder in sorted({path.parent for path in source.rglob("*.csv")}):
+    for folder in sorted({path.parent for path in source.rglob("*") if _is_run(path)}):
         if made == folder.resolve() or made in folder.resolve().parents:
             continue
         models = sorted(path for path in folder.iterdir() if path.suffix.lower() in MODELS)
@@ -175,7 +185,7 @@ def _cases(
             told = f"{folder}: holds {len(models)} models beside runs; put one there."
             failed.append(Distributed(label, into, told, True))
             continue
-        runs = tuple(sorted(folder.glob("*.csv")))
+        runs = tuple(sorted(filter(_is_run, folder.iterdir())))
         options = {"passive": passive}
         root = _root(source, target)
         yield _Place(what, label, into, root, models[0], joint, runs, made, options)
@@ -195,7 +205,10 @@ def _models(
         raise JodaError("--passive is of diagnose and improve.")
     bad: dict[str, Any] = {}
     jobs = find_jobs(source, target, joint, bad)
-    failed += [Distributed(label, target / label, str(e), True) for label, e in bad.items()]
+    for label, error in bad.items():
+        failed.append(Distributed(label, target / label, str(error), True))
+        for told in (target / label).glob(f"*/{RESULT}"):
+            _forget(told.parent)
     options = {"proposer": "offline", "describe": describe}
     root = _root(source, target)
     for label, (model, name, folder) in jobs.items():
@@ -213,8 +226,20 @@ def _kept(folder: Path, task: Task) -> str | None:
         return None
 
 
+def _forget(folder: Path) -> None:
+    """Takes away what says that a result is there; what cannot be, cannot be written either."""
+    with suppress(OSError):
+        (folder / RESULT).unlink()
+
+
 def _write(folder: Path, task: Task, result: Result) -> None:
-    """Writes all files of a result, or none; what says that they are there comes last."""
+    """Writes all files of a result, or none; what says that they are there comes last.
+
+    Of a task that failed nothing says so: what was there before is not its result.
+    """
+    _forget(folder)
+    if result.failed:
+        return
     files = {name: digest(content) for name, content in sorted(result.files.items())}
     told = {"task": task.digest, "told": result.told, "files": files}
     for name in result.files:

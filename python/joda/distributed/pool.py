@@ -1,11 +1,16 @@
 """Who runs tasks: processes of this machine, or Ray's workers on many."""
 
 import os
+import signal
 import socket
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from contextlib import contextmanager
+from multiprocessing import get_context, parent_process
+from pathlib import Path
 from typing import Any
 
 from joda.distributed.task import Result, Task, run
@@ -23,7 +28,11 @@ DIED = Result(
 )
 """What a task comes to whose process dies."""
 AHEAD = 4
-"""Tasks per worker that are handed out before one is done: their files wait in memory."""
+"""Tasks per worker of a cluster that are handed out before one is done: their files wait there."""
+GRACE = 5.0
+"""For a task whose pool is gone to leave nothing behind, s."""
+TOKEN = ".ray/auth_token"
+"""In the user's home: where it is, Ray's clusters ask for it."""
 
 
 def by_processes(tasks: Iterable[Task], workers: int | None) -> Iterator[tuple[Task, Result]]:
@@ -52,12 +61,13 @@ def _side_by_side(
 ) -> Iterator[tuple[Task, Result]]:
     """The same in one pool; ends early where one of its processes dies, and adds what is then
     `lost`."""
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(count, mp_context=spawn, initializer=_end_with_pool) as pool:
         waiting: dict[Future[Result], Task] = {}
         try:
             for task in tasks:
                 waiting[_submitted(pool, task)] = task
-                if len(waiting) >= AHEAD * count:
+                if len(waiting) >= count:  # one that waits there cannot be called off
                     yield _next(waiting)
             while waiting:
                 yield _next(waiting)
@@ -67,9 +77,44 @@ def _side_by_side(
             pool.shutdown(cancel_futures=True)
 
 
+def _end_with_pool() -> None:
+    """Ends this process when the one that began it has ended, however it did."""
+
+    def watch() -> None:
+        begun_by = parent_process()
+        assert begun_by is not None
+        begun_by.join()
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(GRACE)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def _interrupts(how: str) -> Iterator[None]:
+    """Ctrl-C is let through or waits meanwhile, where a system can do that: SIG_UNBLOCK or
+    SIG_BLOCK. A process begins as the one is that begins it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(getattr(signal, how), {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _interruptible(task: Task) -> Result:
+    """Runs a task in a process that Ctrl-C does not reach otherwise."""
+    with _interrupts("SIG_UNBLOCK"):
+        return run(task)
+
+
 def _submitted(pool: ProcessPoolExecutor, task: Task) -> Future[Result]:
     try:
-        return pool.submit(run, task)
+        with _interrupts("SIG_BLOCK"):
+            return pool.submit(_interruptible, task)
     except BrokenProcessPool as error:
         gone: Future[Result] = Future()
         gone.set_exception(error)
@@ -98,6 +143,8 @@ def by_ray(
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nothing is sent to its makers unasked
     if address != HERE:  # else it would try for a quarter of an hour
         os.environ.setdefault("RAY_NUM_REDIS_GET_RETRIES", "1")
+        if (Path.home() / TOKEN).is_file():  # which a cluster that wants none does not mind
+            os.environ.setdefault("RAY_AUTH_MODE", "token")
     try:
         import ray
     except ImportError:
@@ -112,7 +159,7 @@ def by_ray(
         except (OSError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
             raise JodaError(
                 f"no Ray cluster can be used at {address} ({error}); does `ray start --head` run "
-                "there, with this Ray's version and authentication token?"
+                f"there, with this Ray's version, and the token in ~/{TOKEN} if it has one?"
             ) from None
     try:
         remote: Callable[..., Any] = ray.remote(num_cpus=1, max_retries=2)(run).remote

@@ -1,7 +1,7 @@
 """MJCF without the plugin: MuJoCo's own spring, damping and frictionloss."""
 
 from collections.abc import Mapping
-from math import degrees
+from math import degrees, isclose
 from pathlib import Path
 
 import mujoco
@@ -29,14 +29,16 @@ def native(
     for equality in list(spec.equalities):
         if DAMPING_ROW.rstrip("_") in equality.name:
             delete(spec, equality)
-    hinge = mujoco.mjtJoint.mjJNT_HINGE
     for number, own in constants.items():
         joint = spec.joints[number]
         set_strength(joint, "stiffness", *own.stiffness)
         set_strength(joint, "damping", *own.damping, 0.0)
         joint.frictionloss = own.friction
-        by_degree = spec.compiler.degree and joint.type == hinge
-        joint.springref = degrees(own.reference) if by_degree else own.reference
+        joint.springref = own.reference
+    model = spec.compile()
+    for number, own in constants.items():  # a joint keeps the angle's unit of the file it is from
+        if not isclose(model.qpos_spring[model.jnt_qposadr[number]], own.reference):
+            spec.joints[number].springref = degrees(own.reference)
     spec.compile()
     source = Source(path, write_out(spec, path))
     _forget_plugin(source)

@@ -134,6 +134,7 @@ def links_of(model: mujoco.MjModel) -> tuple[list[Link], list[str]]:
         ("equality constraint", _equalities(model)),
         ("actuator", model.nu),
         ("tendon", model.ntendon),
+        ("gravity compensation", int(np.count_nonzero(model.body_gravcomp))),
     ):
         if amount:
             left.append(left_out(amount, what))

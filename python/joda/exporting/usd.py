@@ -4,7 +4,7 @@ UsdPhysics itself has no dry friction. It is written as PhysX (Isaac) and as MuJ
 it: `physxJointAxis:...:dynamicFrictionEffort`, which acts in articulations, and `mjc:frictionloss`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import degrees, radians
 from typing import Any
 
@@ -55,7 +55,8 @@ def usd(
     frames = _frames(links)
     for link, path, frame in zip(links, paths, frames, strict=True):
         _link(stage, model, link, path, frame)
-    joints = _valid([f"joint_{link.joint}" for link in links])
+    taken = [path.name for path in paths]
+    joints = _valid([f"joint_{link.joint}" for link in links], taken)
     for link, path, called in zip(links, paths, joints, strict=True):
         if link.kind != "free" and link.parent >= 0:
             parent = paths[link.parent] if links[link.parent].parent >= 0 else None
@@ -64,14 +65,14 @@ def usd(
     return str(stage.GetRootLayer().ExportToString())
 
 
-def _valid(names: Sequence[str]) -> list[str]:
-    """The names as USD takes them, no two the same."""
+def _valid(names: Sequence[str], taken: Collection[str] = ()) -> list[str]:
+    """The names as USD takes them, no two the same, none of those that are taken."""
     from pxr import Tf
 
     out: list[str] = []
     for name in unique(names):
         one, k = Tf.MakeValidIdentifier(name), 2
-        while one in out:
+        while one in out or one in taken:
             one, k = f"{Tf.MakeValidIdentifier(name)}_{k}", k + 1
         out.append(one)
     return out
