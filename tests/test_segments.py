@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from joda.diagnosis.units import units_of
 from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
 from joda.estimation.estimator import Fit, SegmentEstimator
-from joda.estimation.segmentation import STEPS, _step, segments_of
+from joda.estimation.segmentation import STEPS, _responses, _step, segments_of
 from joda.estimation.unknowns import EMPTY, NOTHING
 from joda.measured import smoothing
 from joda.measured.reading import read_measured
@@ -183,6 +184,27 @@ def test_starts_are_sought_from_those_of_a_fit_nearby_where_these_miss_less():
     assert helped.squares[3] < 0.1 * alone.squares[3]
     others = np.arange(len(near)) != 3
     assert np.array_equal(helped.start[others], alone.start[others])
+
+
+def test_errors_of_a_force_grow_where_the_joint_runs_away():
+    """Against the differential equation; a joint that does not run away is a free one."""
+    rng = np.random.default_rng(0)
+    times = np.cumsum(np.append(0.0, rng.uniform(0.01, 0.05, 30)))
+    gaps = np.diff(times, append=times[-1])
+    rate = np.where(rng.uniform(size=31) < 0.7, rng.uniform(0, 6, 31), 0.0)
+    found = _responses(times, gaps, rate)
+    for k in (0, 7, 20):
+        x = np.array([0.5 * gaps[k], 1.0])
+        assert not found[: k + 1, k].any()
+        for i in range(k + 1, 30):
+            assert found[i, k] == pytest.approx(x[0], rel=1e-7)
+            pushed = solve_ivp(
+                lambda t, y, r=rate[i]: (y[1], r**2 * y[0]), (0, gaps[i]), x, rtol=1e-10, atol=1e-12
+            )
+            x = pushed.y[:, -1]
+    free = np.maximum(times[:, None] - times - 0.5 * gaps, 0.0)
+    assert np.allclose(_responses(times, gaps, np.zeros(31)), free)
+    assert np.allclose(_responses(times, gaps, np.full(31, 1e-6)), free, atol=1e-9)
 
 
 def test_a_good_fit_stays_as_it_is(tmp_path):

@@ -1,6 +1,7 @@
 """The model as it is, with the strengths of its components as numbers to be fitted again."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from joda.estimation.segmentation import segments_of
 from joda.estimation.segments import GRID, Segments
 from joda.estimation.unknowns import Unknowns
 from joda.joints.joint_model import JointModel
+from joda.measured.instability import divergence_rate
 from joda.measured.reading import Measured
 from joda.measured.trust import USUAL, Trust
 from joda.profile import CHANNELS, Profile
@@ -175,7 +177,8 @@ def segments_for(measured: Measured, length: float | None = None, fine: bool = T
         return curve_segments(measured)
     lo, hi = measured.profile.joint.range
     fixed = lo, measured.joint_model.inertia, measured.timestep
-    return segments_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine)
+    diverges = partial(divergence_rate, measured)
+    return segments_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine, diverges)
 
 
 def joint_model_for(measured: Measured, h: float) -> JointModel:

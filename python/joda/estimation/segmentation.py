@@ -1,6 +1,6 @@
 """Cuts measured runs into segments, and weighs their samples by what noise they have."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,7 @@ def segments_of(
     timestep: float,
     length: float | None = None,
     fine: bool = True,
+    diverges: Callable[[Array], Array] = np.zeros_like,
 ) -> Segments:
     """Cuts runs into segments; parts where the force is not known are left out.
 
@@ -62,6 +63,8 @@ def segments_of(
         length: of the segments, s; None: by the joint's pace.
         fine: whether steps are as short as the segments ask for, so that the laws act and not their
             steps; else they are the scene's.
+        diverges: how fast (1/s) the joint runs away from positions (rad or m), as a force that
+            drives it on makes it; 0 where it does not.
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
@@ -124,7 +127,7 @@ def segments_of(
         run=run_of,
         rows=rows,
         sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
-        shared=_shared(rows, time, spread, push / inertia),
+        shared=_shared(rows, time, spread, push / inertia, diverges(position)),
         impacts=_knocks(rows, (position - lo) / span, spread / span, hits),
         rests=_rests(rows, (position - lo) / span, spread / span),
         command=command if driven else None,
@@ -229,13 +232,14 @@ def _spread(time: Array, position: Array, sigma: float) -> Array:
     return np.asarray(np.hypot(sigma, late * smooth))
 
 
-def _shared(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
+def _shared(rows: Integers, time: Array, sigma: Array, push: Array, rate: Array) -> Array:
     """What of the noise a segment's samples share, see `Segments`.
 
     Besides the position's noise there is that of the force: an error of acceleration `push`, from
-    one sample to the next, moves a free joint by that time, and on at the speed that it got. In
-    units of the position's noise the covariance is 1 + sum of l u uᵀ over few directions u, and its
-    inverse root 1 - sum of (1 - 1 / sqrt(1 + l)) u uᵀ.
+    one sample to the next, moves a free joint by that time, and on at the speed that it got; one
+    that runs away at a `rate` further, see `_responses`. In units of the position's noise the
+    covariance is 1 + sum of l u uᵀ over few directions u, and its inverse root 1 - sum of
+    (1 - 1 / sqrt(1 + l)) u uᵀ.
     """
     found = []
     for row in rows:
@@ -245,14 +249,32 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array) -> Array:
             continue
         t = time[own] - time[own[0]]
         gaps = np.diff(t, append=t[-1])
-        moved = np.maximum(t[:, None] - t - 0.5 * gaps, 0.0) * (gaps * push[own])
-        moved /= sigma[own][:, None]
+        moved = _responses(t, gaps, rate[own]) * (gaps * push[own]) / sigma[own][:, None]
         size, way = np.linalg.eigh(moved @ moved.T)
         much = size > SHARED
         found.append(way[:, much] * np.sqrt(1 - 1 / np.sqrt(1 + size[much])))
     out = np.zeros((*rows.shape, max((one.shape[1] for one in found), default=0)))
     for ways, one in zip(out, found, strict=True):
         ways[: len(one), : one.shape[1]] = one
+    return out
+
+
+def _responses(t: Array, gaps: Array, rate: Array) -> Array:
+    """Where a joint is at each time that was given a speed of 1 in the midst of each gap before.
+
+    It moves by x'' = rate² x, with the rate of each gap; a free one, of rate 0, by the time since.
+    Shape (n, n): times, gaps.
+    """
+    if not rate.any():
+        return np.maximum(t[:, None] - t - 0.5 * gaps, 0.0)
+    out = np.zeros((len(t), len(t)))
+    x, v = np.zeros(len(t)), np.zeros(len(t))
+    for i in range(1, len(t)):
+        r, gap = rate[i - 1], gaps[i - 1]
+        growing, going = np.cosh(r * gap), np.sinh(r * gap) / r if r else gap
+        x, v = growing * x + going * v, r**2 * going * x + growing * v
+        x[i - 1], v[i - 1] = 0.5 * gap, 1.0
+        out[i] = x
     return out
 
 

@@ -4,7 +4,7 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from typing import Literal
 
@@ -57,10 +57,7 @@ def concepts(texts: Iterable[str], group: Group) -> Concepts:
     letters = "".join(names)
     meant = _meanings(group)
     told = [one for one in meant if not one.isascii() and one in letters]
-    for word in words:
-        parts = [one for one in meant if _tells(one, word)]
-        told += [one for one in parts if not any(one != other and one in other for other in parts)]
-    return frozenset(meant[one] for one in told)
+    return frozenset(meant[one] for one in told).union(*(_told(word, group) for word in words))
 
 
 def said(description: str, group: Group) -> Concepts:
@@ -69,6 +66,14 @@ def said(description: str, group: Group) -> Concepts:
     return frozenset(
         concept for concept, saying in _sayings()[group].items() if saying.search(text)
     )
+
+
+@lru_cache(maxsize=10_000)  # a scene's names are asked for with each of its joints
+def _told(word: str, group: Group) -> Concepts:
+    meant = _meanings(group)
+    parts = [one for one in meant if _tells(one, word)]
+    longest = [one for one in parts if not any(one != other and one in other for other in parts)]
+    return frozenset(meant[one] for one in longest)
 
 
 def _words(name: str) -> list[str]:
