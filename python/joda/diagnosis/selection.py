@@ -62,6 +62,8 @@ SETTINGS = Settings()
 EVEN, SURE = 0.5, 0.9
 """Probabilities above which an answer is more likely than not, and sure: then neither a closer look
 is taken nor a further experiment proposed."""
+MANY = 8
+"""Segments of which one alone tells of no effect."""
 LITTLE, LEFT, MUCH = SETTINGS.little, SETTINGS.left, SETTINGS.much
 
 
@@ -77,7 +79,8 @@ class Evidence:
         model: excess of the model with its own strengths as fitted.
         tolerant: the same, where noise may be as much as the best of all leaves, within bounds.
         own: the same, where noise is as much as the best of all leaves.
-        gain: in loss, by the first effect, less the price of its numbers.
+        gain: in loss, by the first effect, less the price of its numbers; where the model leaves no
+            more than noise, without the segment that gains most.
         misfit_tolerance: part of the model's excess that the first effect may leave if it is the
             true one.
         effects: names, the likeliest first.
@@ -159,13 +162,26 @@ def evidence(ranking: Ranking) -> Evidence:
         model=excess_of(ranking.baseline),
         tolerant=excess(tolerant, samples),
         own=excess(rescaled(estimator, fit, ranking.level), samples),
-        gain=fit.loss - first.fit.loss - first.cost if first else 0.0,
+        gain=_gain(ranking),
         misfit_tolerance=first.hypothesis.misfit_tolerance if first else KNOWN_LAW,
         effects=tuple(candidate.hypothesis.effect for candidate in candidates),
         left=tuple(
             excess(candidate.score, max(ranking.n_effective, 1.0)) for candidate in candidates
         ),
     )
+
+
+def _gain(ranking: Ranking) -> float:
+    """See `Evidence`: one segment may have been disturbed, by a hand that comes or goes."""
+    estimator, fit = ranking.baseline.estimator, ranking.baseline.fit
+    if not ranking.candidates:
+        return 0.0
+    first = ranking.candidates[0]
+    gain = fit.loss - first.fit.loss - first.cost
+    if excess_of(ranking.baseline) > 0 or np.count_nonzero(estimator.counts) < MANY:
+        return gain
+    each = estimator.losses(fit.squares) - estimator.losses(first.fit.squares)
+    return gain - max(float(each[estimator.counts].max()), 0.0)
 
 
 def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Selection:

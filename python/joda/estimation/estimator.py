@@ -151,8 +151,14 @@ class SegmentEstimator:
 
     def loss(self, squares: Array, cauchy_scale: float = CAUCHY_SCALE, level: float = 1.0) -> float:
         """Robust sum over the segments that count, where noise makes squares of `level`."""
+        return float(np.sum(self.losses(squares, cauchy_scale, level)[self.counts]))
+
+    def losses(
+        self, squares: Array, cauchy_scale: float = CAUCHY_SCALE, level: float = 1.0
+    ) -> Array:
+        """The same of each segment, shape (m,)."""
         room = cauchy_scale * np.maximum(self.segments.count, 1)
-        return float(np.sum((room * np.log1p(squares / level / room))[self.counts]))
+        return np.asarray(room * np.log1p(squares / level / room))
 
     def overdispersion(self, squares: Array) -> float:
         """Robust mean square residual, 1 at least."""
