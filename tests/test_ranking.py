@@ -16,7 +16,7 @@ from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside
 from joda.diagnosis.search import NARROWED, WELLS, WORST, _shown_without_impacts, narrowed, rank
-from joda.diagnosis.selection import weigh
+from joda.diagnosis.selection import decide, evidence, excess_of, weigh
 from joda.diagnosis.verdict import diagnosed
 from joda.effects import EndStopRestitution, QuadraticDamping
 from joda.estimation.estimator import CAUCHY_SCALE
@@ -157,6 +157,27 @@ def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
     assert strange.probabilities[0] <= 0.5  # and an unknown one is as likely
 
 
+@pytest.mark.parametrize(("disturbed", "verdict"), [(1, "adequate"), (3, "missing_effect")])
+def test_one_segment_of_many_tells_of_no_effect(ranked, disturbed, verdict):
+    """Where all of them together leave no more than noise."""
+    estimator, first = ranked.baseline.estimator, ranked.candidates[0]
+    calm = np.where(estimator.counts, 0.5 * estimator.segments.count, 0.0)
+    off = calm.copy()
+    off[np.flatnonzero(estimator.counts)[:disturbed]] *= 7.0
+    fits = [
+        replace(first.fit, squares=squares, loss=estimator.loss(squares)) for squares in (off, calm)
+    ]
+    own = replace(first, fit=fits[1], score=fits[1].loss)
+    one = replace(
+        ranked, baseline=replace(ranked.baseline, fit=fits[0]), candidates=(own,), level=1
+    )
+    assert estimator.counts.sum() > 10 and excess_of(one.baseline) < 0
+    gain = estimator.losses(off) - estimator.losses(calm)
+    told = evidence(one).gain + first.cost
+    assert told == pytest.approx(gain.sum() - gain.max())
+    assert decide(evidence(one)).verdict == verdict
+
+
 def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
     """If neither leaves only noise, though one whose shape is roughly known might leave so much."""
     estimator = ranked.baseline.estimator
@@ -185,7 +206,6 @@ def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
     assert verdict(0.0, 0.01) == "missing_effect"  # both leave only noise: either may be
 
 
-@pytest.mark.long
 @pytest.mark.long
 def test_ends_that_are_bouncier_than_the_model_s_are_unexplained_if_that_is_excluded():
     """Only impacts tell of them, and those tell of nothing else."""
