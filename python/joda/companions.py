@@ -4,7 +4,10 @@ What is told to install leaves the MuJoCo that is there where it is.
 """
 
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import version
+
+from joda.errors import JodaError
 
 Version = tuple[int, int]
 """Major and minor."""
@@ -23,6 +26,31 @@ class Companion:
     package: str
     versions: tuple[Version, ...]
     newest_goes_on: bool = False
+
+    def load(self, user: str, *modules: str) -> None:
+        """Imports the modules for the part of joda that uses them.
+
+        Raises:
+            JodaError: there is none, or it does not go with MuJoCo or joda.
+        """
+        try:
+            for module in modules:
+                import_module(module)
+        except ImportError as error:
+            raise JodaError(
+                f"{user} needs {self.package} (no module {error.name}); {self.remedy()}."
+            ) from None
+        except AttributeError as error:  # of a MuJoCo that it was not made for
+            raise JodaError(
+                f"{self.package} {version(self.package)} does not go with mujoco "
+                f"{version('mujoco')} ({error}); {self.remedy()}."
+            ) from None
+        found = minor(self.package)
+        if found not in self.versions or not (self.newest_goes_on or found == minor("mujoco")):
+            raise JodaError(
+                f"{user} does not take {self.package} {version(self.package)} beside mujoco "
+                f"{version('mujoco')}; {self.remedy()}."
+            )
 
     def fitting(self, mujoco: Version) -> Version | None:
         """The version that goes with a MuJoCo; None: there is none."""

@@ -16,35 +16,14 @@ A joint's friction of the last step, which the plugin keeps in `plugin_state`, i
 backlash and a learned force need state beyond `mjx.Data`: `put_state` makes room for it.
 """
 
-from importlib import import_module
-from importlib.metadata import version
+from joda.companions import MJX
 
-from joda.companions import MJX, dotted, minor
-from joda.errors import JodaError
+MJX.load("joda.mjx", "jax", "mujoco.mjx")  # its versions have other internals
 
-try:
-    import_module("jax")
-    import_module("mujoco.mjx")
-except ImportError as error:
-    raise JodaError(
-        f"joda.mjx needs JAX and MJX (no module {error.name}); {MJX.remedy()}."
-    ) from None
-except AttributeError as error:  # of a MuJoCo that it was not made for
-    raise JodaError(
-        f"mujoco-mjx {version('mujoco-mjx')} does not go with mujoco {version('mujoco')} "
-        f"({error}); {MJX.remedy()}."
-    ) from None
-
-if minor("mujoco-mjx") not in MJX.versions:  # internals that `pipeline` is composed of
-    raise JodaError(
-        f"joda.mjx works with mujoco-mjx {dotted(MJX.versions[0])} to {dotted(MJX.versions[-1])} "
-        f"and found {version('mujoco-mjx')}; {MJX.remedy()}."
-    )
-
-from joda._core import stop_damping
-from joda.mjx.fields import Field, Fields, Place, Prepared, prepare, put_fields
-from joda.mjx.simulate import rollout, step
-from joda.mjx.state import put_state
+from joda._core import stop_damping  # noqa: E402
+from joda.mjx.fields import Field, Fields, Place, Prepared, prepare, put_fields  # noqa: E402
+from joda.mjx.simulate import rollout, step  # noqa: E402
+from joda.mjx.state import put_state  # noqa: E402
 
 __all__ = [
     "Field",

@@ -10,32 +10,11 @@ rows per joint that the plugin sets (docs/physics.md).
     mujoco_warp.step(m, d)
 """
 
-from importlib import import_module
-from importlib.metadata import version
+from joda.companions import WARP
 
-from joda.companions import WARP, minor
-from joda.errors import JodaError
+WARP.load("joda.warp", "warp", "mujoco_warp")  # its versions have other arrays
 
-try:
-    import_module("warp")
-    import_module("mujoco_warp")
-except ImportError as error:
-    raise JodaError(
-        f"joda.warp needs MuJoCo Warp (no module {error.name}); {WARP.remedy()}."
-    ) from None
-except AttributeError as error:  # of a MuJoCo that it was not made for
-    raise JodaError(
-        f"mujoco-warp {version('mujoco-warp')} does not go with mujoco {version('mujoco')} "
-        f"({error}); {WARP.remedy()}."
-    ) from None
-
-if minor("mujoco-warp") != WARP.fitting(minor("mujoco")):  # arrays that the kernel knows
-    raise JodaError(
-        f"joda.warp does not take mujoco-warp {version('mujoco-warp')} beside mujoco "
-        f"{version('mujoco')}; {WARP.remedy()}."
-    )
-
-from joda.warp.fields import Fields, attach, put_fields
-from joda.warp.scene import open_scene, quiet, take_profiles
+from joda.warp.fields import Fields, attach, put_fields  # noqa: E402
+from joda.warp.scene import open_scene, quiet, take_profiles  # noqa: E402
 
 __all__ = ["Fields", "attach", "open_scene", "put_fields", "quiet", "take_profiles"]
