@@ -41,6 +41,8 @@ class Settings:
         much: excess that is, even if no effect lowers it.
         strictly: factor of what a true effect may leave in a second look.
         noticed: excess of the model in a second look from which that tells of effects.
+        many: segments; of so many, all of which leave no more than noise, the gain of the one that
+            gains most does not count.
     """
 
     sharpness: float = 3.0
@@ -56,14 +58,13 @@ class Settings:
     much: float = 0.5
     strictly: float = 0.7
     noticed: float = 0.1
+    many: float = 8
 
 
 SETTINGS = Settings()
 EVEN, SURE = 0.5, 0.9
 """Probabilities above which an answer is more likely than not, and sure: then neither a closer look
 is taken nor a further experiment proposed."""
-MANY = 8
-"""Segments of which one alone tells of no effect."""
 LITTLE, LEFT, MUCH = SETTINGS.little, SETTINGS.left, SETTINGS.much
 
 
@@ -178,7 +179,7 @@ def _gain(ranking: Ranking) -> float:
         return 0.0
     first = ranking.candidates[0]
     gain = fit.loss - first.fit.loss - first.cost
-    if excess_of(ranking.baseline) > 0 or np.count_nonzero(estimator.counts) < MANY:
+    if excess_of(ranking.baseline) > 0 or np.count_nonzero(estimator.counts) < SETTINGS.many:
         return gain
     each = estimator.losses(fit.squares) - estimator.losses(first.fit.squares)
     return gain - max(float(each[estimator.counts].max()), 0.0)
