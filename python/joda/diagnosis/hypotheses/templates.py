@@ -247,7 +247,7 @@ def _snap(units: Units, name: str) -> Hypothesis:
 
     bounds, tries = places(place, WIDEST)
     own: Bounds = [STRENGTH, BARRIER, (0.0, 1.0, 0.02)]
-    own += [(0.3, 0.75, 0.01, 0.1, 0.92), (0.15, 0.7, 0.02, 0.05, 0.95), CATCH]
+    own += [(0.3, 0.75, 0.01, 0.1, 0.92), (0.05, 0.7, 0.02, np.nan, 0.95), CATCH]
     return Hypothesis(
         name,
         "both",
