@@ -26,7 +26,7 @@ from joda.template import Template
 
 WIDEST = 0.5
 """Of a latch."""
-EDGE = (0.002, 0.3, 0.01)
+EDGE = (0.002, 0.48, 0.01)
 """Of a constant on a part of the range, in units of that part."""
 CATCH = (0.0, 0.3, 0.01, np.nan, 0.9)
 """Dry friction of a catch, in units of its force."""
