@@ -216,7 +216,6 @@ def test_improve_writes_what_is_wrong_and_compare_reads_it(tmp_path, rng):
 
 
 @pytest.mark.long
-@pytest.mark.xfail(reason="lost to one of five changes to fits and priors; which is not yet known")
 def test_a_number_and_an_effect_that_hide_each_other_are_told_together(seed=286989642):
     """A delay beside which no effect explains the runs, nor the delay without that effect."""
     case = draw(seed, "constant_friction_hinge", True, None, "field")

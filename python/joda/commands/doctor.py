@@ -126,11 +126,15 @@ def doctor() -> list[Check]:
     """Looks at everything that joda uses; takes some seconds. What needs MuJoCo is not tried where
     that does not work."""
     engine = _mujoco()
-    parts: list[Callable[[], list[Check]]] = [_libraries, _key, _cache]
-    if engine.fatal:
-        parts.insert(1, lambda: _extras([extra for extra in EXTRAS if extra not in COMPANIONS]))
-    else:
-        parts = [_plugin, _libraries, _renderers, _extras, _key, _cache]
+    works = not engine.fatal
+    tried = [extra for extra in EXTRAS if works or extra not in COMPANIONS]
+    parts: list[Callable[[], list[Check]]] = [
+        *([_plugin] if works else []),
+        _libraries,
+        *([_renderers] if works else []),
+        lambda: _extras(tried),
+        *(_key, _cache),
+    ]
     with ThreadPoolExecutor() as pool:
         found = pool.map(lambda part: part(), parts)
         return [*_here(engine), *(check for checks in found for check in checks)]

@@ -26,8 +26,9 @@ from joda.template import Template
 
 WIDEST = 0.5
 """Of a latch."""
-EDGE = (0.002, 0.48, 0.01)
-"""Of a constant on a part of the range, in units of that part."""
+EDGE, SOFT_EDGE = (0.002, 0.3, 0.01), (0.002, 0.48, 0.01)
+"""Of a constant on a part of the range, in units of that part: of a resistance, which is called
+otherwise where it is a hump, and of a force."""
 CATCH = (0.0, 0.3, 0.01, np.nan, 0.9)
 """Dry friction of a catch, in units of its force."""
 LEAN, USUAL_LEAN = (-1.2, 1.2, 0.03), 0.4
@@ -362,7 +363,7 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
             return a if a <= 0.0 else a + edge, b if b >= 1.0 else b - edge
 
         bounds, tries = places(place)
-        soft = [] if whole else [EDGE]
+        soft = [] if whole else [EDGE if name in LOCAL else SOFT_EDGE]
         same = whole and channel == "conservative" and not units.hinge
         return Hypothesis(
             label,
