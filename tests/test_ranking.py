@@ -163,7 +163,8 @@ def test_one_segment_of_many_tells_of_no_effect(ranked, disturbed, verdict):
     estimator, first = ranked.baseline.estimator, ranked.candidates[0]
     calm = np.where(estimator.counts, 0.5 * estimator.segments.count, 0.0)
     off = calm.copy()
-    off[np.flatnonzero(estimator.counts)[:disturbed]] *= 7.0
+    which = np.flatnonzero(estimator.counts)[:disturbed]
+    off[which] += 0.4 * calm.sum() * estimator.segments.count[which] / calm[which].sum()
     fits = [
         replace(first.fit, squares=squares, loss=estimator.loss(squares)) for squares in (off, calm)
     ]
