@@ -16,7 +16,7 @@ from messages_server import serve
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores, get_typestore
 from test_prompts import answers
-from test_readme import shell
+from test_readme import COMMANDS, shell
 
 from joda.diagnosis.selection import SETTINGS
 from joda.measured.runs import read_run
@@ -96,9 +96,16 @@ def test_the_other_tutorial_repairs_the_arm(tmp_path):
 
 @pytest.mark.long
 def test_what_has_no_name_is_learned(tmp_path):
-    told = [run(command, tmp_path) for command in blocks("unknown.md", "sh")[0].splitlines()]
+    demo, add = blocks("unknown.md", "sh")[0].splitlines()
+    assert demo in COMMANDS
+    told = [run(demo, tmp_path), run(add, tmp_path)]
     assert masked(blocks("unknown.md", "text")[0]) <= masked(told[1])
-    assert "The seal is opened:" in told[0]
+    assert "3. Learn the law from the runs" in told[0]
+    truth = json.loads((tmp_path / "alien" / "sealed.json").read_text())
+    opened = told[0].partition("The seal is opened:")[2]
+    assert truth["effect"].replace("_", " ") in opened.splitlines()[1]
+    (left,) = re.findall(r"What was learned leaves ([\d.]+) % of the error", opened)
+    assert float(left) < 10
     (stiffness,) = re.findall(r"stiffness ([\d.]+) ± ", told[1])
     assert float(stiffness) == pytest.approx(13.9, rel=0.05)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gauging import SPAN, gauged
 
-from joda import add, hidden_effect
+from joda import add
 from joda.commands.add import sentences
 from joda.commands.hidden_effect import _judged_law
 from joda.diagnosis.adding import error
@@ -225,15 +225,3 @@ def test_the_demo_judges_what_was_learned():
     told, right = _judged_law(diagnosed("missing_effect", "backlash"), {}, one, tenth)
     assert told.startswith("It has no name, and was taken for play between")
     assert not right
-
-
-@pytest.mark.long
-def test_the_demo_learns_a_law_that_has_no_name(tmp_path):
-    said = []
-    result = hidden_effect(tmp_path / "out", seed=4, alien=True, say=said.append)
-    assert any("Learn the law from the runs" in sentence for sentence in said)
-    opened = next(k for k, sentence in enumerate(said) if "seal is opened" in sentence)
-    assert result.truth["effect"].replace("_", " ") in said[opened + 1]
-    assert result.judgement in said[opened + 2 :]
-    assert result.after.rmse_window < 0.5 * result.before.rmse_window
-    assert result.right == (result.diagnosis.verdict == "unexplained")
