@@ -16,10 +16,11 @@ from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.corrections import ANYTHING
 from joda.diagnosis.findings import Correction
-from joda.diagnosis.hypothesis_fits import FittedHypothesis
+from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
-from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of
+from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of, with_numbers
 from joda.measured.instability import longest_followed
 from joda.measured.reading import Measured
 
@@ -94,6 +95,17 @@ class Calibration:
         """Their standard errors, shape (k,)."""
         return np.sqrt(np.diag(self.covariance))
 
+    def only(self, names: Sequence[NuisanceName]) -> "Calibration":
+        """Some of the numbers, not fitted anew."""
+        kept = [k for k, name in enumerate(self.names) if name in names]
+        return replace(
+            self,
+            numbers=self.numbers.only(names),
+            fit=replace(self.fit, x=self.numbers.taken(self.fit.x, names)),
+            covariance=self.covariance[np.ix_(kept, kept)],
+            others=tuple(self.others[k] for k in kept),
+        )
+
     @property
     def righted(self) -> AppliedCorrections:
         """What is to be set right."""
@@ -110,8 +122,8 @@ class Calibration:
         """The same with numbers that are as likely, within the errors of these."""
         rng, count = np.random.default_rng(0), len(self.names)
         off = rng.multivariate_normal(np.zeros(count), self.covariance, DRAWS, method="svd")
-        strengths = self.fit.x[:-count]
-        return [self._righted(np.append(strengths, self.fit.x[-count:] + one)) for one in off]
+        strengths, own = np.split(self.fit.x, [len(self.fit.x) - count])
+        return [self._righted(np.append(strengths, own + one)) for one in off]
 
     def _righted(self, x: Array) -> AppliedCorrections:
         return righted({str(name): value for name, value in self.numbers.values(x).items()})
@@ -168,19 +180,27 @@ class Calibrator:
 def _longer(measured: Measured, found: Calibration) -> Calibration:
     """The same fitted on in long segments, in which a small error shows; as it was where its
     numbers are others there."""
-    segments = segments_for(measured, longest_followed(found.righted.of(measured), LONGEST))
-    estimator, old = SegmentEstimator(segments, usable(segments)), found.numbers.base
-    joint_model = replace(
-        joint_model_for(measured, segments.h), friction_row=old.joint_model.friction_row
-    )
-    base = base_of(measured.profile, joint_model, segments.h, measured.trust)
-    own = replace(found.numbers, base=base)
+    longest = longest_followed(found.righted.of(measured), LONGEST)
+    estimator, own = as_recorded(measured, found, longest)
     start = estimator.started(own.make(found.fit.x)).start
     fit = estimator.fit(own.make, own.unknowns, found.fit.x, start)
-    moved = np.abs(fit.x - found.fit.x)[base.count :]
+    moved = np.abs(fit.x - found.fit.x)[own.base.count :]
     if np.any(moved > CLEARLY * found.errors):
         return found
     return replace(found, numbers=own, fit=fit)
+
+
+def as_recorded(
+    measured: Measured, found: Calibration, length: float
+) -> tuple[SegmentEstimator, Nuisances]:
+    """Runs as they were recorded in segments of a length (s), and a calibration's numbers there."""
+    segments = segments_for(measured, length)
+    joint_model = replace(
+        joint_model_for(measured, segments.h),
+        friction_row=found.numbers.base.joint_model.friction_row,
+    )
+    base = base_of(measured.profile, joint_model, segments.h, measured.trust)
+    return SegmentEstimator(segments, usable(segments)), replace(found.numbers, base=base)
 
 
 def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
@@ -275,7 +295,7 @@ def _concluded(
     fit = estimator.fit(own.make, own.unknowns, coarse.x, coarse.start)
     fit = estimator.refit(own.make, own.unknowns, fit)
     sure = np.abs(fit.x[baseline.base.count :]) > CLEARLY * np.sqrt(
-        np.diag(_covariance(found, own, fit, every.names))
+        np.diag(covariance(estimator, own, own, fit, [()] * len(names)))
     )
     if not sure.all():  # long steps asked for more
         kept = tuple(name for name, there in zip(names, sure, strict=True) if there)
@@ -302,26 +322,58 @@ def _concluded(
         if name == "force_scale" and "mass" not in every.names:  # then all but friction is as well
             swapped.append(("mass", 1 / own.values(fit.x)["force_scale"]))
         others.append(tuple(swapped))
-    alike = {name for one in others for name, _ in one}
-    return Calibration(own, fit, _covariance(found, own, fit, alike), loss, alone, tuple(others))
+    errors = covariance(estimator, own, every, fit, [[name for name, _ in one] for one in others])
+    return Calibration(own, fit, errors, loss, alone, tuple(others))
 
 
-def _covariance(found: _Search, own: Nuisances, fit: Fit, alike: Collection[NuisanceName]) -> Array:
-    """Covariance of numbers, shape (k, k): by the data, and by how far off the others may be that
-    are not set free, but for those that are an alternative to one of these."""
-    estimator, base = found.baseline.estimator, found.baseline.base
-    rest = [name for name in found.every.names if name not in (*own.names, *alike)]
-    wider = found.every.only((*own.names, *rest))
-    there = replace(fit, x=np.append(fit.x, np.zeros(len(rest))))
-    prior_std = wider.unknowns.prior_std
-    numbers = slice(base.count, base.count + len(own.names))
-    prior_std[numbers] = ANYTHING
-    covariance = estimator.covariance(wider.make, wider.unknowns, there, prior_std)
+def covariance(
+    estimator: SegmentEstimator,
+    own: Nuisances,
+    every: Nuisances,
+    fit: Fit,
+    others: Sequence[Collection[str]],
+    hypothesis: Hypothesis | None = None,
+) -> Array:
+    """Covariance of numbers, by the data and by how far off the others may be that are not free.
+
+    Args:
+        estimator: of the segments.
+        own: the numbers.
+        every: these and others that may be off.
+        fit: of the model's strengths, these numbers, and those of an effect.
+        others: of each number, its alternatives, that are not off as well.
+        hypothesis: the effect; None without.
+
+    Returns:
+        shape (k, k).
+    """
+    rest = [name for name in every.names if name not in own.names]
+    wider = replace(every.only((*own.names, *rest)), base=own.base)
+    first, last = own.base.count, own.base.count + len(own.names)
+    there = replace(fit, x=np.insert(fit.x, [last] * len(rest), 0.0))
+    make, unknowns = wider.make, wider.unknowns
+    if hypothesis:
+        make, unknowns = joined(with_numbers(wider), hypothesis)
+    prior_std = unknowns.prior_std.copy()
+    prior_std[first:last] = ANYTHING
+    precision = np.linalg.inv(estimator.covariance(make, unknowns, there, prior_std))
+
+    def without(names: Collection[str]) -> Array:
+        """Where these are not off."""
+        left = [last + k for k, name in enumerate(rest) if name in names]
+        kept = np.setdiff1d(np.arange(len(precision)), left)
+        whole = np.linalg.inv(precision[np.ix_(kept, kept)])
+        return np.asarray(whole[first:last, first:last])
+
+    alone = without({name for names in others for name in names})
+    variances = np.array([without(names)[k, k] for k, names in enumerate(others)])
+    wider_by = np.sqrt(variances / np.diag(alone))
     floors = {
         "time_delay": BETWEEN * float(np.median(np.diff(estimator.segments.time))),
-        "position_offset": ZERO * float(np.ptp(base.profile.joint.range)),
+        "position_offset": ZERO * float(np.ptp(own.base.profile.joint.range)),
     }
-    return covariance[numbers, numbers] + np.diag([floors.get(one, 0.0) ** 2 for one in own.names])
+    least = [floors.get(one, 0.0) ** 2 for one in own.names]
+    return np.outer(wider_by, wider_by) * alone + np.diag(least)
 
 
 def _equivalent(baseline: Baseline) -> list[FittedHypothesis]:

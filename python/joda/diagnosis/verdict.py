@@ -27,6 +27,7 @@ from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.horizons import HorizonSearch, looked, ranked
 from joda.diagnosis.hypothesis_fits import joined
+from joda.diagnosis.joint_calibration import jointly, needed
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.plausible import Needs, unseen_place
 from joda.diagnosis.rivals import indistinguishable
@@ -173,7 +174,8 @@ def diagnosed(
     calibrator = Calibrator(measured)
     found = calibrator.numbers(baseline) if calibrate else None
     if found and found.alone:
-        return _set_right(measured, found, looked(found.of(measured), exclude, progress))
+        looks = looked(found.of(measured), exclude, progress)
+        return _set_right(measured, found, looks, exclude, progress)
     plain = looked(measured, exclude, progress, baseline)
     ranking, beside = plain.first[0], False
     if calibrate and found is None and plain.selection.verdict != "adequate":
@@ -182,11 +184,11 @@ def diagnosed(
     if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
         looks = looked(found.of(measured), exclude, progress)
         if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
-            return _set_right(measured, found, looks)
+            return _set_right(measured, found, looks, exclude, progress)
     puzzled = calibrate and plain.selection.verdict == "unexplained"
     base = plain.first[0].baseline.base
     if puzzled and (both := _together(measured, base, exclude, progress)):
-        return _set_right(measured, *both)
+        return _set_right(measured, *both, exclude, progress)
     return replace(_concluded(measured, plain), looks=plain.evidence)
 
 
@@ -214,8 +216,28 @@ def _together(
     return (found, looks) if looks.selection.likely else None
 
 
-def _set_right(measured: Measured, found: Calibration, looks: HorizonSearch) -> Diagnosed:
-    """What looking at a joint and runs says whose numbers were set right, with these."""
+def _set_right(
+    measured: Measured,
+    found: Calibration,
+    looks: HorizonSearch,
+    exclude: Collection[str],
+    progress: Progress,
+) -> Diagnosed:
+    """What looking at a joint and runs says whose numbers were set right, with these.
+
+    Those that stood in for an effect are given back, and the runs are looked at once more.
+    """
+    while looks.selection.likely:
+        ranking = looks.ranking
+        beside = measured, found, ranking.baseline, ranking.candidates[0]
+        if (fewer := needed(*beside)) is None:
+            plain = looked(measured, exclude, progress)
+            return replace(_concluded(measured, plain), looks=plain.evidence)
+        if fewer.names == found.names:
+            found = jointly(*beside)
+            break
+        found = fewer
+        looks = looked(found.of(measured), exclude, progress)
     others = [one.of(measured) for one in found.drawn()]
     out = replace(_concluded(found.of(measured), looks, others), looks=looks.evidence)
     numbers = found.corrections(measured)

@@ -213,9 +213,14 @@ class CorrectedBase(BaseModel):
 def corrected_base(base: BaseModel, doubtful: Mapping[str, float]) -> BaseModel:
     """A model whose numbers that were set right may be off by their errors; itself without such."""
     names = tuple(name for name in USUAL if name in doubtful)
-    own = Nuisances(base, names, tuple(doubtful[name] for name in names))
+    return with_numbers(Nuisances(base, names, tuple(map(doubtful.__getitem__, names))))
+
+
+def with_numbers(own: Nuisances) -> BaseModel:
+    """A model whose numbers are its strengths and these; itself without such."""
+    base = own.base
     plain = base.profile, base.joint_model, base.h, base.places
-    return CorrectedBase(*plain, own.unknowns, own) if names else base
+    return CorrectedBase(*plain, own.unknowns, own) if own.names else base
 
 
 def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:

@@ -1,0 +1,70 @@
+"""Numbers that are off, fitted again together with the effect that is missing beside them.
+
+They were found while that effect was missing, or held as its law was sought: what of them stood in
+for it is not off, and how well the others are known is not what it was.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
+from joda.diagnosis.calibration import NEXT, Calibration, as_recorded, covariance
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.estimation.nuisance import nuisances_of, with_numbers
+from joda.measured.reading import Measured
+
+
+def needed(
+    measured: Measured, found: Calibration, baseline: Baseline, effect: FittedHypothesis
+) -> Calibration | None:
+    """The numbers without which the runs are clearly less likely, the effect being fitted anew.
+
+    Args:
+        measured: the joint as it was given, and its runs.
+        found: the numbers.
+        baseline: the model with them set right, and the segments to which the effect was fitted.
+        effect: what is missing.
+
+    Returns:
+        itself where all are, None where none is.
+    """
+    if effect.hypothesis.effect == RESTITUTION:  # which segments do not tell of
+        return found
+    length = baseline.estimator.segments.length
+    best, kept = effect.fit.loss, found
+    while kept.names:
+        tried = []
+        for name in kept.names:
+            fewer = kept.only(tuple(one for one in kept.names if one != name))
+            without = fit_baseline(fewer.of(measured), length)
+            if again := without.fit_hypothesis(effect.hypothesis):
+                tried.append((again.fit.loss, fewer))
+        if not tried:
+            break
+        least, fewer = min(tried, key=lambda pair: pair[0])
+        if least > best + NEXT:
+            break
+        best, kept = min(best, least), fewer
+    return kept if kept.names else None
+
+
+def jointly(
+    measured: Measured, found: Calibration, baseline: Baseline, effect: FittedHypothesis
+) -> Calibration:
+    """The numbers as the runs tell them beside the effect, with their errors; as `needed`."""
+    if effect.hypothesis.effect == RESTITUTION:
+        return found
+    estimator, own = as_recorded(measured, found, baseline.estimator.segments.length)
+    k, n = own.base.count, len(own.names)
+    left = baseline.base.count - k  # set right, they were free within their errors
+    off = effect.fit.x[k : k + left]
+    numbers = found.fit.x[-n:] + off
+    make, unknowns = joined(with_numbers(own), effect.hypothesis)
+    x = np.concatenate([effect.fit.x[:k], numbers, effect.x])
+    fit = estimator.fit(make, unknowns, x, estimator.started(make(x)).start)
+    fit = estimator.refit(make, unknowns, fit)
+    every = nuisances_of(measured, own.base)
+    others = [[name for name, _ in alike] for alike in found.others]
+    errors = covariance(estimator, own, every, fit, others, effect.hypothesis)
+    return replace(found, numbers=own, fit=replace(fit, x=fit.x[: k + n]), covariance=errors)
