@@ -163,7 +163,7 @@ def test_dropped_connections_and_timeouts_are_retried_and_counted(server):
     [
         (error(529, "overloaded_error", "Overloaded"), r"529: Overloaded.*try again later"),
         (error(429, "rate_limit_error", "Slow down"), r"429: Slow down.*batch"),
-        ("drop", "cannot be reached; check network"),
+        ("drop", "cannot be reached, or breaks off; check the network"),
     ],
 )
 def test_lasting_failures_are_a_sentence_after_five_requests(server, entry, says):

@@ -21,6 +21,7 @@ from test_prompts import answers, texts
 
 from joda import JodaError, generate, generate_all
 from joda.commands.generate import Generated
+from joda.commands.generate_all import PassedOver
 from joda.proposal import Proposal
 from joda.propose import session
 from joda.propose.offline import Offline
@@ -89,6 +90,25 @@ def test_the_command_tells_a_line_per_joint(joda, models, tmp_path):
     assert next(line for line in lines if line.startswith("broken: ")).count("broken.xml") == 1
 
 
+def test_a_joint_without_a_range_is_told_and_is_no_failure(joda, tmp_path):
+    rotor = '<body name="rotor"><joint name="spin"/><geom size=".1"/></body>'
+    (tmp_path / "fans").mkdir()
+    (tmp_path / "fans" / "fan.xml").write_text(f"<mujoco><worldbody>{rotor}</worldbody></mujoco>")
+    shutil.copy(MODELS / "drawer.xml", tmp_path / "fans")
+    told = ("generate", tmp_path / "fans", "-o", tmp_path / "out", "--rounds", "1")
+    status, out, err = joda(*told)
+    assert (status, err) == (0, "")
+    assert "fan/spin: passed over, as it has no range, over which a profile is: if it is" in out
+    assert "\n1 joint has no range and no profile.\n" in out
+    page = (tmp_path / "out" / "sheet.html").read_text()
+    assert "fan/spin" in page and "1 without a profile" in page
+    status, out, _ = joda(*told, "--resume", "--json")
+    assert status == 0 and "passed over" in json.loads(out)["fan/spin"]["error"]
+    (tmp_path / "fans" / "drawer.xml").unlink()
+    with pytest.raises(JodaError, match="holds no model with a hinge or slide that has a range"):
+        generate_all(tmp_path / "fans", tmp_path / "none")
+
+
 def test_json_has_a_history_per_joint(joda, models, tmp_path):
     only = ("--joint", "drawer", "--rounds", "1", "--json")
     status, out, _ = joda("generate", models, "-o", tmp_path / "out", *only)
@@ -123,6 +143,9 @@ def test_joints_get_folders_of_their_own_within_the_output(tmp_path):
     )
     target = tmp_path / "models" / "out"
     done = generate_all(tmp_path / "models", target, rounds=1)
+    names = done.keys()
+    assert isinstance(done["two_2/endless"], PassedOver)
+    done = {label: each for label, each in done.items() if label != "two_2/endless"}
     assert all(isinstance(each, Generated) for each in done.values()), done
     folders = {label: each.folder.relative_to(target).as_posix() for label, each in done.items()}
     assert folders == {
@@ -132,7 +155,7 @@ def test_joints_get_folders_of_their_own_within_the_output(tmp_path):
         "two_2/..": "two_2/joint",
     }
     again = generate_all(tmp_path / "models", target, rounds=1, resume=True)
-    assert again.keys() == done.keys(), "the scenes that were made are no models to do"
+    assert again.keys() == names, "the scenes that were made are no models to do"
 
 
 @pytest.mark.parametrize(
@@ -242,7 +265,7 @@ def test_a_service_that_stops_answering_is_a_sentence_and_it_goes_on(
     status, out, err = joda("generate", models, "-o", tmp_path / "out")
     assert status == 2 and err.count("\n") == 1
     assert out.startswith("Estimate, joints: 3, with anthropic") and out.count("\n") == 1
-    assert "batch.json: " in err and "cannot be reached; check network" in err
+    assert "batch.json: " in err and "cannot be reached, or breaks off; check the network" in err
     server.deaf = False
     done = generate_all(models, tmp_path / "out", resume=True)
     assert [len(each) for each in server.batches] == [3, 3]
@@ -261,6 +284,8 @@ def test_a_refusal_in_a_batch_is_that_joints(server, models, tmp_path, joda):
     assert status == 2 and "1 of 3 have no profile" in err
     assert "kitchen/drawer/drawer: the service refuses the request (Bad)." in out
     assert whole(tmp_path / "out" / "kitchen" / "drawer" / "drawer").usage.requests == 1
+    spent = sum(whole(path.parent).usage.requests for path in tmp_path.rglob("history.json"))
+    assert f"Asked {spent} times: " in out and spent == 5  # two joints twice, that one once
     assert whole(tmp_path / "out" / "refrigerator" / "door").complete
     server.results = answered
     status, _, err = joda("generate", models, "-o", tmp_path / "out", "--resume")

@@ -488,7 +488,7 @@ def thousands():
     return answer
 
 
-NO_MESSAGE = "does not answer as the Messages API does; check ANTHROPIC_BASE_URL."
+NO_MESSAGE = "does not answer as the Messages API does; check --base-url or ANTHROPIC_BASE_URL."
 GREAT = message(json.dumps(good_answer()), input_tokens=10**400)
 ANSWERS = {
     "deep brackets": (message("[" * 10**5), "It is not JSON (maximum recursion depth"),

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from assets import NAMES, asset
+from scenes import write
 
 from joda import compile, context
 from joda.field import evaluate
@@ -194,6 +195,35 @@ def test_the_same_part_is_another_kind_on_another_object(tmp_path):
         "wardrobe": "cabinet door",
         "m": "cabinet door",  # by its size
     }
+
+
+KEYS_IN_A_ROW = """<mujoco model="{model}"><worldbody><body name="case">
+  <geom type="box" size=".5 .1 .05" pos=".5 -.1 -.06"/>{keys}</body></worldbody></mujoco>"""
+KEY_ON_A_HINGE = """<body name="{name}{k}" pos="{x} 0 0">
+  <joint name="j{k}" axis="1 0 0" range="-5 0"/>
+  <geom type="box" size=".011 .075 .008" pos="0 .075 0" mass=".02"/></body>"""
+
+
+def test_keys_of_an_instrument_take_a_keys_force_and_come_back(tmp_path):
+    keys = "".join(KEY_ON_A_HINGE.format(name="key_", k=k, x=0.03 + 0.024 * k) for k in range(12))
+    path = write(tmp_path, KEYS_IN_A_ROW.format(model="piano", keys=keys))
+    found = context(path, "j4")
+    assert recognise(found)[0].title == "key on a hinge"
+    done = loop_of(found)
+    good(done)
+    assert 0.25 <= done.last.behaviour.opening.steady / found.lever_arm <= 1.5
+
+
+STICK = """<mujoco model="console"><worldbody><body name="base"><geom type="box" size=".1 .1 .03"/>
+  <body name="joystick" pos="0 0 .03"><joint name="j" axis="1 0 0" range="-30 30"/>
+  <geom type="capsule" size=".012" fromto="0 0 0 0 0 .12" mass=".08"/></body></body></worldbody>
+</mujoco>"""
+
+
+def test_a_joystick_comes_back_to_its_middle(tmp_path):
+    found = context(write(tmp_path, STICK), "j")
+    assert recognise(found)[0].title == "joystick"
+    good(loop_of(found))
 
 
 NOTHING = """

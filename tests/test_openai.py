@@ -215,7 +215,7 @@ FAILURES = {
     "no pictures": (refusal(400, "no image input"), 2, r"\(400: no image input\); choose another"),
     "many requests": (refusal(429, "Slow", retry_after_ms=1), 5, r"429: Slow\); wait a while"),
     "broken": (refusal(500, "Oops", retry_after_ms=1), 5, r"500: Oops\); try again later"),
-    "hung up": ("drop", 5, "127.0.0.1:.* cannot be reached; start the server"),
+    "hung up": ("drop", 5, "127.0.0.1:.* cannot be reached, or breaks off; start the server"),
     "refused": (completion(None, refusal="I can't.\x1b[2J"), 1, "declined to answer"),
     "filtered": (completion("", "content_filter"), 1, "qwen-test declined to answer; describe"),
     "cut off": (completion('{"status": "rev', "length"), 2, "cut off after 32000 tokens"),
@@ -256,7 +256,7 @@ def test_no_answer_in_time_is_a_sentence(server, monkeypatch):
 def test_a_server_that_is_not_there_is_a_sentence(server, monkeypatch):
     monkeypatch.setattr(proposer, "MAX_RETRIES", 0)
     with pytest.raises(
-        ProposalFailed, match=r"http://127\.0\.0\.1:1 cannot be reached; start"
+        ProposalFailed, match=r"http://127\.0\.0\.1:1 cannot be reached, or breaks off; start"
     ) as no:
         OpenAI("qwen-test", "http://127.0.0.1:1/v1?token=hidden").propose(task(), ())
     assert "hidden" not in str(no.value)

@@ -33,6 +33,8 @@ SCENE = """<mujoco>
   </worldbody>
   {more}
 </mujoco>"""
+CHAIR = """<worldbody><body name="chair" pos=".4 0 .5"><joint type="slide" axis="1 0 0"
+  frictionloss="5"/><geom type="box" size=".1 .2 .1" mass="6"/></body></worldbody>"""
 SPATIAL = '<tendon><spatial name="{}" {}><site site="{}"/><site site="front"/></spatial></tendon>'
 PULLS_OPEN = SPATIAL.format("band", 'stiffness="400" springlength="0"', "wall")
 HOLDS = SPATIAL.format("rope", 'limited="true" range="0 .5"', "corner")  # taut at 0.2 m
@@ -182,3 +184,10 @@ def test_a_rope_is_taut_from_its_length_on(position, beyond, tmp_path):
     model = load_model(scene(tmp_path, HOLDS))
     data = mujoco.MjData(model)
     assert put(model, data, 0, position) and taut(model, data, 0) == beyond
+
+
+def test_a_blow_adds_nothing_to_what_the_hand_exerts(tmp_path):
+    """The drawer strikes something heavy that yields: what brakes it then is not the hand's."""
+    found = seen(scene(tmp_path, CHAIR))
+    assert found.opening.arrived
+    assert 0 < found.opening.steady <= found.opening.force

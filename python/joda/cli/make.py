@@ -190,8 +190,15 @@ def generate(
         return
     if review:
         raise JodaError("--review goes with a folder of models; change one joint with joda revise.")
-    with spinner("generate") as progress:
-        result = run(model, joint, output, progress=progress, **options)
+    from joda.commands.generate import NotGenerated
+
+    try:
+        with spinner("generate") as progress:
+            result = run(model, joint, output, progress=progress, **options)
+    except NotGenerated as error:
+        if not as_json:
+            tell_cost(error.usage)
+        raise
     if as_json:
         print_json(generated_as_json(result))
         return

@@ -133,9 +133,13 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", sheet: Path, as_json: 
 
     Raises JodaError if some gave nothing.
     """
+    from joda.commands.generate import NotGenerated
+    from joda.commands.generate_all import PassedOver
     from joda.propose import total
 
     failed = {label: result for label, result in done.items() if isinstance(result, JodaError)}
+    mistakes = [one for one in failed.values() if not isinstance(one, PassedOver)]
+    lost = (one.usage for one in mistakes if isinstance(one, NotGenerated))
     made = {label: result for label, result in done.items() if not isinstance(result, JodaError)}
     if as_json:
         print_json(
@@ -157,14 +161,16 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", sheet: Path, as_json: 
             say(f"{label}: {last.proposal.joint_summary.motion_description}; {lacking}")
             for note in result.notes:
                 say(f"  {note}")
-        tell_cost(total(result.history.usage for result in made.values()))
+        tell_cost(total([*(result.history.usage for result in made.values()), *lost]))
         lasts = [result.history.rounds[-1] for result in made.values()]
         came, not_ = (sum(len(getattr(r, what)) for r in lasts) for what in ("met", "unmet"))
         joints = sum(bool(last.unmet) for last in lasts)
         say(f"{came} of {came + not_} behaviours come true; {joints} joints lack one.")
+        if over := len(failed) - len(mistakes):
+            say(f"{over} {'joint has' if over == 1 else 'joints have'} no range and no profile.")
         say(f"Contact sheet: {sheet}")
-    if failed:
-        raise JodaError(f"{len(failed)} of {len(done)} have no profile; see above.")
+    if mistakes:
+        raise JodaError(f"{len(mistakes)} of {len(done)} have no profile; see above.")
 
 
 def evaluation_as_json(result: "Evaluation") -> dict[str, Any]:

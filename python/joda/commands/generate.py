@@ -11,7 +11,7 @@ import mujoco
 from joda.errors import JodaError
 from joda.files import occupied
 from joda.proposal import Proposal
-from joda.propose import Proposer
+from joda.propose import Proposer, Usage
 from joda.propose.asking import Effort
 from joda.propose.history import History
 from joda.propose.session import PICTURES, Pictures, Progress, Session, relative, silent
@@ -36,6 +36,19 @@ class Generated:
     folder: Path
     history: History
     notes: tuple[str, ...] = ()
+
+
+class NotGenerated(JodaError):
+    """No proposal was to be had.
+
+    Attributes:
+        usage: what was spent all the same.
+    """
+
+    def __init__(self, sentence: str, usage: Usage) -> None:
+        """Takes the sentence for the user and what was spent."""
+        super().__init__(sentence)
+        self.usage = usage
 
 
 def generate(
@@ -84,8 +97,9 @@ def generate(
         what was made.
 
     Raises:
-        JodaError: a file cannot be read or written, the joint does not fit, or no proposal was to
-            be had; what was made and spent until then is in the folder.
+        NotGenerated: no proposal was to be had; what was made and spent until then is in the
+            folder.
+        JodaError: a file cannot be read or written, or the joint does not fit.
     """
     check_rounds(rounds)
     folder, source = Path(output), Path(model)
@@ -99,7 +113,11 @@ def generate(
             check(read_templates(further))
     with loading_once(source):
         session = begin(folder, source, name, describe, further, key, resume, progress)
-        run(session, choose(proposer, session.history.key, vlm, base_url, effort), rounds, force)
+        asked = choose(proposer, session.history.key, vlm, base_url, effort)
+        try:
+            run(session, asked, rounds, force)
+        except JodaError as error:
+            raise NotGenerated(str(error), session.history.usage) from error
     return Generated(folder, session.history, tuple(session.notes))
 
 
@@ -223,12 +241,21 @@ def only_joint(path: Path) -> str:
 
 
 def ranged(model: mujoco.MjModel) -> list[str]:
-    """Names of the joints that can have a profile."""
+    """Names of the joints that can have a profile: hinges and slides that have a range."""
+    return [name for name, has in _movable(model) if has]
+
+
+def endless(model: mujoco.MjModel) -> list[str]:
+    """Names of the hinges and slides that have no range, and so can have no profile."""
+    return [name for name, has in _movable(model) if not has]
+
+
+def _movable(model: mujoco.MjModel) -> list[tuple[str, bool]]:
+    """Hinges and slides, and whether they have a range."""
     return [
-        joint_name(model, k)
+        (joint_name(model, k), bool(model.jnt_range[k][0] < model.jnt_range[k][1]))
         for k in range(model.njnt)
         if joint_type(model, k) in ("hinge", "slide")
-        and model.jnt_range[k][0] < model.jnt_range[k][1]
     ]
 
 

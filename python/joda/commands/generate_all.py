@@ -5,7 +5,17 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from joda.commands.generate import ROUNDS, Generated, begin, check_rounds, choose, ranged, run
+from joda.commands.generate import (
+    ROUNDS,
+    Generated,
+    NotGenerated,
+    begin,
+    check_rounds,
+    choose,
+    endless,
+    ranged,
+    run,
+)
 from joda.commands.review import Decide
 from joda.commands.review import review as walk
 from joda.errors import JodaError
@@ -29,6 +39,16 @@ BOTH_ENDS = Pictures(2, (480, 360))
 
 MODELS = (".xml", ".urdf")
 """How names of models end."""
+
+
+NO_RANGE = (
+    "passed over, as it has no range, over which a profile is: if it is to have one, give it a "
+    'range="0 1.5", in a URDF a <limit> and another type than continuous.'
+)
+
+
+class PassedOver(JodaError):
+    """Why a joint was left alone, which is nobody's mistake."""
 
 
 class Job(NamedTuple):
@@ -80,8 +100,8 @@ def generate_all(
         progress: told how many joints are done, of how many, and what is being done.
 
     Returns:
-        "model/joint" to what was made, or to the reason why nothing was; "model" to the reason why
-        it cannot be loaded.
+        "model/joint" to what was made, or to the reason why nothing was, a `PassedOver` of joints
+        without a range; "model" to the reason why it cannot be loaded.
 
     Raises:
         JodaError: no joint is found, the folder holds files already, or the proposer is not to be
@@ -106,19 +126,23 @@ def generate_all(
                     *(job.folder, job.model, job.joint, describe, further, key, resume),
                     pictures=pictures,
                 )
+                sessions[label] = session
                 if batched is None:
                     own = choose(proposer, session.history.key, vlm, base_url, effort)
                     run(session, own, rounds, force)
                 elif session.pending(rounds) and not force:
                     session.check_unedited()
-                sessions[label] = session
             except JodaError as error:
                 done[label] = error
         if batched is not None:
             _run_many(sessions, batched, rounds, target / "batch.json", done, progress)
         for label, session in sessions.items():
-            if label not in done:
-                done[label] = Generated(session.folder, session.history, tuple(session.notes))
+            failed, made = done.get(label), session.history
+            done[label] = (
+                NotGenerated(str(failed), made.usage)
+                if failed
+                else Generated(session.folder, made, tuple(session.notes))
+            )
     progress(len(jobs), len(jobs), "drawing the contact sheet")
     write_sheet(target, done)
     progress(len(jobs), len(jobs), "done")
@@ -180,12 +204,14 @@ def _check_target(folder: Path, allowed: bool) -> None:
 
 
 def find_jobs(source: Path, target: Path, joint: str | None, failed: Results) -> dict[str, Job]:
-    """The joints to be done, by label; models that cannot be loaded are added to `failed`."""
+    """The joints to be done, by label; added to `failed` are models that cannot be loaded, and
+    joints without a range."""
     jobs: dict[str, Job] = {}
     others = set()
     for path, stem, part in _models(source, target):
         try:
-            names = ranged(load_model(path))
+            model = load_model(path)
+            names = ranged(model)
         except JodaError as error:
             if not part:
                 failed[stem] = error
@@ -197,11 +223,14 @@ def find_jobs(source: Path, target: Path, joint: str | None, failed: Results) ->
                 jobs[f"{stem}/{name}"] = Job(path, name, folder)
             else:
                 others.add(name)
+        for name in endless(model):
+            if joint in (None, name):
+                failed[f"{stem}/{name}"] = PassedOver(NO_RANGE)
     if not jobs and others:
         listed = ", ".join(f"'{name}'" for name in sorted(others))
         raise JodaError(f"{source}: no model has a joint '{joint}'; there are: {listed}.")
     if not jobs:
-        reasons = " ".join(map(str, failed.values()))
+        reasons = " ".join(str(one) for one in failed.values() if not isinstance(one, PassedOver))
         raise JodaError(
             reasons or f"{source}: holds no model with a hinge or slide that has a range."
         )

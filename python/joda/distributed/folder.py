@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from joda.commands.generate_all import MODELS, find_jobs
+from joda.commands.generate_all import MODELS, PassedOver, find_jobs
 from joda.distributed.pool import by_processes, by_ray
 from joda.distributed.task import Result, Task, What, digest, folder_of
 from joda.errors import JodaError
@@ -206,7 +206,8 @@ def _models(
     bad: dict[str, Any] = {}
     jobs = find_jobs(source, target, joint, bad)
     for label, error in bad.items():
-        failed.append(Distributed(label, target / label, str(error), True))
+        mistake = not isinstance(error, PassedOver)
+        failed.append(Distributed(label, target / label, str(error), mistake))
         for told in (target / label).glob(f"*/{RESULT}"):
             _forget(told.parent)
     options = {"proposer": "offline", "describe": describe}

@@ -76,6 +76,7 @@ def pulled(
     ahead = motion.velocity * sign > FAST * abs(end - start) / SLOW
     begins = np.flatnonzero(ahead[1:] & ~ahead[:-1])
     s = (motion.position - lo) / (hi - lo)
+    spent = np.maximum(sign * _inertial(motion, context), 0.0)  # no braking adds to it
     told = Pull(
         arrived=arrived,
         force=number(force[most]),
@@ -84,7 +85,7 @@ def pulled(
         middle=number(np.median(middle)) if len(middle) else 0.0,
         last=number(last.max()) if len(last) else 0.0,
         snaps_at=apart(s[begins]),
-        steady=number((force - sign * _inertial(motion, context)).max()) if arrived else None,
+        steady=number((force - spent).max()) if arrived else None,
     )
     return told, float(np.clip(s[-1], 0, 1))
 

@@ -206,7 +206,9 @@ class Anthropic(VisionModel):
         except (ValueError, RecursionError):  # JSON that is cut off, or brackets too deep
             message = None
         if not _usable(message):  # a web page, say
-            told = "does not answer as the Messages API does; check ANTHROPIC_BASE_URL."
+            told = (
+                "does not answer as the Messages API does; check --base-url or ANTHROPIC_BASE_URL."
+            )
             raise ProposalFailed(f"{host(client)} {told}", tally.usage)
         tally.pay(_tokens(message))
         return message
@@ -251,7 +253,8 @@ class Anthropic(VisionModel):
         if isinstance(error, anthropic.APITimeoutError):
             return f"{host(client)} does not answer within {self._timeout:g} s; try again later."
         if not isinstance(error, anthropic.APIStatusError):
-            return f"{host(client)} cannot be reached; check network and ANTHROPIC_BASE_URL."
+            said = "cannot be reached, or breaks off; check the network and the address."
+            return f"{host(client)} {said}"
         reason = self._credentials.hide(str(error.api_message or ""))
         advice = {
             401: "set ANTHROPIC_API_KEY to a valid key",

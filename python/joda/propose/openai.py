@@ -171,7 +171,8 @@ class OpenAI(VisionModel):
         if isinstance(error, openai.APITimeoutError):
             return f"{host(client)} does not answer within {self._timeout:g} s; try again later."
         if not isinstance(error, openai.APIStatusError):
-            return f"{host(client)} cannot be reached; start the server, or check --base-url."
+            said = "cannot be reached, or breaks off; start the server, or check --base-url."
+            return f"{host(client)} {said}"
         advice = {
             401: "set OPENAI_API_KEY to a valid key",
             404: f"check --base-url, which mostly ends in /v1, and the model '{self.model}'",

@@ -24,9 +24,9 @@ WATER, SOLID = 1000.0, 30.0
 HOLLOW, ROUGHLY, LIGHT = 4.0, 0.1, 1.0
 """How many times what a mesh encloses MuJoCo counts of a thin hull, how near that the mass then is,
 and what is too little (kg) to be worth a word."""
-FAR, NEAR = 10.0, 0.02
+FAR, NEAR = 1.2, 0.02
 """Of the way from a hinge's axis to the farthest geom, how far a mass must seem to be from the axis
-for a word: so much at the least, or so little at most."""
+for a word: more than so much, as no geom reaches there, or less than so little."""
 NEARLY = 0.01
 """How near that density a mean density is taken for it."""
 ARMATURE = 0.5
