@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.applied_corrections import AppliedCorrections, righted
-from joda.diagnosis.baseline import Baseline
+from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.corrections import ANYTHING
 from joda.diagnosis.findings import Correction
@@ -42,6 +42,8 @@ CLEARLY = 3.0
 SURPRISE = 4.0
 """How many of its widths a number may be off where something is left: a zero that is far off looks
 like a force beside a spring."""
+UNUSUAL = 2.0
+"""The same where an effect explains as much in its place."""
 EARLIER: dict[NuisanceName, float] = {"force_offset": float(np.sqrt(ALIKE))}
 """The same, whatever is left, of a number that is an effect where it surprises: a constant one."""
 LONGEST = 1.5
@@ -171,7 +173,7 @@ class Calibrator:
             return None
         if self._segments is not baseline.estimator:
             self._segments, self._fits = baseline.estimator, {}
-        found = _calibrated(_Search(baseline, every, self._fits), beside)
+        found = _calibrated(_Search(measured, baseline, every, self._fits), beside)
         if found and all(found.numbers.little(found.fit.x)):
             return None
         return _longer(measured, found) if found and found.alone else found
@@ -222,8 +224,13 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
         return None
     own = every.only(names)
     widths = np.abs(best.x[baseline.base.count :]) / own.prior_stds
-    most = SURPRISE if excess(best.loss, count) > CALM else np.inf
-    far = {name for name, off in zip(names, widths, strict=True) if off > EARLIER.get(name, most)}
+    off = dict(zip(names, widths, strict=True))
+    far = {name for name in EARLIER if off.get(name, 0.0) > EARLIER[name]}
+    unusual = {name for name in names if off[name] > UNUSUAL}
+    if excess(best.loss, count) > CALM:
+        far |= {name for name in names if off[name] > SURPRISE}
+    if unusual - far and _effect_instead(found, best, own, unusual):
+        far |= unusual
     if far:  # they stand in for what is missing
         rest = tuple(name for name in every.names if name not in far)
         return _calibrated(replace(found, every=every.only(rest)), beside) if rest else None
@@ -235,11 +242,13 @@ class _Search:
     """Fits of numbers to segments, in long steps.
 
     Attributes:
+        measured: the joint and its runs.
         baseline: the model as it is, fitted.
         every: the numbers that may be off.
         fits: that were made of some of them, by name.
     """
 
+    measured: Measured
     baseline: Baseline
     every: Nuisances
     fits: dict[tuple[NuisanceName, ...], Fit]
@@ -284,6 +293,20 @@ class _Search:
 
 def _loss(fit: Fit) -> float:
     return fit.loss
+
+
+def _effect_instead(
+    found: _Search, fit: Fit, own: Nuisances, unusual: Collection[NuisanceName]
+) -> bool:
+    """Whether an effect that may be the same as one of the numbers is clearly likelier than those
+    that are unusually far off, the others being free beside it."""
+    widths = zip(own.names, own.prior_stds, strict=True)
+    usual = {str(name): width for name, width in widths if name not in unusual}
+    estimator = found.baseline.estimator
+    model = fit_baseline(replace(found.measured, doubtful=usual), estimator.segments.length)
+    least = min((one.fit.loss + one.cost for one in _equivalent(model)), default=np.inf)
+    told = estimator.fit(own.make, own.unknowns, fit.x, fit.start).loss
+    return bool(least < told + found.price * len(unusual) - ALIKE)
 
 
 def _concluded(
