@@ -19,7 +19,6 @@ from test_prompts import answers, blank, images, texts
 
 from joda import JodaError, generate
 from joda.cli import main
-from joda.commands.generate import NotGenerated
 from joda.pictures.offscreen import NoRenderer
 from joda.profile import Profile
 from joda.proposal import Proposal
@@ -406,7 +405,7 @@ def test_a_model_that_was_moved_is_one_sentence(quick, tmp_path, joda):
 
 def test_what_a_failure_cost_is_kept_and_counted(quick, tmp_path):
     failed = ProposalFailed("no.", Usage(requests=2, input_tokens=500, dollars=0.01))
-    with pytest.raises(NotGenerated, match=r"^no\.$") as error:
+    with pytest.raises(ProposalFailed, match=r"^no\.$") as error:
         generate(OVEN, "door", tmp_path / "out", proposer=Scripted(failed))
     assert error.value.usage == failed.usage
     kept = whole(tmp_path / "out")

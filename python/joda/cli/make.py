@@ -190,12 +190,12 @@ def generate(
         return
     if review:
         raise JodaError("--review goes with a folder of models; change one joint with joda revise.")
-    from joda.commands.generate import NotGenerated
+    from joda.propose.asking import ProposalFailed
 
     try:
         with spinner("generate") as progress:
             result = run(model, joint, output, progress=progress, **options)
-    except NotGenerated as error:
+    except ProposalFailed as error:
         if not as_json:
             tell_cost(error.usage)
         raise

@@ -133,13 +133,13 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", sheet: Path, as_json: 
 
     Raises JodaError if some gave nothing.
     """
-    from joda.commands.generate import NotGenerated
     from joda.commands.generate_all import PassedOver
     from joda.propose import total
+    from joda.propose.asking import ProposalFailed
 
     failed = {label: result for label, result in done.items() if isinstance(result, JodaError)}
     mistakes = [one for one in failed.values() if not isinstance(one, PassedOver)]
-    lost = (one.usage for one in mistakes if isinstance(one, NotGenerated))
+    lost = (one.usage for one in mistakes if isinstance(one, ProposalFailed))
     made = {label: result for label, result in done.items() if not isinstance(result, JodaError)}
     if as_json:
         print_json(

@@ -11,8 +11,8 @@ import mujoco
 from joda.errors import JodaError
 from joda.files import occupied
 from joda.proposal import Proposal
-from joda.propose import Proposer, Usage
-from joda.propose.asking import Effort
+from joda.propose import Proposer
+from joda.propose.asking import Effort, ProposalFailed
 from joda.propose.history import History
 from joda.propose.session import PICTURES, Pictures, Progress, Session, relative, silent
 from joda.scenes.model import find_joint, joint_name, joint_type, load_model
@@ -36,19 +36,6 @@ class Generated:
     folder: Path
     history: History
     notes: tuple[str, ...] = ()
-
-
-class NotGenerated(JodaError):
-    """No proposal was to be had.
-
-    Attributes:
-        usage: what was spent all the same.
-    """
-
-    def __init__(self, sentence: str, usage: Usage) -> None:
-        """Takes the sentence for the user and what was spent."""
-        super().__init__(sentence)
-        self.usage = usage
 
 
 def generate(
@@ -97,7 +84,7 @@ def generate(
         what was made.
 
     Raises:
-        NotGenerated: no proposal was to be had; what was made and spent until then is in the
+        ProposalFailed: no proposal was to be had; what was made and spent until then is in the
             folder.
         JodaError: a file cannot be read or written, or the joint does not fit.
     """
@@ -117,7 +104,7 @@ def generate(
         try:
             run(session, asked, rounds, force)
         except JodaError as error:
-            raise NotGenerated(str(error), session.history.usage) from error
+            raise ProposalFailed(str(error), session.history.usage) from error
     return Generated(folder, session.history, tuple(session.notes))
 
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from joda.commands.generate import (
     ROUNDS,
     Generated,
-    NotGenerated,
     begin,
     check_rounds,
     choose,
@@ -21,7 +20,7 @@ from joda.commands.review import review as walk
 from joda.errors import JodaError
 from joda.files import file_name, make_folder, read_text, write_text
 from joda.propose import Ask, BatchProposer, Proposer
-from joda.propose.asking import Effort
+from joda.propose.asking import Effort, ProposalFailed
 from joda.propose.offline import Offline
 from joda.propose.session import PICTURES, Pictures, Session
 from joda.propose.sheet import Entry, sheet
@@ -139,7 +138,7 @@ def generate_all(
         for label, session in sessions.items():
             failed, made = done.get(label), session.history
             done[label] = (
-                NotGenerated(str(failed), made.usage)
+                ProposalFailed(str(failed), made.usage)
                 if failed
                 else Generated(session.folder, made, tuple(session.notes))
             )
