@@ -1,6 +1,7 @@
 """The context of a joint against closed forms."""
 
 import json
+import re
 
 import mujoco
 import numpy as np
@@ -226,3 +227,23 @@ def test_a_plain_joint_has_no_elements_of_its_own(tmp_path):
     found = context(write(tmp_path, LID), "lid")
     assert "own elements: none" in found.describe()
     assert not found.native.contacts and not found.native.besides
+
+
+CAP = """<robot name="bottle">{more}<link name="base"/><link name="helper"/>
+  <link name="cap"><collision><geometry><cylinder radius=".02" length=".02"/></geometry></collision></link>
+  <joint name="rises" type="prismatic"><axis xyz="0 0 1"/><parent link="base"/>
+  <child link="helper"/><limit lower="0" upper=".03" effort="1" velocity="1"/></joint>
+  <joint name="turns" type="revolute"><axis xyz="0 0 1"/><parent link="helper"/>
+  <child link="cap"/><limit lower="0" upper="6" effort="1" velocity="1"/></joint></robot>"""
+
+
+def test_a_link_without_a_mass_is_told_with_a_remedy_that_works(tmp_path):
+    path = tmp_path / "bottle.urdf"
+    path.write_text(CAP.format(more=""))
+    with pytest.raises(
+        JodaError, match=r"MuJoCo cannot load it: .* A link without a mass"
+    ) as error:
+        context(path, "rises")
+    (remedy,) = re.findall("write (<mujoco>.*</mujoco>) into", str(error.value))
+    path.write_text(CAP.format(more=remedy))
+    assert context(path, "rises").joint.range == (0.0, 0.03)

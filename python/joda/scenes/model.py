@@ -21,6 +21,11 @@ _TYPES = {
 _SCALAR = ("hinge", "slide")
 LONGEST_NAME = 1000
 """Bytes of a name in a model."""
+MASSLESS = (
+    " A link without a mass, as PartNet-Mobility's helpers between two joints, needs a little: "
+    'write <mujoco><compiler boundmass="1e-4" boundinertia="1e-7"/></mujoco> into the <robot>.'
+)
+"""What to do about bodies without a mass; in MJCF the same attributes of its <compiler>."""
 
 
 def load(path: Path) -> Loaded:
@@ -39,7 +44,9 @@ def _load(path: Path) -> Loaded:
     except UnicodeDecodeError:
         raise _not_utf8(path) from None
     except (ValueError, RuntimeError, mujoco.FatalError) as error:  # RuntimeError: out of memory
-        raise JodaError(f"{path}: MuJoCo cannot load it: {sentence(error)}") from None
+        said = sentence(error)
+        remedy = MASSLESS if "mjMINVAL" in said else ""
+        raise JodaError(f"{path}: MuJoCo cannot load it: {said}{remedy}") from None
     _check_bounds(path, model)
     return spec, model
 
