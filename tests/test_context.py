@@ -230,7 +230,8 @@ def test_a_plain_joint_has_no_elements_of_its_own(tmp_path):
 
 
 CAP = """<robot name="bottle">{more}<link name="base"/><link name="helper"/>
-  <link name="cap"><collision><geometry><cylinder radius=".02" length=".02"/></geometry></collision></link>
+  <link name="cap"><collision><geometry><cylinder radius=".02" length=".02"/>
+  </geometry></collision></link>
   <joint name="rises" type="prismatic"><axis xyz="0 0 1"/><parent link="base"/>
   <child link="helper"/><limit lower="0" upper=".03" effort="1" velocity="1"/></joint>
   <joint name="turns" type="revolute"><axis xyz="0 0 1"/><parent link="helper"/>
