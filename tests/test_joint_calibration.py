@@ -6,21 +6,13 @@ import numpy as np
 import pytest
 from test_calibration import found_of
 
-from joda.component import Component
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.joint_calibration import jointly, needed
 from joda.estimation.nuisance import nuisances_of
 
 EFFECT = "constant_positive_conservative_hinge"
-HEAVIER, ZERO = 1.4, 0.06
-CURVE = Component(interval=(0.4, 0.65), x=(0.0, 0.3, 0.7, 1.0), y=(0.0, 0.8, 0.8, 0.0))
-
-
-def pull(q):
-    """A constant force on a part of the arm's range, N m."""
-    s = (q + 4) / 8
-    (a, b), x = CURVE.interval, CURVE.x
-    return float(np.interp((s - a) / (b - a), x, CURVE.y)) if a < s < b else 0.0
+HEAVIER, ZERO, PULL = 1.4, 0.06, 0.6
+"""Factor of the mass, a zero (rad) that nothing asks for, and a force (N m) that is missing."""
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +29,7 @@ def found(tmp_path_factory):
         covariance=np.diag([mass.covariance[0, 0], 1e-6]),
         others=((), ()),
     )
-    pulled, _ = found_of(folder, rng, mass=HEAVIER, extra=pull)
+    pulled, _ = found_of(folder, rng, mass=HEAVIER, extra=lambda q: PULL)
     return pulled, both
 
 
