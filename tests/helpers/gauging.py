@@ -11,7 +11,7 @@ SPAN, FRICTION = 1.5, 0.2
 SCENE = f"""<mujoco><compiler angle="radian"/><worldbody><body>
 <joint name="door" type="hinge" axis="0 0 1" range="0 {SPAN}" limited="true"
  damping="0.1" frictionloss="{FRICTION}"/>
-<inertial pos=".2 0 0" mass="2" diaginertia=".02 .02 .02"/><geom size=".1" mass="0"/>
+<inertial pos=".2 0 0" mass="2" diaginertia=".02 .02 .02"/><geom pos=".2 0 0" size=".1" mass="0"/>
 </body></worldbody></mujoco>"""
 """The model: constant friction and damping."""
 
