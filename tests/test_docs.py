@@ -106,6 +106,8 @@ def test_what_has_no_name_is_learned(tmp_path):
     assert truth["effect"].replace("_", " ") in opened.splitlines()[1]
     (left,) = re.findall(r"What was learned leaves ([\d.]+) % of the error", opened)
     assert float(left) < 10
+    told_of = json.loads((tmp_path / "alien" / "diagnosis.json").read_text())
+    assert told_of["verdict"] == "unexplained"
     (stiffness,) = re.findall(r"stiffness ([\d.]+) ± ", told[1])
     assert float(stiffness) == pytest.approx(13.9, rel=0.05)
 
