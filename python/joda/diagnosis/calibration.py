@@ -315,8 +315,9 @@ def _concluded(
     """The numbers in usual steps, with their errors and what the data cannot tell from them."""
     baseline, estimator, every = found.baseline, found.baseline.estimator, found.every
     own = every.only(names)
-    fit = estimator.fit(own.make, own.unknowns, coarse.x, coarse.start)
-    fit = estimator.refit(own.make, own.unknowns, fit)
+    starts = (coarse.start, estimator.segments.start)
+    fits = (estimator.fit(own.make, own.unknowns, coarse.x, start) for start in starts)
+    fit = estimator.refit(own.make, own.unknowns, min(fits, key=_loss))
     sure = np.abs(fit.x[baseline.base.count :]) > CLEARLY * np.sqrt(
         np.diag(covariance(estimator, own, own, fit, [()] * len(names)))
     )
