@@ -226,6 +226,87 @@ def test_a_joystick_comes_back_to_its_middle(tmp_path):
     good(loop_of(found))
 
 
+BOTH_WAYS = """<mujoco model="{object}"><worldbody><body name="base">{base}<body name="{part}" pos="{at}">
+  <joint name="j" {joint}/>{moves}</body></body></worldbody></mujoco>"""
+FRAME = '<geom type="box" size=".03 .05 1" pos="0 {} 1"/>'
+
+
+@pytest.mark.parametrize(
+    ("title", "parts"),
+    [
+        (
+            "door that swings both ways",
+            {
+                "object": "saloon", "part": "leaf", "at": "0 -.4 1",
+                "base": FRAME.format(-0.47) + FRAME.format(0.47),
+                "joint": 'axis="0 0 1" range="-80 80"',
+                "moves": '<geom type="box" size=".014 .38 .5" pos="0 .39 0" mass="12"/>',
+            },
+        ),
+        (
+            "flap that swings both ways",
+            {
+                "object": "cats", "part": "flap", "at": "0 0 .3",
+                "base": FRAME.format(-0.18) + FRAME.format(0.18),
+                "joint": 'axis="0 1 0" range="-70 70"',
+                "moves": '<geom type="box" size=".003 .11 .13" pos="0 0 -.132" mass=".2"/>',
+            },
+        ),
+        (
+            "hanging pedal",
+            {
+                "object": "truck", "part": "clutch_pedal", "at": ".06 0 .5",
+                "base": '<geom type="box" size=".02 .3 .3" pos="0 0 .3"/>',
+                "joint": 'axis="0 1 0" range="0 20"',
+                "moves": '<geom type="box" size=".01 .01 .16" pos="0 0 -.17" mass=".5"/>'
+                '<geom type="box" size=".006 .04 .03" pos=".016 0 -.32" mass=".1"/>',
+            },
+        ),
+        (
+            "plunger of a syringe",
+            {
+                "object": "syringe", "part": "plunger", "at": "0 0 .12",
+                "base": '<geom type="box" size=".002 .01 .05" pos=".012 0 .05"/>'
+                '<geom type="box" size=".002 .01 .05" pos="-.012 0 .05"/>',
+                "joint": 'type="slide" axis="0 0 -1" range="0 .06"',
+                "moves": '<geom type="cylinder" size=".005 .04" pos="0 0 .02" mass=".005"/>'
+                '<geom type="cylinder" size=".009 .002" pos="0 0 .06" mass=".002"/>',
+            },
+        ),
+        (
+            "wheel that rolls",
+            {
+                "object": "bicycle", "part": "rear_wheel", "at": "0 0 .34",
+                "base": '<geom type="box" size=".01 .01 .25" pos="0 .06 .6"/>',
+                "joint": 'axis="0 1 0" range="-720 720"',
+                "moves": '<geom type="cylinder" size=".34 .02" zaxis="0 1 0" mass="1.5"/>',
+            },
+        ),
+    ],
+)  # fmt: skip
+def test_what_goes_both_ways_hangs_or_rolls_does_as_such_things_do(tmp_path, title, parts):
+    found = context(write(tmp_path, BOTH_WAYS.format(**parts)), "j")
+    assert recognise(found)[0].title == title
+    good(loop_of(found))
+
+
+KNOB = """<mujoco model="house"><worldbody><body name="frame">
+  <geom type="box" size=".05 .05 1.05" pos="0 -.52 1.05"/>
+  <body name="door" pos="0 -.46 1"><joint name="hinge" axis="0 0 1" range="0 100"/>
+    <geom type="box" size=".02 .44 1" pos="0 .45 0" mass="20"/>
+    <body name="knob" pos=".03 .83 0"><joint name="j" axis="1 0 0" range="-50 50"/>
+      <geom type="cylinder" size=".01 .02" zaxis="1 0 0" pos=".015 0 0" mass=".05"/>
+      <geom type="sphere" size=".028" pos=".055 0 0" mass=".2"/></body></body>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("name", ["knob", "link_2"])
+def test_a_doors_round_knob_comes_back_to_its_middle(tmp_path, name):
+    found = context(write(tmp_path, KNOB.replace('"knob"', f'"{name}"')), "j")
+    assert "springs back to its middle" in recognise(found)[0].title
+    good(loop_of(found))
+
+
 NOTHING = """
 <mujoco><compiler angle="radian"/><worldbody><body>
   <joint name="j" axis="1 0 0" range="0 1.6"/><geom type="sphere" size=".2" mass="3"/>

@@ -17,8 +17,9 @@ GRIP = 60.0
 FIRMNESS = 1000.0
 """Stiffness of a hand at the end of the lever arm, N/m."""
 
-SLOW = 3.0
-"""How long (s) a hand takes from one end to the other."""
+SLOW, QUICKEST = 3.0, 1.0
+"""How long (s) a hand takes from one end to the other, and how fast it goes at most (m/s) where a
+joint turns many times."""
 
 
 ACCELERATING = 0.05
@@ -64,7 +65,8 @@ def pulled(
     stiffness = FIRMNESS * arm**2
     step = model.opt.timestep
     model.opt.timestep = min(step, finest(context.equivalent_inertia, stiffness))
-    motion = pull(model, joint, start, end, grip(context), stiffness, SLOW)
+    duration = max(SLOW, abs(end - start) * arm / QUICKEST)
+    motion = pull(model, joint, start, end, grip(context), stiffness, duration)
     model.opt.timestep = step
     sign = np.sign(end - start)
     way = (motion.position - start) / (end - start)
@@ -73,7 +75,7 @@ def pulled(
     most = int(np.argmax(force)) if arrived else -1
     middle = force[(way >= 0.3) & (way <= 0.7)]
     last = force[way >= 0.85]
-    ahead = motion.velocity * sign > FAST * abs(end - start) / SLOW
+    ahead = motion.velocity * sign > FAST * abs(end - start) / duration
     begins = np.flatnonzero(ahead[1:] & ~ahead[:-1])
     s = (motion.position - lo) / (hi - lo)
     spent = np.maximum(sign * _inertial(motion, context), 0.0)  # no braking adds to it
