@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from hidden_figures import NEAR, SURE, fine, first, hides, misled, told
+from hidden_figures import NEAR, SURE, fine, first, hides, misled, near, told
 
 
 def by_effect(rows: list[dict]) -> None:
@@ -38,10 +38,6 @@ def _unseen(row: dict) -> str:
     return f"; unseen {row['unseen_before']:.2g} -> {row['unseen']:.2g} of the achievable"
 
 
-def _near(row: dict) -> bool:
-    return row.get("unseen", float("inf")) <= NEAR
-
-
 def _added(row: dict) -> bool:
     """Whether there was an effect, and what was named was added."""
     return hides(row) == "effect" and row.get("adds", True)
@@ -57,7 +53,7 @@ FIGURES: list[Figure] = [
     ("right name first, positions only", lambda r: hides(r) == "effect" and not r["forced"], fine),
     ("nothing: adequate", lambda r: hides(r) == "nothing", fine),
     ("no catalogue: unexplained", lambda r: hides(r) == "outside", fine),
-    (f"unseen whole runs within {NEAR} of the achievable", _added, _near),
+    (f"unseen whole runs within {NEAR} of the achievable", _added, near),
     (f"right, of p ≥ {SURE}", _sure, lambda r: not misled(r)),
 ]
 """Name, the cases that it is of, and which of them count."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from hidden_figures import NEAR, fine, hides
+from hidden_figures import NEAR, fine, hides, near
 
 KINDS = ("mass", "force_offset", "time_delay", "position_offset")
 """What may be off; a force's scale and a mass are one: only their ratio is known without friction
@@ -27,7 +27,7 @@ def by_numbers(rows: list[dict]) -> None:
     _line("false corrections, of each number", clean, lambda pair: told(*pair) is not None)
     _line("false corrections, of others", whole, lambda row: bool(OTHERS & set(numbers(row))))
     mended = [row for row in whole if "unseen" in row]
-    _line(f"unseen whole runs within {NEAR} of the achievable", mended, _near)
+    _line(f"unseen whole runs within {NEAR} of the achievable", mended, near)
     print("\nWrong:")
     for row in rows:
         wrong = row.get("seal", {}).get("wrong", {})
@@ -75,10 +75,6 @@ def within(pair: tuple[dict, str]) -> bool:
     """Whether it is told, within two of its errors."""
     found = told(*pair)
     return found is not None and abs(found[0] - right(*pair)) < 2 * found[1]
-
-
-def _near(row: dict) -> bool:
-    return row["unseen"] <= NEAR
 
 
 def _said(row: dict) -> str:

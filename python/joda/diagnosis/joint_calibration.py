@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
+from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.calibration import NEXT, Calibration, as_recorded, covariance
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.estimation.nuisance import nuisances_of, with_numbers
@@ -29,8 +29,6 @@ def needed(
     Returns:
         itself where all are, None where none is.
     """
-    if effect.hypothesis.effect == RESTITUTION:  # which segments do not tell of
-        return found
     length = baseline.estimator.segments.length
     best, kept = effect.fit.loss, found
     while kept.names:
@@ -53,8 +51,6 @@ def jointly(
     measured: Measured, found: Calibration, baseline: Baseline, effect: FittedHypothesis
 ) -> Calibration:
     """The numbers as the runs tell them beside the effect, with their errors; as `needed`."""
-    if effect.hypothesis.effect == RESTITUTION:
-        return found
     estimator, own = as_recorded(measured, found, baseline.estimator.segments.length)
     k, n = own.base.count, len(own.names)
     left = baseline.base.count - k  # set right, they were free within their errors

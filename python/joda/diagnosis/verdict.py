@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joda.diagnosis.baseline import Baseline, fit_baseline
+from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.calibration import Calibration, Calibrator
 from joda.diagnosis.corrections import (
     FAR_OFF,
@@ -228,8 +228,10 @@ def _set_right(
     Those that stood in for an effect are given back, and the runs are looked at once more.
     """
     while looks.selection.likely:
-        ranking = looks.ranking
-        beside = measured, found, ranking.baseline, ranking.candidates[0]
+        ranking, best = looks.ranking, looks.ranking.candidates[0]
+        if best.hypothesis.effect == RESTITUTION:  # which segments do not tell of
+            break
+        beside = measured, found, ranking.baseline, best
         if (fewer := needed(*beside)) is None:
             plain = looked(measured, exclude, progress)
             return replace(_concluded(measured, plain), looks=plain.evidence)
