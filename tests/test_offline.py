@@ -226,8 +226,9 @@ def test_a_joystick_comes_back_to_its_middle(tmp_path):
     good(loop_of(found))
 
 
-BOTH_WAYS = """<mujoco model="{object}"><worldbody><body name="base">{base}<body name="{part}" pos="{at}">
-  <joint name="j" {joint}/>{moves}</body></body></worldbody></mujoco>"""
+BOTH_WAYS = """<mujoco model="{object}"><worldbody><body name="base">{base}
+  <body name="{part}" pos="{at}"><joint name="j" {joint}/>{moves}</body>
+</body></worldbody></mujoco>"""
 FRAME = '<geom type="box" size=".03 .05 1" pos="0 {} 1"/>'
 
 
