@@ -75,6 +75,7 @@ def curve_segments(measured: Measured) -> CurveWindows:
     spread = np.where(rows >= 0, prior_std[rows], np.inf)
     return CurveWindows(
         h=measured.timestep,
+        length=measured.timestep,
         force=force,
         at=np.arange(count),
         fresh=np.ones(count, bool),

@@ -35,6 +35,9 @@ APPROACH = 8
 """Samples before a impact that belong to it."""
 SURE = 0.1
 """Of the error of a velocity at first, where the joint rests."""
+JOLTED = 0.03
+"""Part of the range by which errors of the force, alone, may move the joint within a segment; where
+they would more, as where a hand pulls up between two samples, a segment begins after them."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a segment's samples share it."""
 CLEAR = 1.5
@@ -84,7 +87,8 @@ def segments_of(
             begins = GRID * np.round(np.arange(many) * steps / many / GRID).astype(int)
             place = (time - time[0]) / h
             index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
-            spread = _spread(time, position, sigma)
+            spread, push = _spread(time, position, sigma), run.part(piece).force_error()
+            begins = _after_jolts(begins, index, time, push / inertia, JOLTED * span)
             begins, hits = _before_knocks(begins, index, (position - lo) / span, spread / span)
             many = len(begins)
             window = np.searchsorted(begins, index, side="right") - 1
@@ -103,7 +107,7 @@ def segments_of(
                 window + count,
                 -1,
             )
-            noise = spread, run.part(piece).force_error()
+            noise = spread, push
             samples.append((step + index, place - index, position, time, window, hits, *noise))
             step, count = step + steps, count + many
     force, command, at, fresh, start, prior_stds, run_of = (
@@ -115,6 +119,7 @@ def segments_of(
     rows = rows_of(window, count)
     return Segments(
         h=h,
+        length=length,
         force=force,
         at=at,
         fresh=fresh,
@@ -276,6 +281,29 @@ def _responses(t: Array, gaps: Array, rate: Array) -> Array:
         x[i - 1], v[i - 1] = 0.5 * gap, 1.0
         out[i] = x
     return out
+
+
+def _after_jolts(
+    begins: Integers, index: Integers, time: Array, push: Array, far: float
+) -> Integers:
+    """Where segments begin, also after errors `push` (of an acceleration, from each sample to the
+    next) that would move a free joint further than `far` until the segment ends."""
+    jolts = np.diff(time, append=time[-1]) * push
+    at = 0
+    out = list(begins)
+    while at < len(out):
+        first = np.searchsorted(index, out[at])
+        end = np.searchsorted(index, out[at + 1]) if at + 1 < len(out) else len(index)
+        moved = jolts[first : end - 1] * (time[end - 1] - time[first : end - 1])
+        if len(moved) and np.sqrt(np.sum(moved**2)) > far:
+            after = first + int(np.argmax(moved)) + 1
+            out.insert(at + 1, index[after] // GRID * GRID)
+            if out[at + 1] in (out[at], *out[at + 2 : at + 3]):
+                out.pop(at + 1)
+                at += 1
+        else:
+            at += 1
+    return np.array(out)
 
 
 def _before_knocks(

@@ -45,6 +45,7 @@ class Segments:
 
     Attributes:
         h: step, s.
+        length: of a segment, s; ends of runs, knocks and jolts make some shorter.
         force: at each step, N·m or N, shape (steps,); of a scene all that is put into it, shape
             (steps, inputs).
         command: of an actuator there, see `Servo`; None where none acted.
@@ -67,6 +68,7 @@ class Segments:
     """
 
     h: float
+    length: float
     force: Array
     at: Integers
     fresh: NDArray[np.bool_]
@@ -88,12 +90,6 @@ class Segments:
     def pushed(self) -> bool:
         """Whether a hand or an actuator moved the joint."""
         return self.command is not None or bool(self.force.any())
-
-    @property
-    def length(self) -> float:
-        """Of a usual segment, s."""
-        ends = np.append(self.at, len(self.force))
-        return float(self.h * np.median(np.diff(ends)))
 
     @property
     def count(self) -> Integers:
@@ -215,6 +211,7 @@ def evenly(
     rows = rows_of(window, len(at))
     return Segments(
         h=h,
+        length=length,
         force=force,
         at=at,
         fresh=at == 0,
