@@ -158,8 +158,9 @@ def test_failures_are_rows_and_the_rest_is_not_asked_for_ever(folder, tmp_path, 
         options = (folder, "--proposer", "openai", "--vlm", "q", "--base-url", f"{server.url}/v1",
                    "--rounds", 1, "-o", tmp_path / "o")  # fmt: skip
         server.script[:] = [refusal(403, "No.")]
-        status, _, err = joda(*options)
+        status, out, err = joda(*options)
         assert status == 2 and "3 joints in a row got no proposal, the rest is not asked" in err
+        assert "Asked 3 times: " in out
         assert "(403: No)" in err and len(server.requests) == 3
         kept = Evaluation.read(tmp_path / "o" / "evaluation.json")
         assert [(one.met, one.rounds, one.usage.requests) for one in kept.joints] == [(0, 0, 1)] * 3

@@ -527,7 +527,7 @@ def test_ctrl_c_stops_at_once_and_it_can_be_resumed(joda, server, tmp_path):
     out, err = running.communicate(timeout=30)
     assert (
         running.returncode == 130
-        and re.fullmatch("Estimate, .*\n", out)
+        and re.fullmatch(r"Estimate, .*\nAsked \d times: .*\n", out)
         and err in ("", "joda: interrupted.\n")
     )
     kept = whole(tmp_path / "out")

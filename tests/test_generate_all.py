@@ -20,6 +20,7 @@ from test_generate import (  # noqa: F401
 from test_prompts import answers, texts
 
 from joda import JodaError, generate, generate_all
+from joda.cli.tell import telling_cost
 from joda.commands.generate import Generated
 from joda.commands.generate_all import PassedOver
 from joda.proposal import Proposal
@@ -105,8 +106,59 @@ def test_a_joint_without_a_range_is_told_and_is_no_failure(joda, tmp_path):
     status, out, _ = joda(*told, "--resume", "--json")
     assert status == 0 and "passed over" in json.loads(out)["fan/spin"]["error"]
     (tmp_path / "fans" / "drawer.xml").unlink()
+    status, out, err = joda("generate", tmp_path / "fans", "-o", tmp_path / "only")
+    assert (status, err) == (0, "") and "1 joint has no range and no profile." in out
+    assert "fan/spin" in (tmp_path / "only" / "sheet.html").read_text()
+    (tmp_path / "fans" / "fan.xml").write_text("<mujoco/>")
     with pytest.raises(JodaError, match="holds no model with a hinge or slide that has a range"):
         generate_all(tmp_path / "fans", tmp_path / "none")
+
+
+def test_a_joint_whose_later_round_came_to_nothing_keeps_its_profile(
+    server, models, tmp_path, joda
+):
+    def results(entry):
+        later = len(entry["params"]["messages"]) > 1
+        if later and "drawer, a slide" in texts(entry["params"]):
+            return {"type": "errored", "error": error(400, "invalid_request_error", "Bad.")["body"]}
+        return answered(entry)
+
+    server.results = results
+    status, out, err = joda("generate", models, "-o", tmp_path / "out")
+    assert status == 2 and "1 of 3 stopped early and go on with --resume; see above." in err
+    assert "Round 2 came to nothing: the service refuses the request (Bad)." in out
+    assert "kitchen/drawer/drawer: " in out and "0 of 0 behaviours" not in out
+    assert "Asked 6 times: " in out
+    assert "came to nothing" in (tmp_path / "out" / "sheet.html").read_text()
+    server.results = answered
+    status, _, err = joda("generate", models, "-o", tmp_path / "out", "--resume")
+    assert (status, err) == (0, "")
+
+
+def test_what_was_asked_is_told_where_the_user_breaks_off(server, models, tmp_path, capsys):
+    server.results = answered
+    done = generate_all(models, tmp_path / "out")
+    spent = sum(one.history.usage.requests for one in done.values())
+    with pytest.raises(KeyboardInterrupt), telling_cost(tmp_path / "out", as_json=False):
+        raise KeyboardInterrupt
+    assert f"Asked {spent} times: " in capsys.readouterr().out
+
+
+def test_a_complete_folder_that_is_resumed_has_the_same_sheet(tmp_path):
+    robot = """<robot name="box"><link name="base"><collision><geometry><box size=".4 .4 .4"/>
+      </geometry></collision></link><link name="lid"><inertial><mass value="1"/>
+      <inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial><collision>
+      <origin xyz=".2 0 .01"/><geometry><box size=".4 .4 .02"/></geometry></collision></link>
+      <joint name="hinge" type="revolute"><origin xyz="-.2 0 .21"/><axis xyz="0 -1 0"/>
+      <parent link="base"/><child link="lid"/><limit lower="0" upper="1.5" effort="1"
+      velocity="1"/></joint></robot>"""
+    (tmp_path / "boxes").mkdir()
+    (tmp_path / "boxes" / "box.urdf").write_text(robot)
+    made = generate_all(tmp_path / "boxes", tmp_path / "out")["box/hinge"]
+    assert any("was written out by MuJoCo first" in note for note in made.notes)
+    page = (tmp_path / "out" / "sheet.html").read_bytes()
+    assert generate_all(tmp_path / "boxes", tmp_path / "out", resume=True)["box/hinge"] == made
+    assert (tmp_path / "out" / "sheet.html").read_bytes() == page
 
 
 def test_json_has_a_history_per_joint(joda, models, tmp_path):

@@ -308,10 +308,34 @@ def test_a_doors_round_knob_comes_back_to_its_middle(tmp_path, name):
     good(loop_of(found))
 
 
+STAND = '<geom type="box" size=".06 .05 .02" pos="0 .08 0"/>'
+
 NOTHING = """
 <mujoco><compiler angle="radian"/><worldbody><body>
   <joint name="j" axis="1 0 0" range="0 1.6"/><geom type="sphere" size=".2" mass="3"/>
 </body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "object", "part", "joint", "moves"),
+    [
+        ("handle that springs back", "door", "door_handle", 'axis="0 1 0" range="0 45"',
+         '<geom type="box" size=".06 .008 .01" pos="-.055 -.05 0" mass=".1"/>'),
+        ("joystick", "joystick", "stick", 'axis="0 1 0" range="-25 25"',
+         '<geom type="capsule" size=".012" fromto="0 0 0 0 0 .14" mass=".08"/>'),
+        ("wheel that rolls", "shopping_cart", "cart_wheel", 'axis="0 1 0" range="-360 360"',
+         '<geom type="cylinder" size=".06 .015" zaxis="0 1 0" mass=".3"/>'),
+        ("hanging pedal", "cockpit", "accelerator", 'axis="0 1 0" range="0 25"',
+         '<geom type="box" size=".006 .01 .1" pos="0 0 -.1" mass=".3"/>'),
+    ],
+)  # fmt: skip
+def test_what_names_and_shape_say_together(tmp_path, kind, object, part, joint, moves):
+    base = '<geom type="box" size=".4 .02 1" pos=".33 .03 0"/>' if object == "door" else STAND
+    text = BOTH_WAYS.format(
+        object=object, part=part, at="0 0 0.06", base=base, joint=joint, moves=moves
+    )
+    found = context(write(tmp_path, text), "j")
+    assert recognise(found)[0].title == kind
 
 
 def test_a_joint_that_nothing_tells_of_has_low_confidence_and_can_be_moved(tmp_path):

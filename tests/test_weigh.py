@@ -60,6 +60,22 @@ def test_a_mass_that_can_be_is_left_alone_unless_forced(tmp_path):
     assert weigh(path, "j", out, force=True).before == pytest.approx(8.001)
 
 
+def test_an_inertia_that_cannot_be_becomes_that_of_the_geoms(tmp_path):
+    """A board of 0.3 m about its edge: m w² / 3, and of its thickness."""
+    (tmp_path / "a.xml").write_text(
+        """<mujoco><worldbody><geom type="box" size=".2 .2 .2" pos="0 .25 0"/>
+        <body pos="-.15 -.2 0"><inertial pos=".15 0 0" mass="1" diaginertia="1 1 1"/>
+        <joint name="j" axis="0 0 1" range="-110 0"/>
+        <geom type="box" size=".15 .01 .15" pos=".15 -.01 0"/></body></worldbody></mujoco>"""
+    )
+    done = weigh(tmp_path / "a.xml", "j", tmp_path / "b.xml")
+    assert "correct the inertia" in done.doubts[0]
+    after = context(tmp_path / "b.xml", "j")
+    assert not after.doubts
+    right = after.moving_mass * ((0.3**2 + 0.02**2) / 12 + 0.15**2 + 0.01**2)
+    assert after.equivalent_inertia == pytest.approx(right, rel=1e-3)
+
+
 def test_a_part_without_geoms_has_no_size(tmp_path):
     with pytest.raises(JodaError, match="moves no geoms"):
         weigh(model(tmp_path), "bare", tmp_path / "b.xml")

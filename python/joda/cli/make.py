@@ -37,6 +37,7 @@ from joda.cli.tell import (
     tell_nearest,
     tell_round,
     tell_viewer,
+    telling_cost,
     with_text_paths,
 )
 from joda.errors import JodaError
@@ -182,7 +183,7 @@ def generate(
     if model.is_dir():
         from joda.commands.generate_all import SHEET
 
-        with progress_bar() as bar:
+        with telling_cost(output, as_json), progress_bar() as bar:
             done = run_all(model, output, joint=joint, progress=bar, **options)
         if review:
             done = run_all(model, output, joint=joint, review=look_at, **options | {"resume": True})
@@ -190,15 +191,8 @@ def generate(
         return
     if review:
         raise JodaError("--review goes with a folder of models; change one joint with joda revise.")
-    from joda.propose.asking import ProposalFailed
-
-    try:
-        with spinner("generate") as progress:
-            result = run(model, joint, output, progress=progress, **options)
-    except ProposalFailed as error:
-        if not as_json:
-            tell_cost(error.usage)
-        raise
+    with telling_cost(output, as_json), spinner("generate") as progress:
+        result = run(model, joint, output, progress=progress, **options)
     if as_json:
         print_json(generated_as_json(result))
         return

@@ -22,7 +22,7 @@ from joda.cli.options import (
 )
 from joda.cli.progress import progress_bar
 from joda.cli.say import say
-from joda.cli.tell import evaluation_as_json, print_json, tell_evaluation
+from joda.cli.tell import evaluation_as_json, print_json, tell_evaluation, telling_cost
 from joda.errors import JodaError
 
 
@@ -119,7 +119,7 @@ def evaluate(
     """
     from joda import evaluate as run
 
-    with progress_bar() as bar:
+    with telling_cost(output, as_json), progress_bar() as bar:
         result = run(
             what, models, output, proposer=proposer, rounds=rounds, templates=templates or (),
             key=key, vlm=vlm, base_url=base_url, effort=effort, resume=resume, force=force,

@@ -6,7 +6,8 @@ import shlex
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,7 +47,8 @@ def with_text_paths(values: Mapping[str, Any]) -> dict[str, Any]:
 def generated_as_json(result: "Generated") -> dict[str, Any]:
     """What `joda generate --json` prints of a joint."""
     told: dict[str, Any] = result.history.model_dump(mode="json")
-    return {**told, "usage": result.history.usage.model_dump(mode="json"), "notes": result.notes}
+    usage = result.history.usage.model_dump(mode="json")
+    return {**told, "usage": usage, "notes": result.notes, "stopped": result.stopped}
 
 
 def tell_changes(changes: Sequence[str]) -> None:
@@ -101,6 +103,26 @@ def tell_cost(usage: "Usage") -> None:
         )
 
 
+@contextmanager
+def telling_cost(folder: Path | None, as_json: bool) -> Iterator[None]:
+    """Tells what was asked of the network in a folder where what is done here is broken off."""
+    from joda.propose import total
+    from joda.propose.asking import ProposalFailed
+    from joda.propose.history import History
+
+    try:
+        yield
+    except (ProposalFailed, KeyboardInterrupt) as error:
+        if isinstance(error, ProposalFailed):
+            spent = error.usage
+        else:
+            kept = folder.rglob("history.json") if folder else ()
+            spent = total(History.read(path).usage for path in kept)
+        if not as_json:
+            tell_cost(spent)
+        raise
+
+
 def tell_estimate(estimated: "Estimate | None", as_json: bool) -> None:
     """What a generation will about cost."""
     if as_json:
@@ -133,7 +155,7 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", sheet: Path, as_json: 
 
     Raises JodaError if some gave nothing.
     """
-    from joda.commands.generate_all import PassedOver
+    from joda.commands.generate_all import PassedOver, remarks
     from joda.propose import total
     from joda.propose.asking import ProposalFailed
 
@@ -159,7 +181,7 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", sheet: Path, as_json: 
             last = result.history.rounds[-1]
             lacking = " ".join(last.unmet) or "as described"
             say(f"{label}: {last.proposal.joint_summary.motion_description}; {lacking}")
-            for note in result.notes:
+            for note in remarks(result):
                 say(f"  {note}")
         tell_cost(total([*(result.history.usage for result in made.values()), *lost]))
         lasts = [result.history.rounds[-1] for result in made.values()]
@@ -169,8 +191,10 @@ def tell_all(done: "Mapping[str, Generated | JodaError]", sheet: Path, as_json: 
         if over := len(failed) - len(mistakes):
             say(f"{over} {'joint has' if over == 1 else 'joints have'} no range and no profile.")
         say(f"Contact sheet: {sheet}")
-    if mistakes:
-        raise JodaError(f"{len(mistakes)} of {len(done)} have no profile; see above.")
+    stopped = sum(bool(result.stopped) for result in made.values())
+    lacks = [(len(mistakes), "have no profile"), (stopped, "stopped early and go on with --resume")]
+    if told := [f"{count} of {len(done)} {what}" for count, what in lacks if count]:
+        raise JodaError(f"{', '.join(told)}; see above.")
 
 
 def evaluation_as_json(result: "Evaluation") -> dict[str, Any]:

@@ -159,9 +159,10 @@ def evaluate(
         write_text(folder / RESULT, result.to_json())
         lost = lost + 1 if unanswered else 0
         if lost == PATIENCE:
-            raise JodaError(
+            raise ProposalFailed(
                 f"{lost} joints in a row got no proposal, the rest is not asked; go on with "
-                f"--resume -o {folder}. The last: {judged.failed}"
+                f"--resume -o {folder}. The last: {judged.failed}",
+                result.usage,
             )
     progress(len(cases), len(cases), "done")
     return result

@@ -31,11 +31,13 @@ class Generated:
             and history.json.
         history: the rounds, what each proposed, what came of it, what it cost.
         notes: what the user should be told, a sentence each.
+        stopped: why a further round came to nothing; empty where it did not.
     """
 
     folder: Path
     history: History
     notes: tuple[str, ...] = ()
+    stopped: str = ""
 
 
 def generate(

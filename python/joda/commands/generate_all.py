@@ -136,11 +136,11 @@ def generate_all(
         if batched is not None:
             _run_many(sessions, batched, rounds, target / "batch.json", done, progress)
         for label, session in sessions.items():
-            failed, made = done.get(label), session.history
+            failed, made = str(done.get(label, "")), session.history
             done[label] = (
-                ProposalFailed(str(failed), made.usage)
-                if failed
-                else Generated(session.folder, made, tuple(session.notes))
+                Generated(session.folder, made, tuple(session.notes), failed)
+                if made.rounds
+                else ProposalFailed(failed, made.usage)
             )
     progress(len(jobs), len(jobs), "drawing the contact sheet")
     write_sheet(target, done)
@@ -152,12 +152,19 @@ def generate_all(
     return dict(sorted(done.items()))
 
 
+def remarks(made: Generated) -> tuple[str, ...]:
+    """What is to be told of a joint besides its behaviours, a sentence each."""
+    if not made.stopped:
+        return made.notes
+    return (*made.notes, f"Round {len(made.history.rounds) + 1} came to nothing: {made.stopped}")
+
+
 def write_sheet(folder: Path, done: Results) -> None:
     """Writes the contact sheet of what is in a folder; raises JodaError."""
     entries = [
         Entry(label, failed=str(one))
         if isinstance(one, JodaError)
-        else Entry.read(label, one.folder, one.history, one.notes)
+        else Entry.read(label, one.folder, one.history, remarks(one))
         for label, one in sorted(done.items())
     ]
     write_text(folder / SHEET, sheet(entries, folder, f"Joints of {folder.resolve().name}"))
@@ -228,7 +235,8 @@ def find_jobs(source: Path, target: Path, joint: str | None, failed: Results) ->
     if not jobs and others:
         listed = ", ".join(f"'{name}'" for name in sorted(others))
         raise JodaError(f"{source}: no model has a joint '{joint}'; there are: {listed}.")
-    if not jobs:
+    passed = [isinstance(one, PassedOver) for one in failed.values()]
+    if not jobs and not (passed and all(passed)):
         reasons = " ".join(str(one) for one in failed.values() if not isinstance(one, PassedOver))
         raise JodaError(
             reasons or f"{source}: holds no model with a hinge or slide that has a range."

@@ -10,7 +10,7 @@ import numpy as np
 
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes
-from joda.scenes.masses import mass_doubts
+from joda.scenes.masses import mass_doubts, misplaced
 from joda.scenes.materials import Weight, estimate_weight
 from joda.scenes.model import find_joint, joint_name, load, load_model, moves_with, write_out
 
@@ -46,7 +46,9 @@ def weigh(
     """Writes a model in which what a joint moves has an estimated mass.
 
     Masses and inertias of all bodies that the joint moves are multiplied by one factor; centres of
-    mass stay. The estimate is rough: within a factor of two or three of what a scale would say.
+    mass stay. Where mass or inertia lies where nothing of the part is, centres and inertias become
+    those of the bodies' geoms. The estimate is rough: within a factor of two or three of what a
+    scale would say.
 
     Args:
         model: MJCF or URDF file.
@@ -76,12 +78,15 @@ def weigh(
             f"{estimate.mass:.3g} kg); add --force to replace it all the same."
         )
     factor = estimate.mass / before
+    shaped = (
+        _by_geoms(spec) if misplaced(compiled, number, moves_with(compiled, body)) else compiled
+    )
     for index in np.flatnonzero(moves_with(compiled, body)):
-        part = spec.bodies[index]
+        part, like = spec.bodies[index], shaped if shaped.body_mass[index] > 0 else compiled
         part.explicitinertial = True
         part.mass = float(compiled.body_mass[index]) * factor
-        part.inertia = compiled.body_inertia[index] * factor
-        part.ipos, part.iquat = compiled.body_ipos[index], compiled.body_iquat[index]
+        part.inertia = like.body_inertia[index] * part.mass / max(like.body_mass[index], 1e-12)
+        part.ipos, part.iquat = like.body_ipos[index], like.body_iquat[index]
         part.fullinertia = [np.nan] * 6
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
     text = _written(spec, source, target.parent)
@@ -91,6 +96,13 @@ def weigh(
     if not np.isclose(found, estimate.mass, rtol=1e-3):
         raise JodaError(f"{target}: MuJoCo wrote {found:.3g} kg, not {estimate.mass:.3g} kg.")
     return Weighed(before, estimate, doubts, target)
+
+
+def _by_geoms(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The model whose bodies have the masses and inertias of their geoms."""
+    copy = spec.copy()
+    copy.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    return copy.compile()
 
 
 def _written(spec: mujoco.MjSpec, source: Path, folder: Path) -> bytes:

@@ -76,6 +76,7 @@ class History(File):
         rounds: oldest first.
         failures: requests that gave nothing.
         composed: SHA-256 of the `composed.json` that the last round left.
+        attached: what was told as its scene was written, a sentence each.
     """
 
     schema_version: Literal[1] = 1
@@ -91,6 +92,7 @@ class History(File):
     rounds: tuple[Round, ...] = ()
     failures: tuple[Failure, ...] = ()
     composed: str = ""
+    attached: tuple[str, ...] = ()
 
     @field_validator("model", "templates")
     @classmethod

@@ -123,6 +123,8 @@ class Session:
         )
         if self.turns and not self._finished():
             self._write(self.turns[-1])
+        elif self.turns:
+            self._tell(history.attached)
 
     @classmethod
     def start(
@@ -406,8 +408,12 @@ class Session:
         write_bytes(self.folder / "profile.png", turn.picture())
         joint = self.history.joint
         said = attach(self.model, turn.profile, self.folder / "scene.xml", joint=joint, force=True)
-        self.notes += [note for note in said if note not in self.notes]
+        self._save(attached=tuple(said))
+        self._tell(said)
         write_text(self.folder / "composed.json", turn.profile.to_json())  # last, see _finished
+
+    def _tell(self, sentences: Sequence[str]) -> None:
+        self.notes += [sentence for sentence in sentences if sentence not in self.notes]
 
     def _pictures(self, wanted: Pictures) -> list[bytes]:
         """The joint at several positions, those of before or made now; none where none can be."""

@@ -50,7 +50,7 @@ def mass_doubts(model: mujoco.MjModel, joint: int, inertia: float, driven: bool)
     parts = [np.flatnonzero(part) for part in (own & collides, own & ~collides, own) if part.any()]
     sizes = np.array([[*_volumes(model, int(g)), *_box(model, int(g))] for p in parts for g in p])
     sums = np.add.reduceat(sizes, np.cumsum([0, *map(len, parts[:-1])])) if parts else None
-    out = [] if sums is None else [_of_mass(name, mass, sums), _of_place(model, joint, moving)]
+    out = [] if sums is None else [_of_mass(name, mass, sums), misplaced(model, joint, moving)]
     out.append(_of_armature(model, joint, inertia) if not driven else "")
     return tuple(sentence for sentence in out if sentence)
 
@@ -113,8 +113,9 @@ def _counted_more(said: str, mass: float, volume: float) -> str:
     )
 
 
-def _of_place(model: mujoco.MjModel, joint: int, moving: Mask) -> str:
-    """A sentence where the mass, or what resists turning, lies where nothing of the part is."""
+def misplaced(model: mujoco.MjModel, joint: int, moving: Mask) -> str:
+    """A sentence where the mass, or what resists turning, lies where nothing of the part is; empty
+    where it does not."""
     data, body = mujoco.MjData(model), int(model.jnt_bodyid[joint])
     mujoco.mj_fwdPosition(model, data)
     mass, geoms = float(model.body_subtreemass[body]), moving[model.geom_bodyid]

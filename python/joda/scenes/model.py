@@ -23,7 +23,8 @@ LONGEST_NAME = 1000
 """Bytes of a name in a model."""
 MASSLESS = (
     " A link without a mass, as PartNet-Mobility's helpers between two joints, needs a little: "
-    'write <mujoco><compiler boundmass="1e-4" boundinertia="1e-7"/></mujoco> into the <robot>.'
+    'write <mujoco><compiler boundmass="1e-4" boundinertia="1e-7"/></mujoco> into the <robot>. '
+    "One that is a part itself, and has visuals only, needs its <inertial>."
 )
 """What to do about bodies without a mass; in MJCF the same attributes of its <compiler>."""
 
