@@ -207,6 +207,31 @@ def test_errors_of_a_force_grow_where_the_joint_runs_away():
     assert np.allclose(_responses(times, gaps, np.full(31, 1e-6)), free, atol=1e-9)
 
 
+@pytest.mark.parametrize("each", [1, 30])
+def test_a_segment_begins_after_a_force_that_changed_between_two_samples(each):
+    """A stroke of 20 ms that is recorded well, each millisecond, or once in 30 ms."""
+    rng, t = np.random.default_rng(3), STEP * np.arange(1800)
+    force = np.where((t > 0.835) & (t < 0.855), -20.0, 0.0) + 0.2 * np.sin(4 * t)
+    speed = STEP * np.cumsum(force)
+    position = 0.3 + STEP * np.cumsum(speed + 0.4)
+    seen = position[::each] + SIGMA * rng.standard_normal(len(t[::each]))
+    run = Run("run.csv", t[::each], seen, None, force[::each], True)
+    segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP, 0.6)
+    begins = STEP * segments.at
+    if each == 1:
+        assert np.allclose(begins, [0.0, 0.6, 1.2], atol=0.01)
+    else:
+        assert any(0.83 < begin < 0.91 for begin in begins)
+        assert not any(row[0] < 0.83 and row[1] > 0.86 for row in _spans(segments))
+    assert segments.length == pytest.approx(0.6, abs=0.01)
+
+
+def _spans(segments):
+    """First and last times of the segments that have enough samples."""
+    rows = [row[row >= 0] for row in segments.rows]
+    return [segments.time[row[[0, -1]]] for row in rows if len(row) >= smoothing.LEAST]
+
+
 def test_a_good_fit_stays_as_it_is(tmp_path):
     found = measured(tmp_path, 0.2 + 0.5 * (1 - np.exp(-STEP * np.arange(1000))))
     base = base_of(found.profile, joint_model_for(found, STEP), STEP)

@@ -173,22 +173,25 @@ def diagnosed(
     baseline = fit_baseline(measured)
     calibrator = Calibrator(measured)
     found = calibrator.numbers(baseline) if calibrate else None
+    mended: tuple[Calibration, HorizonSearch] | None = None
     if found and found.alone:
-        looks = looked(found.of(measured), exclude, progress)
-        return _set_right(measured, found, looks, exclude, progress)
-    plain = looked(measured, exclude, progress, baseline)
-    ranking, beside = plain.first[0], False
-    if calibrate and found is None and plain.selection.verdict != "adequate":
-        ranking, beside = plain.ranking, True
-        found = calibrator.numbers(ranking.baseline, beside)
-    if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
-        looks = looked(found.of(measured), exclude, progress)
-        if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
-            return _set_right(measured, found, looks, exclude, progress)
-    puzzled = calibrate and plain.selection.verdict == "unexplained"
-    base = plain.first[0].baseline.base
-    if puzzled and (both := _together(measured, base, exclude, progress)):
-        return _set_right(measured, *both, exclude, progress)
+        plain = looked(found.of(measured), exclude, progress)
+        mended = found, plain
+    else:
+        plain = looked(measured, exclude, progress, baseline)
+        ranking, beside = plain.first[0], False
+        if calibrate and found is None and plain.selection.verdict != "adequate":
+            ranking, beside = plain.ranking, True
+            found = calibrator.numbers(ranking.baseline, beside)
+        if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
+            looks = looked(found.of(measured), exclude, progress)
+            if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
+                mended = found, looks
+    puzzled = calibrate and (mended[1] if mended else plain).selection.verdict == "unexplained"
+    if puzzled and (both := _together(measured, baseline.base, exclude, progress)):
+        mended = both
+    if mended:
+        return _set_right(measured, *mended, exclude, progress)
     return replace(_concluded(measured, plain), looks=plain.evidence)
 
 

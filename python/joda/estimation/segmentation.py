@@ -76,6 +76,7 @@ def segments_of(
     chunk = max(round(usual / h), 1)
     parts: list[tuple[NDArray[Any], ...]] = []
     samples: list[tuple[NDArray[Any], ...]] = []
+    apart: list[int] = []
     step, count = 0, 0
     for number, (run, sigma) in enumerate(zip(runs, sigmas, strict=True)):
         for piece in known(run):
@@ -85,6 +86,7 @@ def segments_of(
             each = max(round(length / h), 1)
             many = max(round(steps / each), 1)
             begins = GRID * np.round(np.arange(many) * steps / many / GRID).astype(int)
+            apart.extend(np.diff(begins, append=steps))
             place = (time - time[0]) / h
             index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
             spread, push = _spread(time, position, sigma), run.part(piece).force_error()
@@ -119,7 +121,7 @@ def segments_of(
     rows = rows_of(window, count)
     return Segments(
         h=h,
-        length=length,
+        length=float(h * np.median(apart)),
         force=force,
         at=at,
         fresh=fresh,
