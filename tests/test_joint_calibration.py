@@ -1,14 +1,17 @@
 """Numbers that are off beside an effect: what stood in for it is given back, the rest is right."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_calibration import found_of
+from test_calibration import arm, found_of, logged
 
+from joda.diagnosis import verdict
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.joint_calibration import jointly, needed
 from joda.estimation.nuisance import nuisances_of
+from joda.measured.reading import read_measured
 
 EFFECT = "constant_positive_conservative_hinge"
 HEAVIER, ZERO, PULL = 1.4, 0.06, 0.6
@@ -54,3 +57,32 @@ def test_what_is_left_is_fitted_beside_the_effect(found, names):
     right = {"mass": np.log(HEAVIER), "position_offset": 0.0}
     off = told.fit.x[-len(names) :] - [right[name] for name in names]
     assert np.all(np.abs(off) < 4 * told.errors + 0.01)
+
+
+@pytest.mark.parametrize(
+    ("left", "together", "ends"),
+    [
+        ("unexplained", True, "both"),
+        ("unexplained", False, "numbers"),
+        ("missing_effect", True, "numbers"),
+        ("adequate", True, "numbers"),
+    ],
+)
+def test_numbers_and_effects_are_asked_for_together_where_these_leave_something(
+    tmp_path, monkeypatch, left, together, ends
+):
+    numbers = SimpleNamespace(alone=True, of=lambda measured: measured)
+    looks = SimpleNamespace(selection=SimpleNamespace(verdict=left))
+    runs = logged(tmp_path, np.random.default_rng(0))
+    measured = read_measured(write_arm(tmp_path), "arm", runs)
+    monkeypatch.setattr(verdict.Calibrator, "numbers", lambda *_: numbers)
+    monkeypatch.setattr(verdict, "looked", lambda *_: looks)
+    monkeypatch.setattr(verdict, "_together", lambda *_: ("both", looks) if together else None)
+    monkeypatch.setattr(verdict, "_set_right", lambda _, found, *rest: found)
+    assert verdict.diagnosed(measured) == (numbers if ends == "numbers" else ends)
+
+
+def write_arm(folder):
+    """The arm as it is."""
+    (folder / "arm.xml").write_text(arm())
+    return folder / "arm.xml"
