@@ -54,9 +54,12 @@ def models(tmp_path):
 NAMES = ["kitchen/drawer/drawer", "kitchen/oven/door", "refrigerator/door"]
 
 
-def answered(entry):
-    """Of the joint that is asked for: a proposal in round one, complete in round two."""
+def answered(entry, refused_from=3):
+    """Of the joint that is asked for: a proposal in round one, complete in round two; of the drawer
+    a refusal from some round on."""
     later = len(entry["params"]["messages"]) > 1
+    if 1 + later >= refused_from and "drawer, a slide" in texts(entry["params"]):
+        return {"type": "errored", "error": error(400, "invalid_request_error", "Bad.")["body"]}
     if later:
         return {"type": "succeeded", "message": reply("oven", 1)}
     name = "oven" if "oven" in texts(entry["params"]).split("# The joint")[1] else "refrigerator"
@@ -117,13 +120,7 @@ def test_a_joint_without_a_range_is_told_and_is_no_failure(joda, tmp_path):
 def test_a_joint_whose_later_round_came_to_nothing_keeps_its_profile(
     server, models, tmp_path, joda
 ):
-    def results(entry):
-        later = len(entry["params"]["messages"]) > 1
-        if later and "drawer, a slide" in texts(entry["params"]):
-            return {"type": "errored", "error": error(400, "invalid_request_error", "Bad.")["body"]}
-        return answered(entry)
-
-    server.results = results
+    server.results = lambda entry: answered(entry, refused_from=2)
     status, out, err = joda("generate", models, "-o", tmp_path / "out")
     assert status == 2 and "1 of 3 stopped early and go on with --resume; see above." in err
     assert "Round 2 came to nothing: the service refuses the request (Bad)." in out
@@ -326,12 +323,7 @@ def test_a_service_that_stops_answering_is_a_sentence_and_it_goes_on(
 
 @pytest.mark.slow
 def test_a_refusal_in_a_batch_is_that_joints(server, models, tmp_path, joda):
-    def results(entry):
-        if "drawer, a slide" in texts(entry["params"]):
-            return {"type": "errored", "error": error(400, "invalid_request_error", "Bad.")["body"]}
-        return answered(entry)
-
-    server.results = results
+    server.results = lambda entry: answered(entry, refused_from=1)
     status, out, err = joda("generate", models, "-o", tmp_path / "out")
     assert status == 2 and "1 of 3 have no profile" in err
     assert "kitchen/drawer/drawer: the service refuses the request (Bad)." in out

@@ -74,15 +74,10 @@ def test_numbers_and_effects_are_asked_for_together_where_these_leave_something(
     numbers = SimpleNamespace(alone=True, of=lambda measured: measured)
     looks = SimpleNamespace(selection=SimpleNamespace(verdict=left))
     runs = logged(tmp_path, np.random.default_rng(0))
-    measured = read_measured(write_arm(tmp_path), "arm", runs)
+    (tmp_path / "arm.xml").write_text(arm())
+    measured = read_measured(tmp_path / "arm.xml", "arm", runs)
     monkeypatch.setattr(verdict.Calibrator, "numbers", lambda *_: numbers)
     monkeypatch.setattr(verdict, "looked", lambda *_: looks)
     monkeypatch.setattr(verdict, "_together", lambda *_: ("both", looks) if together else None)
     monkeypatch.setattr(verdict, "_set_right", lambda _, found, *rest: found)
     assert verdict.diagnosed(measured) == (numbers if ends == "numbers" else ends)
-
-
-def write_arm(folder):
-    """The arm as it is."""
-    (folder / "arm.xml").write_text(arm())
-    return folder / "arm.xml"

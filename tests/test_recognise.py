@@ -261,7 +261,7 @@ def test_every_archetype_has_its_force_and_effects_that_there_are():
 def test_every_force_has_a_source_or_is_called_an_estimate():
     assert {row.basis for row in forces().values()} == {"standard", "measured", "estimate"}
     for row in forces().values():
-        assert 0 < row.opening[0] < row.opening[1] <= 200
+        assert 0 < row.opening[0] < row.opening[1] <= 100
         assert bool(row.source) == (row.basis != "estimate")
 
 

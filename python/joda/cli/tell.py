@@ -112,14 +112,13 @@ def telling_cost(folder: Path | None, as_json: bool) -> Iterator[None]:
 
     try:
         yield
-    except (ProposalFailed, KeyboardInterrupt) as error:
-        if isinstance(error, ProposalFailed):
-            spent = error.usage
-        else:
-            kept = folder.rglob("history.json") if folder else ()
-            spent = total(History.read(path).usage for path in kept)
+    except ProposalFailed as error:
         if not as_json:
-            tell_cost(spent)
+            tell_cost(error.usage)
+        raise
+    except KeyboardInterrupt:
+        if folder and not as_json:
+            tell_cost(total(History.read(path).usage for path in folder.rglob("history.json")))
         raise
 
 

@@ -235,11 +235,11 @@ def find_jobs(source: Path, target: Path, joint: str | None, failed: Results) ->
     if not jobs and others:
         listed = ", ".join(f"'{name}'" for name in sorted(others))
         raise JodaError(f"{source}: no model has a joint '{joint}'; there are: {listed}.")
-    passed = [isinstance(one, PassedOver) for one in failed.values()]
-    if not jobs and not (passed and all(passed)):
-        reasons = " ".join(str(one) for one in failed.values() if not isinstance(one, PassedOver))
+    mistakes = [str(one) for one in failed.values() if not isinstance(one, PassedOver)]
+    if not jobs and (mistakes or not failed):
         raise JodaError(
-            reasons or f"{source}: holds no model with a hinge or slide that has a range."
+            " ".join(mistakes)
+            or f"{source}: holds no model with a hinge or slide that has a range."
         )
     return jobs
 

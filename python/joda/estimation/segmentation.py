@@ -109,8 +109,8 @@ def segments_of(
                 window + count,
                 -1,
             )
-            noise = spread, push
-            samples.append((step + index, place - index, position, time, window, hits, *noise))
+            own = position, time, window, hits, spread, push
+            samples.append((step + index, place - index, *own))
             step, count = step + steps, count + many
     force, command, at, fresh, start, prior_stds, run_of = (
         np.concatenate(x) for x in zip(*parts, strict=True)
@@ -297,12 +297,11 @@ def _after_jolts(
         first = np.searchsorted(index, out[at])
         end = np.searchsorted(index, out[at + 1]) if at + 1 < len(out) else len(index)
         moved = jolts[first : end - 1] * (time[end - 1] - time[first : end - 1])
-        if len(moved) and np.sqrt(np.sum(moved**2)) > far:
-            after = first + int(np.argmax(moved)) + 1
-            out.insert(at + 1, index[after] // GRID * GRID)
-            if out[at + 1] in (out[at], *out[at + 2 : at + 3]):
-                out.pop(at + 1)
-                at += 1
+        begin = out[at]
+        if np.sqrt(np.sum(moved**2)) > far:
+            begin = index[first + int(np.argmax(moved)) + 1] // GRID * GRID
+        if begin > out[at]:
+            out.insert(at + 1, begin)
         else:
             at += 1
     return np.array(out)
