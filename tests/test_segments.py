@@ -8,6 +8,7 @@ from joda.diagnosis.units import units_of
 from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.segmentation import STEPS, _responses, _step, segments_of
+from joda.estimation.segments import GRID
 from joda.estimation.unknowns import EMPTY, NOTHING
 from joda.measured import smoothing
 from joda.measured.reading import read_measured
@@ -217,7 +218,7 @@ def test_a_segment_begins_after_a_force_that_changed_between_two_samples(each):
     seen = position[::each] + SIGMA * rng.standard_normal(len(t[::each]))
     run = Run("run.csv", t[::each], seen, None, force[::each], True)
     segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP, 0.6)
-    begins = STEP * segments.at
+    begins = segments.h * segments.at
     if each == 1:
         assert np.allclose(begins, [0.0, 0.6, 1.2], atol=0.01)
     else:
@@ -264,7 +265,20 @@ def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
 
 @pytest.mark.parametrize(
     ("timestep", "length", "usual", "step"),
-    [(2e-3, 0.1, 0.1, 1 / 3000), (5e-4, 0.45, 0.45, 1.5e-3), (5e-4, 1.5, 0.45, 1.5e-3)],
+    [(2e-3, 0.1, 0.1, 1 / 1500), (5e-4, 0.45, 0.45, 3e-3), (5e-4, 1.5, 0.45, 3e-3)],
 )
 def test_steps_are_short_for_the_windows(timestep, length, usual, step):
     assert _step(timestep, length, usual, STEPS) == pytest.approx(step)
+
+
+def test_forces_of_longer_steps_act_about_their_beginnings():
+    """A force that grows steadily, in two runs: it is the same at the same time."""
+    t = STEP * np.arange(600)
+    runs = [Run("run.csv", t, 0.5 + 0 * t, None, force, True) for force in (t, 3 - t)]
+    own = segments_of(runs, [SIGMA, SIGMA], 1.0, 0.0, 1.0, STEP, fine=False)
+    longer = own.coarser()
+    begins = longer.at[longer.fresh]
+    inside = np.setdiff1d(np.arange(len(longer.force)), begins)
+    inside = inside[inside < begins[1] - 1]
+    np.testing.assert_allclose(longer.force[inside], own.force[::GRID][inside], rtol=1e-12)
+    np.testing.assert_allclose(longer.force[begins], own.force[own.at[own.fresh]], atol=STEP)

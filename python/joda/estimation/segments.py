@@ -97,12 +97,16 @@ class Segments:
         return np.asarray((self.rows >= 0).sum(axis=1))
 
     def coarser(self) -> "Segments":
-        """The same in steps that are `GRID` times longer; forces are the mean over each."""
-        own = self.command
+        """The same in steps that are `GRID` times longer; commands are the mean over each, forces
+        that about its begin, which is where a step takes them to act."""
+        own, steps = self.command, np.arange(0, len(self.force), GRID)
+        about = steps[:, None] + np.arange(GRID) - GRID // 2
+        begins = self.at[self.fresh]
+        about = np.maximum(about, begins[np.searchsorted(begins, steps, side="right") - 1, None])
         return replace(
             self,
             h=GRID * self.h,
-            force=self.force.reshape(-1, GRID).mean(axis=1),
+            force=self.force[about].mean(axis=1),
             command=None if own is None else own.reshape(-1, GRID).mean(axis=1),
             at=self.at // GRID,
             step=self.step // GRID,
