@@ -223,8 +223,8 @@ import os, sys, time
 from joda.distributed import pool
 
 def slow(task):
-    open(os.path.join(task, f"begun {os.getpid()} {time.time()}"), "w").close()
     try:
+        open(os.path.join(task, f"begun {os.getpid()} {time.time()}"), "w").close()
         time.sleep(60)
     finally:
         open(os.path.join(task, f"left {os.getpid()}"), "w").close()
