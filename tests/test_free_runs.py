@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from lids import FRICTION, INERTIA, SIGMA, thrown
+from lids import FRICTION, INERTIA, SIGMA, SPAN, thrown
 
 from joda import compare
 from joda.diagnosis.baseline import fit_baseline
@@ -166,6 +166,23 @@ def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
     said = diagnosed(measured).diagnosis
     assert compared(tmp_path, 3).adequacy.verdict != "within_noise"
     assert "The model is adequate" not in said.summary
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [1.035, 0.965])
+def test_a_small_part_of_friction_is_a_correction_where_free_runs_tell_it(tmp_path, rng, times):
+    """What is less than 5 % off is worth a word where the model is denied as it is."""
+    measured = thrown(tmp_path, rng, 4, drag=1e-6, friction=times * FRICTION)
+    back = [replace(run, position=SPAN - run.position) for run in measured.runs[2:]]
+    runs = [*measured.runs[:2], *back]
+    found = diagnosed(measured.with_runs(runs, range(4)))
+    (told,) = found.diagnosis.corrections
+    assert (found.diagnosis.verdict, told.parameter) == ("adequate", "frictionloss")
+    assert told.factor == pytest.approx(times, abs=0.015)
+    assert "as it stands the model" in found.diagnosis.summary
+    assert found.corrected.profile.channels.friction.components[0].y[0] == pytest.approx(
+        times * FRICTION, abs=0.015 * FRICTION
+    )
 
 
 @pytest.mark.slow

@@ -221,9 +221,10 @@ def corrections(found: Sequence[Number], joint: Joint, least: float) -> tuple[Co
     return tuple(one.correction(joint) for one in found if one.parameter and one.off(least))
 
 
-def off(found: Sequence[Number]) -> str:
-    """Which numbers are off and by what, with their errors; empty if none is."""
-    return ", ".join(one.told for one in found if one.off(OFF))
+def off(found: Sequence[Number], least: float = OFF) -> str:
+    """Which numbers are off by a part at the least, and by what, with their errors; empty if none
+    is."""
+    return ", ".join(one.told for one in found if one.off(least))
 
 
 def off_beside(found: Sequence[Number]) -> str:

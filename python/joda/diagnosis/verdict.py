@@ -349,10 +349,11 @@ def _adequate(
         return unexplained(DRIFTING.format(left.free), AGAIN)
     if free and free.drifting:
         return unexplained(SLOWLY, AGAIN)
-    told_by = (free.numbers, free.errors) if free and free.denied else None
+    denying = free if free and free.denied else None
+    told_by, least = ((denying.numbers, denying.errors), 0.0) if denying else (None, OFF)
     own, worst_run = numbers(ranking.baseline, found=told_by), worst_missed(measured)
-    numbers_off = off(own)
-    if free and free.denied and not numbers_off:
+    numbers_off = off(own, least)
+    if denying and not numbers_off:
         return unexplained(TOGETHER, AGAIN)
     if numbers_off and moved_one_way(measured):
         experiment = _next(measured, ranking, weigh(ranking), one_way=True)
@@ -365,7 +366,7 @@ def _adequate(
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
     if numbers_off and worst_run and worst_run.fault:
         summary = WITH_THESE.format(WHOLE.format(missed), numbers_off, noise)
-    elif numbers_off and free and free.denied:
+    elif numbers_off and denying:
         summary = WITH_THESE.format(FREELY, numbers_off, noise)
     else:
         loose = missed > MULTIPLE and left.whole <= BEYOND
@@ -377,12 +378,12 @@ def _adequate(
     if doubt := other_unit(measured):
         summary += f" But {doubt}."
     report = _report(measured, "adequate", summary, (), None)
-    report = replace(report, corrections=corrections(own, measured.profile.joint, OFF))
+    report = replace(report, corrections=corrections(own, measured.profile.joint, least))
     driven = ranking.baseline.base.joint_model.servo is not None
     if doubt or (by_one_factor(own) and not driven):
         return Diagnosed(report)
-    x = free.numbers if free and free.denied else ranking.baseline.fit.x
-    return Diagnosed(report, corrected=corrected(ranking.baseline, own, OFF, x))
+    x = denying.numbers if denying else ranking.baseline.fit.x
+    return Diagnosed(report, corrected=corrected(ranking.baseline, own, least, x))
 
 
 def _report_uneven(measured: Measured) -> str:

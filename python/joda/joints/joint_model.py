@@ -35,7 +35,6 @@ class JointModel:
             all but rests; None: the plugin's, which hardly does.
         servo: what the joint's actuators make of commands; None where none acted.
         integrator: of the scene (`mujoco.mjtIntegrator`), for what MuJoCo simulates by itself.
-        trapezoidal: whether a simulator's steps are of second order, else they are MuJoCo's.
     """
 
     inertia: float
@@ -47,7 +46,6 @@ class JointModel:
     friction_row: Row | None = None
     servo: Servo | None = None
     integrator: int = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
-    trapezoidal: bool = False
 
     def simulator(self, profile: Profile, h: float) -> JointSimulator:
         """The joint with a profile, for steps of h (s)."""
@@ -62,7 +60,7 @@ class JointModel:
         row = friction_row(*self.friction_row, h) if self.friction_row else (0.0, 0.0)
         own = self.servo or Servo()
         servo = own.gain, own.stiffness, own.drag, own.low, own.high, own.delay
-        return JointSimulator(lo, hi, texts, *fixed, solref, solimp, row, servo, self.trapezoidal)
+        return JointSimulator(lo, hi, texts, *fixed, solref, solimp, row, servo)
 
     @property
     def with_plugin(self) -> "JointModel":
@@ -71,8 +69,7 @@ class JointModel:
 
     def stepped(self, h: float) -> "JointModel":
         """The same for steps of h (s) that stand for no steps, see `Servo.stepped`."""
-        servo = self.servo.stepped(h) if self.servo else None
-        return replace(self, servo=servo, trapezoidal=True)
+        return replace(self, servo=self.servo.stepped(h)) if self.servo else self
 
     def heavier(self, inertia: float, gravity: float, turned: float = 0.0) -> "JointModel":
         """The same with factors of its inertia and of gravity's force, and with the centre of mass
