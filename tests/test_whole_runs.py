@@ -31,3 +31,15 @@ def test_errors_explain_the_runs_of_a_right_model_and_not_those_of_a_wrong_one(f
     assert len(baseline.fit.x)
     wrong = replace(baseline, fit=replace(baseline.fit, x=3.0 * baseline.fit.x))
     assert worst(train, wrong).free > worst(train, baseline).free
+
+
+def test_a_start_is_sought_as_mujoco_moves_the_joint():
+    """The joint's own simulator takes the plugin's steps."""
+    train, _ = read(draw(12, "presliding_friction", True, family="household"))
+    replayer = train.replayer
+    assert replayer.simulator
+    for run, sigma in zip(train.runs, train.sigma, strict=True):
+        starts = np.array([(run.position[0], 0.0), (run.position[3], 0.1)])
+        known = run.time - run.time[0], starts, np.tile(run.force, (2, 1)), None
+        apart = np.abs(replayer._quickly(*known) - replayer._replay(*known))
+        assert apart.max() < 0.01 * sigma

@@ -11,6 +11,7 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
+from joda._core import JointSimulator
 from joda.joints.joint_model import JointModel
 from joda.joints.rig import rig
 from joda.measured import smoothing
@@ -131,8 +132,10 @@ class Replayer:
         self.servo = joint_model.servo
         self.model = rig(alone, profile, joint_model.friction_row, self.servo)
         self.model.opt.timestep = self.h = timestep
-        self.simulator = joint_model.simulator(profile, timestep) if self.model.nplugin else None
-        if not self.model.nplugin:
+        self.simulator: JointSimulator | None = None
+        if self.model.nplugin:
+            self.simulator = joint_model.simulator(profile, timestep)
+        else:
             self.model.opt.integrator = joint_model.integrator
         solref, solimp = joint_model.limits(profile, timestep)
         self.model.jnt_solref[0], self.model.jnt_solimp[0] = solref, solimp
