@@ -46,12 +46,13 @@ joda::JointSimulator MakeJointSimulator(double lo, double hi, const Texts& texts
                                         bool hinge, const std::array<double, 2>& solref,
                                         const std::array<double, 5>& solimp,
                                         const std::array<double, 2>& friction_row,
-                                        const std::array<double, 6>& servo) {
+                                        const std::array<double, 6>& servo, bool trapezoidal) {
   const joda::Body body = {{lo, hi}, inertia, row_inertia, weight,
                            hinge,    solref,  solimp,      friction_row};
   const auto [gain, stiffness, damping, low, high, delay] = servo;
   return joda::JointSimulator(body, {gain, stiffness, damping, {low, high}, delay},
-                              Pointers(texts).data());
+                              Pointers(texts).data(),
+                              trapezoidal ? joda::Scheme::kTrapezoidal : joda::Scheme::kEngine);
 }
 
 std::vector<joda::JointSimulator::Start> ReadStarts(const Dense<std::int64_t>& at,
@@ -147,8 +148,9 @@ Raises:
   module.def("stop_damping", &joda::StopDamping, py::arg("restitution"),
              "Damping, times the timestep, of an end stop with this restitution, 0 <= it < 1.");
 
-  py::class_<joda::JointSimulator>(module, "JointSimulator",
-                                   R"(A joint by itself, stepped as MuJoCo does with the plugin.
+  py::class_<joda::JointSimulator>(
+      module, "JointSimulator",
+      R"(A joint by itself, stepped as MuJoCo does with the plugin, or more accurately.
 
 Units are those of a hinge; for a slide read N, m and kg.
 
@@ -164,6 +166,8 @@ Args:
     plugin's row.
   servo: of an actuator that exerts gain (command - stiffness q) - damping v: gain, stiffness,
     damping, the least and the largest force, and the delay of commands, s.
+  trapezoidal: whether damping acts by the mean velocity of a step, and friction turns when the
+    joint does, not with the step, which is of second order; else all as MuJoCo steps.
 
 Raises:
   ValueError: a text cannot be read, or a number is impossible; one sentence says why.)")
@@ -171,7 +175,8 @@ Raises:
            py::arg("inertia"), py::arg("row_inertia"), py::arg("weight"), py::arg("hinge"),
            py::arg("solref"), py::arg("solimp"),
            py::arg("friction_row") = std::array<double, 2>{0, 0},
-           py::arg("servo") = std::array<double, 6>{1, 0, 0, -HUGE_VAL, HUGE_VAL, 0})
+           py::arg("servo") = std::array<double, 6>{1, 0, 0, -HUGE_VAL, HUGE_VAL, 0},
+           py::arg("trapezoidal") = false)
       .def("replay", &Replay, py::arg("force"), py::arg("at"), py::arg("start"), py::arg("fresh"),
            py::arg("h"), py::arg("command") = py::none(),
            R"(Steps through forces, set to a start here and there.

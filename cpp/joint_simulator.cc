@@ -16,6 +16,9 @@ constexpr double kLeastImpedance = 0.0001, kMostImpedance = 0.9999, kLeastWidth 
 // Runs that are replayed at once.
 constexpr size_t kSideBySide = 2;
 
+// Part of a step that tells how fast the joint slows down before it turns.
+constexpr double kProbe = 1e-3;
+
 // Friction: force = offset - stiff a, within +-bound.
 struct Friction {
   double offset, stiff, bound;
@@ -34,6 +37,13 @@ Motion Solve(double mass, double drive, const Friction& friction) {
   return {stuck, held};
 }
 
+// Part of the damping that acts by the velocity after a step, the rest by that before: a half is of
+// second order, but more is needed where a step would damp the velocity beyond rest.
+double Implicit(Scheme scheme, double h, double drag, double inertia) {
+  if (scheme == Scheme::kEngine || h * drag >= 1e3 * inertia) return 1;
+  return h * drag > 2 * inertia ? 1 - inertia / (h * drag) : 0.5;
+}
+
 bool IsFinite(const JointSimulator::State& state) {
   return std::isfinite(state.q + state.v + state.held + state.loose.gap + state.loose.velocity +
                        state.remembered);
@@ -42,8 +52,11 @@ bool IsFinite(const JointSimulator::State& state) {
 }  // namespace
 
 JointSimulator::JointSimulator(const Body& body, const Servo& servo,
-                               const char* const texts[kTexts])
-    : body_(body), servo_(servo), profile_(ParseProfile("", body.range[0], body.range[1], texts)) {
+                               const char* const texts[kTexts], Scheme scheme)
+    : body_(body),
+      servo_(servo),
+      profile_(ParseProfile("", body.range[0], body.range[1], texts)),
+      scheme_(scheme) {
   if (!(body_.range[0] < body_.range[1])) {
     throw std::invalid_argument("the range must be two increasing numbers");
   }
@@ -92,7 +105,8 @@ void JointSimulator::Advance(double h, double force, double command, State* stat
                   resist(v + state->loose.velocity), state->loose);
   }
   const FrictionBounds bounds = behind.On(own).dry;
-  double drag = behind.On(own).drag + behind.scale * yielding;
+  double drag = behind.On(own).drag;
+  yielding *= behind.scale;
 
   const double bound = bounds.Bound(), held = std::clamp(state->held, -bound, bound);
   const FrictionRow row =
@@ -104,9 +118,10 @@ void JointSimulator::Advance(double h, double force, double command, State* stat
     friction = {-D * per_second * v, D, bound};
   }
 
-  const double mass = body_.inertia + h * drag;
-  const double drive =
-      behind.scale * (spring + weight + pushed) + behind.force + servo + bounds.Shift() - drag * v;
+  const double mass =
+      body_.inertia + h * (Implicit(scheme_, h, drag, body_.inertia) * drag + yielding);
+  const double drive = behind.scale * (spring + weight + pushed) + behind.force + servo +
+                       bounds.Shift() - (drag + yielding) * v;
   Motion motion = Solve(mass, drive, friction);
   if (q < body_.range[0] || q > body_.range[1]) {
     const Limit limit = LimitRow(h, q, v);
@@ -125,6 +140,23 @@ void JointSimulator::Advance(double h, double force, double command, State* stat
     state->remembered = Remember(effects->learned, h, state->v, state->remembered);
   }
   if (has_load) state->loose = Settle(effects->backlash, h, behind, state->v);
+}
+
+// In the leapfrog that steps of symplectic Euler are, v is the velocity half a step before q: where
+// it turns within the step, friction does so too.
+void JointSimulator::Step(double h, double force, double command, State* state) const {
+  const State before = *state;
+  Advance(h, force, command, state);
+  if (scheme_ == Scheme::kEngine || before.v * state->v > 0 || std::abs(before.v) < kStill) return;
+  State turned = before;
+  Advance(kProbe * h, force, command, &turned);
+  const double turns = kProbe * h * before.v / (before.v - turned.v);  // after that time
+  if (!(turns > kProbe * h && turns < (1 - kProbe) * h)) return;
+  turned = before;
+  Advance(turns, force, command, &turned);
+  Advance(h - turns, force, command, &turned);
+  turned.q = before.q + h * turned.v;
+  *state = turned;
 }
 
 void JointSimulator::Restart(const Start& start, bool fresh, State* state) const {
@@ -197,7 +229,7 @@ void JointSimulator::Replay(double h, const double* force, const double* command
         restart(&run);
       }
       before[run.k] = run.state.q;
-      Advance(h, force[run.k], commanded(run, run.k), &run.state);
+      Step(h, force[run.k], commanded(run, run.k), &run.state);
       after[run.k++] = run.state.q;
       if (!IsFinite(run.state)) lose(&run);
     }

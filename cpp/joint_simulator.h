@@ -29,6 +29,13 @@ struct Body {
   std::array<double, 2> friction_row = {0, 0};
 };
 
+// How steps stand for the motion between them.
+enum class Scheme {
+  kEngine,      // as MuJoCo steps with the plugin
+  kTrapezoidal  // second order: damping acts by the mean velocity of a step, and friction turns
+                // when the joint does, not with the step
+};
+
 // An actuator on the joint: gain (command - stiffness q) - damping v, within limits.
 struct Servo {
   double gain = 1;
@@ -56,7 +63,8 @@ class JointSimulator {
   };
 
   // Throws std::invalid_argument, one sentence; the texts are as in ParseProfile.
-  JointSimulator(const Body& body, const Servo& servo, const char* const texts[kTexts]);
+  JointSimulator(const Body& body, const Servo& servo, const char* const texts[kTexts],
+                 Scheme scheme = Scheme::kEngine);
 
   // One step of h under the applied force and the actuator's command.
   void Advance(double h, double force, double command, State* state) const;
@@ -77,6 +85,9 @@ class JointSimulator {
   };
 
   void Restart(const Start& start, bool fresh, State* state) const;
+
+  // One step as the scheme has it.
+  void Step(double h, double force, double command, State* state) const;
   double Weight(double q) const;
   double Actuate(double command, double q, double v) const;
   Limit LimitRow(double h, double q, double v) const;
@@ -85,6 +96,7 @@ class JointSimulator {
   Body body_;
   Servo servo_;
   Profile profile_;
+  Scheme scheme_;
 };
 
 }  // namespace joda

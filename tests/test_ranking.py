@@ -11,10 +11,10 @@ from joda.diagnosis import baseline as fits
 from joda.diagnosis import search
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.hypotheses import Units, hypotheses
-from joda.diagnosis.hypotheses.base import KNOWN_SHAPE
+from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
 from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
-from joda.diagnosis.hypothesis_fits import beside, joined
+from joda.diagnosis.hypothesis_fits import beside, joined, price
 from joda.diagnosis.search import NARROWED, WELLS, WORST, _shown_without_impacts, narrowed, rank
 from joda.diagnosis.selection import decide, evidence, excess_of, weigh
 from joda.diagnosis.verdict import diagnosed
@@ -187,6 +187,26 @@ def test_one_segment_of_many_tells_of_no_effect(ranked, disturbed, verdict):
     told = evidence(one).gain + first.cost
     assert told == pytest.approx(gain.sum() - gain.max())
     assert decide(evidence(one)).verdict == verdict
+
+
+def test_a_number_costs_what_the_data_tell_of_it(baseline):
+    """Nothing where they tell nothing, or only of its sum with one of the model's own; a uniform
+    number has a variance of a twelfth of its width's square; never more than for BIC."""
+    (hypothesis,) = [one for one in baseline.hypotheses if one.effect == "quadratic_damping"]
+    wide = replace(hypothesis, unknowns=unknowns_of((0.0, 1.0, 0.01), (-2.0, 2.0, 0.01)))
+
+    def cost(*information):
+        fit = replace(baseline.fit, x=np.zeros(3), information=np.array(information, float))
+        return price(wide, fit, samples=100.0)
+
+    none = [100, 0, 0], [0, 0, 0], [0, 0, 0]
+    assert cost(*none) == pytest.approx(0.0)
+    assert cost([100, 0, 0], [0, 12, 0], [0, 0, 0]) == pytest.approx(np.log(2))
+    assert cost([100, 0, 0], [0, 0, 0], [0, 0, 6]) == pytest.approx(np.log(1 + 6 * 16 / 12))
+    assert cost([50, 50, 0], [50, 50, 0], [0, 0, 0]) == pytest.approx(0.0)
+    assert cost([100, 0, 0], [0, 1e9, 0], [0, 0, 1e9]) == pytest.approx(2 * np.log(100))
+    without = price(wide, replace(baseline.fit, information=None), samples=100.0)
+    assert without == pytest.approx(2 * np.log(100))
 
 
 def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):

@@ -265,7 +265,7 @@ def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
 
 @pytest.mark.parametrize(
     ("timestep", "length", "usual", "step"),
-    [(2e-3, 0.1, 0.1, 1 / 3000), (5e-4, 0.45, 0.45, 1.5e-3), (5e-4, 1.5, 0.45, 1.5e-3)],
+    [(2e-3, 0.1, 0.1, 1 / 1500), (5e-4, 0.45, 0.45, 3e-3), (5e-4, 1.5, 0.45, 3e-3)],
 )
 def test_steps_are_short_for_the_windows(timestep, length, usual, step):
     assert _step(timestep, length, usual, STEPS) == pytest.approx(step)

@@ -24,7 +24,7 @@ def set_profile(
 ) -> None: ...
 
 class JointSimulator:
-    """A joint by itself, stepped as MuJoCo does with the plugin."""
+    """A joint by itself, stepped as MuJoCo does with the plugin, or more accurately."""
 
     def __init__(
         self,
@@ -39,6 +39,7 @@ class JointSimulator:
         solimp: Sequence[float] | NDArray[np.float64],
         friction_row: Sequence[float] = (0.0, 0.0),
         servo: Sequence[float] = (1.0, 0.0, 0.0, -inf, inf, 0.0),
+        trapezoidal: bool = False,
     ) -> None: ...
     def replay(
         self,

@@ -1,6 +1,6 @@
 """A model fitted to measured runs, and what it may lack, fitted together with it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -31,8 +31,10 @@ from joda.profile import Profile
 Array = NDArray[np.float64]
 
 CLEARLY, CALM = 10.0, 0.1
-"""Gain in loss from which runs tell that friction yields as MuJoCo's own does, and what that may
-leave per sample beyond noise."""
+"""Gain in loss from which runs tell that MuJoCo made them, in its steps or with a friction that
+yields as its own does, and what that may leave per sample beyond noise."""
+FINER = 4.0
+"""Steps for one of the scene's, from which runs cannot tell that they were made in these."""
 RESTITUTION = "end_stop_restitution"
 """Effect that only impacts tell of."""
 
@@ -140,8 +142,27 @@ class CoarseFit:
         return min(self.fits, key=lambda fit: fit.loss)
 
 
-def _fitted(estimator: SegmentEstimator, base: BaseModel, near: Array | None) -> tuple[Fit, Fit]:
+@dataclass(frozen=True)
+class _Fitted:
     """A model's strengths fitted, and as they are given."""
+
+    estimator: SegmentEstimator
+    base: BaseModel
+    fit: Fit
+    given: Fit
+
+    @property
+    def loss(self) -> float:
+        """Per sample: steps of another length cut segments a little differently."""
+        return self.fit.loss / max(self.estimator.samples, 1.0)
+
+    @property
+    def calm(self) -> bool:
+        """Whether hardly more than noise is left, so that nothing else is missing."""
+        return excess(self.fit.loss, max(self.estimator.samples, 1.0)) < CALM
+
+
+def _fitted(estimator: SegmentEstimator, base: BaseModel, near: Array | None) -> _Fitted:
     as_it_is = base.unknowns.mean
     given = replace(estimator.started(base.simulator(as_it_is)), x=as_it_is)
     tried = [(as_it_is, estimator.segments.start), (as_it_is, given.start)]
@@ -150,7 +171,23 @@ def _fitted(estimator: SegmentEstimator, base: BaseModel, near: Array | None) ->
     away = [replace(estimator.started(base.simulator(x)), x=x) for x in base.beginnings()]
     tried += [(one.x, one.start) for one in away if one.loss < given.loss]
     fits = [estimator.fit(base.simulator, base.unknowns, x, start) for x, start in tried]
-    return estimator.refit(base.simulator, base.unknowns, min(fits, key=lambda f: f.loss)), given
+    fit = estimator.refit(base.simulator, base.unknowns, min(fits, key=lambda f: f.loss))
+    return _Fitted(estimator, base, fit, given)
+
+
+def _ways(measured: Measured, length: float | None, near: Array | None) -> Iterator[_Fitted]:
+    """The model in accurate steps, with a friction that holds; then as MuJoCo may have moved it."""
+    own = measured.own_row if measured.profile.channels.friction.components else None
+    cut = [segments_for(measured, length)]
+    if measured.runs and FINER * measured.timestep >= cut[0].h:
+        cut.append(segments_for(measured, length, fine=False))
+    for accurate, segments in zip((True, False), cut, strict=False):
+        estimator = SegmentEstimator(segments, usable(segments))
+        h, joint_model = segments.h, joint_model_for(measured, segments.h)
+        for row in (None, own) if own and measured.runs else (None,):
+            moving = replace(joint_model, friction_row=row)
+            plain = base_of(measured.profile, moving, h, measured.trust, accurate)
+            yield _fitted(estimator, corrected_base(plain, measured.doubtful), near)
 
 
 def fit_baseline(
@@ -158,8 +195,9 @@ def fit_baseline(
 ) -> Baseline:
     """Fits the model's own strengths.
 
-    Its native friction may yield as MuJoCo's own row does, where the runs are of such a joint; else
-    it holds as the plugin's, and as that of real joints.
+    Where the runs are clearly such as MuJoCo makes them, it is simulated in the scene's own steps,
+    or its native friction yields as MuJoCo's own row does; else steps are accurate and friction
+    holds, as the plugin's and as that of real joints.
 
     Args:
         measured: the joint and its runs.
@@ -167,24 +205,11 @@ def fit_baseline(
         near: factors of the strengths with which a fit begins besides, as shorter segments told
             them: in longer ones a model that is far off is fitted less easily.
     """
-    segments = segments_for(measured, length)
-    estimator = SegmentEstimator(segments, usable(segments))
-    joint_model, own = joint_model_for(measured, segments.h), measured.own_row
-
-    def based(joint_model: JointModel) -> BaseModel:
-        plain = base_of(measured.profile, joint_model, segments.h, measured.trust)
-        return corrected_base(plain, measured.doubtful)
-
-    base = based(joint_model)
-    fit, given = _fitted(estimator, base, near)
-    if measured.runs and own and measured.profile.channels.friction.components:
-        yielding = based(replace(joint_model, friction_row=own))
-        fit_so, given_so = _fitted(estimator, yielding, near)
-        explained = (
-            excess(fit_so.loss, max(estimator.samples, 1.0)) < CALM
-        )  # else something else is missing
-        if explained and fit_so.loss < fit.loss - CLEARLY:
-            base, fit, given = yielding, fit_so, given_so
-    every = hypotheses(units_of(segments, measured), measured.templates, measured.profile)
-    points = initial_points(estimator.coarser, base.coarser(), given, fit)
-    return Baseline(estimator, base, measured.joint_model, fit, points, tuple(every))
+    usual, *others = _ways(measured, length, near)
+    best = min((one for one in others if one.calm), key=lambda one: one.loss, default=usual)
+    clearly = CLEARLY / max(usual.estimator.samples, 1.0)
+    found = best if best.loss < usual.loss - clearly else usual
+    estimator, base = found.estimator, found.base
+    every = hypotheses(units_of(estimator.segments, measured), measured.templates, measured.profile)
+    points = initial_points(estimator.coarser, base.coarser(), found.given, found.fit)
+    return Baseline(estimator, base, measured.joint_model, found.fit, points, tuple(every))

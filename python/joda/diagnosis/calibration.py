@@ -196,12 +196,12 @@ def as_recorded(
     measured: Measured, found: Calibration, length: float
 ) -> tuple[SegmentEstimator, Nuisances]:
     """Runs as they were recorded in segments of a length (s), and a calibration's numbers there."""
-    segments = segments_for(measured, length)
+    fitted = found.numbers.base
+    segments = segments_for(measured, length, fine=fitted.accurate)
     joint_model = replace(
-        joint_model_for(measured, segments.h),
-        friction_row=found.numbers.base.joint_model.friction_row,
+        joint_model_for(measured, segments.h), friction_row=fitted.joint_model.friction_row
     )
-    base = base_of(measured.profile, joint_model, segments.h, measured.trust)
+    base = base_of(measured.profile, joint_model, segments.h, measured.trust, fitted.accurate)
     return SegmentEstimator(segments, usable(segments)), replace(found.numbers, base=base)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigvalsh
 from scipy.optimize import minimize
 
 from joda._core import JointSimulator
@@ -287,9 +288,33 @@ def simplex_searched(
 
 def scored(estimator: SegmentEstimator, hypothesis: Hypothesis, fit: Fit) -> FittedHypothesis:
     """A fit of a hypothesis, with what its numbers cost."""
-    samples = estimator.samples
-    cost = hypothesis.neg_log_prior + len(hypothesis.unknowns.low) * np.log(max(samples, 2.0))
+    cost = price(hypothesis, fit, estimator.samples)
     return FittedHypothesis(hypothesis, fit, fit.loss + cost, cost)
+
+
+def price(hypothesis: Hypothesis, fit: Fit, samples: float, share: float = 1.0) -> float:
+    """What a hypothesis and its numbers cost, in loss.
+
+    Twice the logarithm of how much the data narrow the numbers, from their bounds and what is known
+    of them (Laplace's method: Kass and Raftery 1995, eq. 5), along each principal axis at most
+    that of BIC, ln(samples): what the data do not tell of costs nothing.
+
+    Args:
+        hypothesis: of how rare an effect, and what numbers.
+        fit: of them, the last ones; as for BIC where it made no step.
+        samples: how many count.
+        share: of what the fit's samples tell, what counts.
+    """
+    own, k = hypothesis.unknowns, len(hypothesis.unknowns.low)
+    most = float(np.log(max(samples, 2.0)))
+    if fit.information is None:
+        return hypothesis.neg_log_prior + k * most
+    base, across = fit.information[:-k, :-k], fit.information[:-k, -k:]
+    told = fit.information[-k:, -k:] - own.known
+    told -= across.T @ np.linalg.pinv(base, hermitian=True) @ across
+    before = own.known + np.diag(12 / (own.high - own.low) ** 2)  # of a uniform distribution
+    narrowed = eigvalsh(before + share * told, before)
+    return hypothesis.neg_log_prior + float(np.log(np.maximum(narrowed, 1.0)).clip(max=most).sum())
 
 
 def usual(estimator: SegmentEstimator, fit: Fit) -> float:

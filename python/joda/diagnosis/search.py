@@ -10,7 +10,7 @@ import numpy as np
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, CoarseFit
 from joda.diagnosis.hypotheses import Hypothesis
-from joda.diagnosis.hypothesis_fits import FittedHypothesis, beside, joined
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, beside, joined, price
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.profile import Profile
 
@@ -275,8 +275,8 @@ def _scored(
     n_effective = float(estimator.counts.sum()) if level > WORST else samples
 
     def scored(one: FittedHypothesis) -> FittedHypothesis:
-        loss = rescaled(estimator, one.fit, level) * n_effective / samples
-        cost = one.hypothesis.neg_log_prior + len(one.x) * np.log(max(n_effective, 2.0))
-        return replace(one, score=loss + cost)
+        count = n_effective / samples
+        cost = price(one.hypothesis, one.fit, n_effective, count / level)
+        return replace(one, score=rescaled(estimator, one.fit, level) * count + cost)
 
     return tuple(_best(map(scored, candidates))), level, n_effective

@@ -53,6 +53,7 @@ class BaseModel:
         h: step, s.
         places: channel and number of each component that has a factor.
         unknowns: the numbers, the factors first.
+        accurate: whether its steps stand for none; else they are MuJoCo's.
     """
 
     profile: Profile
@@ -60,6 +61,7 @@ class BaseModel:
     h: float
     places: tuple[tuple[str, int], ...]
     unknowns: Unknowns
+    accurate: bool
 
     @property
     def count(self) -> int:
@@ -116,11 +118,21 @@ class BaseModel:
 
     def with_profile(self, profile: Profile, x: Array) -> JointSimulator:
         """The joint with its numbers but another profile."""
-        return self.own(x).stepped(self.h).simulator(profile, self.h)
+        return self.stepped(self.own(x)).simulator(profile, self.h)
+
+    def stepped(self, joint_model: JointModel) -> JointModel:
+        """A joint for its steps."""
+        return joint_model.stepped(self.h) if self.accurate else joint_model
 
 
-def base_of(profile: Profile, joint_model: JointModel, h: float, trust: Trust = USUAL) -> BaseModel:
-    """The model as it is; `trust`: how far off its numbers may be."""
+def base_of(
+    profile: Profile,
+    joint_model: JointModel,
+    h: float,
+    trust: Trust = USUAL,
+    accurate: bool = True,
+) -> BaseModel:
+    """The model as it is; `trust`: how far off its numbers may be; the rest: see `BaseModel`."""
     shared = shared_damping(profile, joint_model.servo)
     places = tuple(
         (name, number)
@@ -134,7 +146,7 @@ def base_of(profile: Profile, joint_model: JointModel, h: float, trust: Trust = 
     unknowns = Unknowns(np.zeros(k), np.full(k, most), np.full(k, 0.01), np.ones(k), prior_stds)
     if joint_model.servo is not None:
         unknowns = unknowns.and_(_of_servo(joint_model.servo, trust))
-    return BaseModel(profile, joint_model, h, places, unknowns)
+    return BaseModel(profile, joint_model, h, places, unknowns, accurate)
 
 
 def shared_damping(profile: Profile, servo: Servo | None) -> list[tuple[str, int]]:

@@ -52,12 +52,15 @@ class Fit:
         start: of the segments, shape (m, d).
         squares: sum of squared residuals of each segment, shape (m,).
         loss: robust, with the numbers' penalty; twice a negative log-likelihood.
+        information: inverse covariance of the numbers where the fit made its last step, with what
+            is known of them before; shape (k, k). None where it made none.
     """
 
     x: Array
     start: Array
     squares: Array
     loss: float
+    information: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -307,7 +310,7 @@ class SegmentEstimator:
         x = np.clip(x, unknowns.low, unknowns.high)
         squares = self.squares(make(x), start)[1]
         loss = self.loss(squares, cauchy_scale) + unknowns.penalty(x)
-        damping, central = 1e-3, False
+        damping, central, H = 1e-3, False, None
         for _ in range(iterations):
             about = self.linear(make, unknowns, x, start, cauchy_scale, central)
             H, gradient = about.normal()
@@ -326,12 +329,12 @@ class SegmentEstimator:
                     damping = max(damping / 10, 1e-6)
                     break
                 damping *= 10
-            told(Fit(x, start, squares, loss))
+            told(Fit(x, start, squares, loss, H))
             if before - loss < LOSS_TOLERANCE:
                 if central:
                     break
                 damping, central = 1e-3, True  # one-sided differences are cheap, but biased
-        return Fit(x, start, squares, loss)
+        return Fit(x, start, squares, loss, H)
 
 
 def _step(H: Array, gradient: Array, damping: float, unknowns: Unknowns, x: Array) -> Array:

@@ -130,9 +130,8 @@ class Nuisances:
 
     def with_profile(self, profile: Profile, x: Array) -> JointSimulator:
         """The joint with them, but another profile."""
-        h = self.base.h
-        own = self.body(self.base.own(x), x).stepped(h)
-        return MeasuredSimulator(own.simulator(profile, h), self.sensing(x))  # type: ignore[return-value]
+        own = self.base.stepped(self.body(self.base.own(x), x))
+        return MeasuredSimulator(own.simulator(profile, self.base.h), self.sensing(x))  # type: ignore[return-value]
 
     def values(self, x: Array) -> dict[NuisanceName, float]:
         """Factors, and the other numbers in their units; more may follow in x."""
@@ -220,7 +219,7 @@ def with_numbers(own: Nuisances) -> BaseModel:
     """A model whose numbers are its strengths and these; itself without such."""
     base = own.base
     plain = base.profile, base.joint_model, base.h, base.places
-    return CorrectedBase(*plain, own.unknowns, own) if own.names else base
+    return CorrectedBase(*plain, own.unknowns, base.accurate, own) if own.names else base
 
 
 def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:

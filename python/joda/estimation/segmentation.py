@@ -26,7 +26,7 @@ all the same sample."""
 STILL, CREEPS = 6.0, 3.0
 """Range of the positions in a segment, in noises, up to which the joint may rest there; and how
 much its two halves may differ, in standard errors."""
-STEPS, DRIVEN_STEPS = 300, 200
+STEPS, DRIVEN_STEPS = 150, 200
 """Steps that a segment has at least; and where an actuator acts, whose commands come in their
 own steps."""
 HOP = 0.25

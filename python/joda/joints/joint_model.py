@@ -35,6 +35,7 @@ class JointModel:
             all but rests; None: the plugin's, which hardly does.
         servo: what the joint's actuators make of commands; None where none acted.
         integrator: of the scene (`mujoco.mjtIntegrator`), for what MuJoCo simulates by itself.
+        trapezoidal: whether a simulator's steps are of second order, else they are MuJoCo's.
     """
 
     inertia: float
@@ -46,6 +47,7 @@ class JointModel:
     friction_row: Row | None = None
     servo: Servo | None = None
     integrator: int = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+    trapezoidal: bool = False
 
     def simulator(self, profile: Profile, h: float) -> JointSimulator:
         """The joint with a profile, for steps of h (s)."""
@@ -60,7 +62,7 @@ class JointModel:
         row = friction_row(*self.friction_row, h) if self.friction_row else (0.0, 0.0)
         own = self.servo or Servo()
         servo = own.gain, own.stiffness, own.drag, own.low, own.high, own.delay
-        return JointSimulator(lo, hi, texts, *fixed, solref, solimp, row, servo)
+        return JointSimulator(lo, hi, texts, *fixed, solref, solimp, row, servo, self.trapezoidal)
 
     @property
     def with_plugin(self) -> "JointModel":
@@ -69,7 +71,8 @@ class JointModel:
 
     def stepped(self, h: float) -> "JointModel":
         """The same for steps of h (s) that stand for no steps, see `Servo.stepped`."""
-        return replace(self, servo=self.servo.stepped(h)) if self.servo else self
+        servo = self.servo.stepped(h) if self.servo else None
+        return replace(self, servo=servo, trapezoidal=True)
 
     def heavier(self, inertia: float, gravity: float, turned: float = 0.0) -> "JointModel":
         """The same with factors of its inertia and of gravity's force, and with the centre of mass

@@ -33,6 +33,8 @@ CATCH = (0.0, 0.3, 0.01, np.nan, 0.9)
 """Dry friction of a catch, in units of its force."""
 LEAN, USUAL_LEAN = (-1.2, 1.2, 0.03), 0.4
 """Logarithm of the ratio of a well's flanks: bounds and step; its doubt before the data."""
+TOP, USUAL_TOP = (0.05, 0.8, 0.02), (0.33, 0.12)
+"""Where a latch's barrier is highest, in units of it: bounds and step; what it is before the data."""
 BARRIER = (0.2, 3.0, 0.02, 0.05, 12.0)
 """Of a latch, in units of its hold."""
 RATIO = (0.0, 3.0, 0.02)
@@ -225,14 +227,15 @@ def _spring(units: Units, name: str) -> Iterator[Hypothesis]:
 
 def _snap(units: Units, name: str) -> Hypothesis:
     """A latch: how it holds, its barrier, the hold at the very end, where it tips over, where it
-    holds most, friction, how far it reaches."""
+    holds most, friction, where its barrier is highest, how far it reaches."""
     low = name.endswith("low_end")
     place = "low" if low else "high"
 
     def part(x: Array) -> Component:
-        hold, share, end, tip, most = (float(value) for value in x[:5])
+        hold, share, end, tip, most, _, top = (float(value) for value in x[:7])
         barrier, rest = share * hold, 1 - tip
-        at = np.array((0.0, most * tip, tip, tip + 0.33 * rest, tip + 0.66 * rest, 1.0))
+        slope = tip + rest * np.array((top, 0.5 * (1 + top)))
+        at = np.array((0.0, most * tip, tip, *slope, 1.0))
         y = units.force * np.array((-end * hold, -hold, 0.0, barrier, TAIL * barrier, 0.0))
         if not low:
             at, y = 1 - at[::-1], -y[::-1]
@@ -248,12 +251,14 @@ def _snap(units: Units, name: str) -> Hypothesis:
 
     bounds, tries = places(place, WIDEST)
     own: Bounds = [STRENGTH, BARRIER, (0.0, 1.0, 0.02)]
-    own += [(0.3, 0.75, 0.01, 0.1, 0.92), (0.05, 0.7, 0.02, np.nan, 0.95), CATCH]
+    own += [(0.3, 0.75, 0.01, 0.1, 0.92), (0.05, 0.7, 0.02, np.nan, 0.95), CATCH, TOP]
+    first = TRIAL, 0.8, 0.5
+    then = 0.45, 0.0, USUAL_TOP[0]
     return Hypothesis(
         name,
         "both",
-        unknowns_of(*own, *bounds),
-        np.array([(TRIAL, 0.8, 0.5, tip, 0.45, 0.0, *t) for t in tries for tip in (0.4, 0.6)]),
+        known(unknowns_of(*own, *bounds), 6, *USUAL_TOP),
+        np.array([(*first, tip, *then, *t) for t in tries for tip in (0.4, 0.6)]),
         write,
         reach,
         lambda x: units.force * float(x[0]) * max(1.0, float(x[1])),
