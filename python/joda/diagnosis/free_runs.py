@@ -6,9 +6,11 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from joda.diagnosis.baseline import Baseline
+from joda.estimation.base_model import BaseModel
+from joda.estimation.estimator import Fit, SegmentEstimator
+from joda.estimation.segmentation import segments_of
 from joda.measured.instability import followed
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
@@ -22,20 +24,15 @@ BEYOND = 5.0
 """How many times what errors explain of it a model that is adequate may miss a whole run by."""
 TRAVELLED = 0.3
 """Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
-FINE, TRIES, SETTLED = 0.05, 10, 1e-3
-"""Strengths fitted to whole free runs: change that tells slopes, most steps, least gain of one."""
 MOST = 0.9
 """Part of all samples that free runs must hold, before an end, to tell of all."""
-STEP = 0.01
-"""A change of a factor; that of another number is its own step of differences."""
 APART = 5e-3
 """Part of a strength by which another simulator's may differ."""
-FINER, FEW = 4, 4
-"""Steps for one of the scene's, and most steps of the fit then: what the scene's step makes of a
-motion is no effect that is missing."""
+FINER = 4
+"""Steps for one of the scene's, for whole runs of a joint that an actuator drives."""
 CHANCE = 1e-4
 """Probability, for a model that lacks nothing, of a drift of free runs as clear as one that counts:
-strengths are fitted in a few steps only, and two simulators differ a little."""
+two simulators differ a little."""
 DRAWS = 8
 """Strengths that are drawn, to tell how far their errors move a run."""
 
@@ -141,53 +138,77 @@ class FreeRuns:
 
 
 def free_runs(measured: Measured, baseline: Baseline) -> FreeRuns | None:
-    """Fits the model's strengths to its free runs, each from the start that suits it best.
+    """Fits the model's strengths to its free runs, each as one segment.
 
     Args:
         measured: the joint and its runs.
-        baseline: the model fitted to their segments.
+        baseline: the model fitted to their usual segments.
 
     Returns:
         None if no run is free.
     """
-    parts, base = free_parts(measured), baseline.base
-    if not parts:
+    if not (parts := free_parts(measured)):
         return None
-    count, errors = len(baseline.fit.x), np.sqrt(np.diag(baseline.covariance))
-    near: list[Array | None] = [None] * len(parts)
-
-    def left(strengths: Array, finer: int) -> list[Array]:
-        replayer, out = _replayer(measured, baseline, strengths, finer), []
-        for k, (run, sigma) in enumerate(parts):
-            found, near[k] = replayer.followed(run, sigma, near[k])
-            out.append(found / sigma)
-        return out
-
-    first, unit = base.unknowns.mean, base.unknowns.step / STEP
-    x = first
-    drifting = all(drifts(parts, left(x, finer)) < CHANCE for finer in (1, FINER))
-    denied, near = drifting, [None] * len(parts)
-    begin = np.where(np.arange(count) < len(base.places), first, baseline.fit.x)
-    y = 1 + (begin - first) / unit
-    for finer, tries in ((1, TRIES), (FINER, FEW)):
-        if not drifting or not count:
-            break
-        found = least_squares(
-            lambda y, finer=finer: np.concatenate(left(first + unit * (y - 1), finer)),
-            y,
-            bounds=tuple(1 + (b - first) / unit for b in (base.unknowns.low, base.unknowns.high)),
-            diff_step=FINE / finer**2,
-            max_nfev=tries,
-            ftol=SETTLED,
-        )
-        y = found.x
-        x = first + unit * (y - 1)
-        drifting = drifts(parts, left(x, finer)) < CHANCE
-        spread = np.linalg.pinv(found.jac.T @ found.jac) * max(np.mean(found.fun**2), 1.0)
-        errors = unit * np.hypot(np.sqrt(np.diag(spread)), APART)
+    ways = [_Whole(measured, baseline.base, parts, accurate) for accurate in (True, False)]
+    given = [way.given for way in ways]
+    fits = [way.fitted(baseline.fit.x) for way in ways]
+    best = int(np.argmin([fit.loss for fit in fits]))
     samples = sum(len(run.time) for run in measured.runs)
-    covered = sum(len(run.time) for run, _ in parts) / samples
-    return FreeRuns(denied, drifting, covered, x, errors)
+    return FreeRuns(
+        denied=all(way.denied(fit) for way, fit in zip(ways, given, strict=True)),
+        drifting=all(way.denied(fit) for way, fit in zip(ways, fits, strict=True)),
+        covered=sum(len(run.time) for run, _ in parts) / samples,
+        numbers=fits[best].x,
+        errors=ways[best].errors(fits[best]),
+    )
+
+
+class _Whole:
+    """A model and free runs as a whole, in accurate steps or in the scene's own: what a step makes
+    of a motion is no effect that is missing."""
+
+    def __init__(
+        self,
+        measured: Measured,
+        base: BaseModel,
+        parts: Sequence[tuple[Run, float]],
+        accurate: bool,
+    ) -> None:
+        runs, sigmas = zip(*parts, strict=True)
+        (lo, hi), inertia = measured.profile.joint.range, measured.joint_model.inertia
+        longest = max(float(np.ptp(run.time)) for run in runs)
+        self.parts = parts
+        self.segments = segments_of(
+            runs, sigmas, hi - lo, lo, inertia, measured.timestep, longest, accurate
+        )
+        self.estimator = SegmentEstimator(self.segments, np.ones(len(self.segments.at), bool))
+        self.base = base.in_steps(self.segments.h, accurate)
+
+    @property
+    def given(self) -> Fit:
+        """The model as it is, from the starts that suit it best."""
+        as_it_is = self.base.unknowns.mean
+        return replace(self.estimator.started(self.base.simulator(as_it_is)), x=as_it_is)
+
+    def fitted(self, near: Array) -> Fit:
+        """Its strengths fitted, from where they are and from what shorter segments told."""
+        make, unknowns = self.base.simulator, self.base.unknowns
+        begins = [(x, self.estimator.started(make(x)).start) for x in (unknowns.mean, near)]
+        fits = [self.estimator.fit(make, unknowns, x, start) for x, start in begins]
+        return self.estimator.refit(make, unknowns, min(fits, key=lambda fit: fit.loss))
+
+    def denied(self, fit: Fit) -> bool:
+        """Whether more is left than noise makes."""
+        missed = self.segments.misfit(self.base.simulator(fit.x), fit.start)
+        each = np.split(missed, np.cumsum([len(run.time) for run, _ in self.parts])[:-1])
+        left = [own / sigma for own, (_, sigma) in zip(each, self.parts, strict=True)]
+        return drifts(self.parts, left) < CHANCE
+
+    def errors(self, fit: Fit) -> Array:
+        """Standard errors of the fitted numbers, shape (k,)."""
+        unknowns = self.base.unknowns
+        found = self.estimator.covariance(self.base.simulator, unknowns, fit, unknowns.prior_std)
+        return np.asarray(np.hypot(np.sqrt(np.diag(found)), APART * np.abs(fit.x)))
 
 
 def _replayer(measured: Measured, baseline: Baseline, x: Array, finer: int) -> Replayer:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,9 +109,13 @@ class BaseModel:
         shared = shared_damping(self.profile, self.joint_model.servo)
         return own + [(place, float(np.exp(x[len(self.places) + 1]))) for place in shared]
 
-    def coarser(self) -> "BaseModel":
+    def in_steps(self, h: float, accurate: bool) -> Self:
+        """The same for steps of h, s."""
+        return replace(self, h=h, accurate=accurate)
+
+    def coarser(self) -> Self:
         """The same for `GRID` times longer steps."""
-        return replace(self, h=GRID * self.h)
+        return self.in_steps(GRID * self.h, self.accurate)
 
     def simulator(self, x: Array) -> JointSimulator:
         """The joint with its numbers."""

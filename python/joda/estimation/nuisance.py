@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -199,10 +199,11 @@ class CorrectedBase(BaseModel):
 
     nuisances: Nuisances
 
-    def coarser(self) -> "CorrectedBase":
-        """The same for longer steps."""
-        longer = self.nuisances.coarser()
-        return replace(self, h=longer.base.h, nuisances=longer)
+    def in_steps(self, h: float, accurate: bool) -> Self:
+        """The same for steps of h, s."""
+        own = self.nuisances
+        own = replace(own, base=own.base.in_steps(h, accurate))
+        return replace(self, h=h, accurate=accurate, nuisances=own)
 
     def with_profile(self, profile: Profile, x: Array) -> JointSimulator:
         """The joint with its numbers but another profile."""

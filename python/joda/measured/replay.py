@@ -171,13 +171,12 @@ class Replayer:
         paths = self._quickly(time, begins, pushes, command)
         return float(np.sqrt(np.mean((paths[1:] - paths[0]) ** 2)))
 
-    def followed(self, run: Run, sigma: float, near: Array | None = None) -> tuple[Array, Array]:
+    def followed(self, run: Run, sigma: float) -> tuple[Array, Array]:
         """Predicted minus measured positions from the start that suits the whole run best.
 
         Args:
             run: whose force is known throughout.
             sigma: noise of its position, rad or m.
-            near: where to look from: position and velocity; None: as `start` says.
 
         Returns:
             rad or m, shape (n,); and that start.
@@ -186,9 +185,9 @@ class Replayer:
         command = _command(run, len(time))
         offsets = np.diag(NEAR_BY * sigma / np.array([1, time[-1]]))
         tries = np.vstack([np.zeros(2), offsets])
-        if near is None and (start := self.start(run, sigma)):
-            near = start.best
-        at, step, least = np.asarray(near), np.zeros(2), np.inf
+        start = self.start(run, sigma)
+        at = start.best if start else np.array([run.position[0], 0.0])
+        step, least = np.zeros(2), np.inf
         best = np.full(len(time), ASTRAY * sigma)
         for _ in range(TRIES):
             paths = self._replay(time, at + step + tries, force, command)

@@ -34,7 +34,8 @@ CATCH = (0.0, 0.3, 0.01, np.nan, 0.9)
 LEAN, USUAL_LEAN = (-1.2, 1.2, 0.03), 0.4
 """Logarithm of the ratio of a well's flanks: bounds and step; its doubt before the data."""
 TOP, USUAL_TOP = (0.05, 0.8, 0.02), (0.33, 0.12)
-"""Where a latch's barrier is highest, in units of it: bounds and step; what it is before the data."""
+"""Where a latch is hardest to pass, in units of its barrier: bounds and step; its mean and doubt
+before the data."""
 BARRIER = (0.2, 3.0, 0.02, 0.05, 12.0)
 """Of a latch, in units of its hold."""
 RATIO = (0.0, 3.0, 0.02)
