@@ -1,6 +1,6 @@
 """A model fitted to measured runs, and what it may lack, fitted together with it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,9 +24,11 @@ from joda.diagnosis.units import units_of
 from joda.estimation.base_model import BaseModel, base_of, joint_model_for, segments_for, usable
 from joda.estimation.estimator import Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import corrected_base
+from joda.estimation.segments import Segments
 from joda.joints.joint_model import JointModel
 from joda.measured.reading import Measured
 from joda.profile import Profile
+from joda.scenes.native import Row
 
 Array = NDArray[np.float64]
 
@@ -162,10 +164,21 @@ class _Fitted:
         return excess(self.fit.loss, max(self.estimator.samples, 1.0)) < CALM
 
 
-def _fitted(estimator: SegmentEstimator, base: BaseModel, near: Array | None) -> _Fitted:
+def _fitted(
+    measured: Measured,
+    segments: Segments,
+    near: Array | None,
+    accurate: bool = True,
+    row: Row | None = None,
+) -> _Fitted:
+    """The model in steps that stand for none or in MuJoCo's, with a row of friction that yields."""
+    estimator = SegmentEstimator(segments, usable(segments))
+    joint_model = replace(joint_model_for(measured, segments.h), friction_row=row)
+    plain = base_of(measured.profile, joint_model, segments.h, measured.trust, accurate)
+    base = corrected_base(plain, measured.doubtful)
     as_it_is = base.unknowns.mean
     given = replace(estimator.started(base.simulator(as_it_is)), x=as_it_is)
-    tried = [(as_it_is, estimator.segments.start), (as_it_is, given.start)]
+    tried = [(as_it_is, segments.start), (as_it_is, given.start)]
     if near is not None:
         tried.append((near, estimator.started(base.simulator(near)).start))
     away = [replace(estimator.started(base.simulator(x)), x=x) for x in base.beginnings()]
@@ -175,19 +188,22 @@ def _fitted(estimator: SegmentEstimator, base: BaseModel, near: Array | None) ->
     return _Fitted(estimator, base, fit, given)
 
 
-def _ways(measured: Measured, length: float | None, near: Array | None) -> Iterator[_Fitted]:
-    """The model in accurate steps, with a friction that holds; then as MuJoCo may have moved it."""
+def _as_made(
+    measured: Measured, length: float | None, near: Array | None, usual: _Fitted
+) -> _Fitted:
+    """The model as MuJoCo moves it, in the scene's steps, or with a friction that yields as its own
+    does, where hardly more than noise is left then, and clearly less than of accurate steps that
+    are as short; else as it was fitted."""
+    segments, alike = usual.estimator.segments, usual
+    if stepped := FINER * measured.timestep >= segments.h:
+        segments = segments_for(measured, length, fine=False)
+        alike = _fitted(measured, segments, near)
     own = measured.own_row if measured.profile.channels.friction.components else None
-    cut = [segments_for(measured, length)]
-    if measured.runs and FINER * measured.timestep >= cut[0].h:
-        cut.append(segments_for(measured, length, fine=False))
-    for accurate, segments in zip((True, False), cut, strict=False):
-        estimator = SegmentEstimator(segments, usable(segments))
-        h, joint_model = segments.h, joint_model_for(measured, segments.h)
-        for row in (None, own) if own and measured.runs else (None,):
-            moving = replace(joint_model, friction_row=row)
-            plain = base_of(measured.profile, moving, h, measured.trust, accurate)
-            yield _fitted(estimator, corrected_base(plain, measured.doubtful), near)
+    rows = (*((None,) if stepped else ()), *((own,) if own else ()))
+    made = [_fitted(measured, segments, near, not stepped, row) for row in rows]
+    best = min((one for one in made if one.calm), key=lambda one: one.loss, default=usual)
+    clearly = CLEARLY / max(usual.estimator.samples, 1.0)
+    return best if best.loss < min(usual.loss, alike.loss) - clearly else usual
 
 
 def fit_baseline(
@@ -205,10 +221,9 @@ def fit_baseline(
         near: factors of the strengths with which a fit begins besides, as shorter segments told
             them: in longer ones a model that is far off is fitted less easily.
     """
-    usual, *others = _ways(measured, length, near)
-    best = min((one for one in others if one.calm), key=lambda one: one.loss, default=usual)
-    clearly = CLEARLY / max(usual.estimator.samples, 1.0)
-    found = best if best.loss < usual.loss - clearly else usual
+    found = _fitted(measured, segments_for(measured, length), near)
+    if measured.runs:
+        found = _as_made(measured, length, near, found)
     estimator, base = found.estimator, found.base
     every = hypotheses(units_of(estimator.segments, measured), measured.templates, measured.profile)
     points = initial_points(estimator.coarser, base.coarser(), found.given, found.fit)
