@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,12 +150,11 @@ def free_runs(measured: Measured, baseline: Baseline) -> FreeRuns | None:
     if not (parts := free_parts(measured)):
         return None
     ways = [_Whole(measured, baseline.base, parts, accurate) for accurate in (True, False)]
-    given = [way.given for way in ways]
     fits = [way.fitted(baseline.fit.x) for way in ways]
     best = int(np.argmin([fit.loss for fit in fits]))
     samples = sum(len(run.time) for run in measured.runs)
     return FreeRuns(
-        denied=all(way.denied(fit) for way, fit in zip(ways, given, strict=True)),
+        denied=all(way.denied(way.given) for way in ways),
         drifting=all(way.denied(fit) for way, fit in zip(ways, fits, strict=True)),
         covered=sum(len(run.time) for run, _ in parts) / samples,
         numbers=fits[best].x,
@@ -184,7 +183,7 @@ class _Whole:
         self.estimator = SegmentEstimator(self.segments, np.ones(len(self.segments.at), bool))
         self.base = base.in_steps(self.segments.h, accurate)
 
-    @property
+    @cached_property
     def given(self) -> Fit:
         """The model as it is, from the starts that suit it best."""
         as_it_is = self.base.unknowns.mean
@@ -193,8 +192,8 @@ class _Whole:
     def fitted(self, near: Array) -> Fit:
         """Its strengths fitted, from where they are and from what shorter segments told."""
         make, unknowns = self.base.simulator, self.base.unknowns
-        begins = [(x, self.estimator.started(make(x)).start) for x in (unknowns.mean, near)]
-        fits = [self.estimator.fit(make, unknowns, x, start) for x, start in begins]
+        begins = (self.given, replace(self.estimator.started(make(near)), x=near))
+        fits = [self.estimator.fit(make, unknowns, one.x, one.start) for one in begins]
         return self.estimator.refit(make, unknowns, min(fits, key=lambda fit: fit.loss))
 
     def denied(self, fit: Fit) -> bool:
