@@ -55,6 +55,16 @@ def test_a_quantised_motion_is_noise(rng):
     assert cleared(make) > 0.95
 
 
+def test_an_encoder_that_dithers_at_rest_is_noise(rng):
+    """Between two levels, by a noise far smaller than their distance."""
+
+    def make():
+        steps = np.round(0.45 + 0.03 * rng.standard_normal(SAMPLES))
+        return (0.45 - steps) * 12**0.5, steps, 12**0.5
+
+    assert cleared(make) > 0.95
+
+
 def test_half_a_noise_that_comes_and_goes_is_none(rng):
     slow = 0.5 * np.sin(np.linspace(0, 9, SAMPLES))
 

@@ -304,7 +304,7 @@ def test_a_curve_is_level_where_no_run_has_been(baseline, effect):
 
 @pytest.mark.slow
 def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened():
-    """Drag as an effect of which usually only a tenth of the true size is looked for."""
+    """Even drag as an effect of which usually only a tenth of the true size is looked for."""
     baseline = fit_baseline(read(draw(84751434, EFFECT))[0].changed(runs=[0, 4]))
     every = [h for h in baseline.hypotheses if h.effect == EFFECT]
     size = baseline.fit_hypothesis(every[0]).x[0]
@@ -313,7 +313,7 @@ def test_a_fit_that_is_pressed_against_a_usual_bound_is_widened():
     def bounded(high, widest):
         bounds = replace(every[0].unknowns, high=high, widest=np.stack([[np.nan], widest]))
         return baseline.fit_hypothesis(
-            replace(every[0], unknowns=bounds, trials=np.array([[0.05 * size]]))
+            replace(every[0], unknowns=bounds, trials=np.array([[0.05 * size]]), uneven=None)
         )
 
     hard, pressed, wide = (bounded(usual, up) for up in ([np.nan], 2 * usual, widest))

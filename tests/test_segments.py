@@ -77,6 +77,15 @@ def test_what_rests_at_an_end_or_leaves_it_does_not_knock():
 
 
 # --- starts
+def test_a_segment_begins_where_an_end_that_yields_has_let_go_of_the_joint():
+    """What was pressed into the end rests there; what comes after tells of the joint."""
+    t = STEP * np.arange(400)
+    segments = cut(np.where(t < 0.13, -0.003, -0.003 + 0.5 * (t - 0.13) ** 2))
+    back = 0.13 + (2 * 0.003) ** 0.5
+    tells = [segments.time[row[row >= 0]] for row in segments.rows[usable(segments)]]
+    assert back - 0.01 < min(own[0] for own in tells) < back + 0.02
+
+
 @pytest.mark.parametrize("step", [1e-3, 4e-3])
 def test_what_is_let_go_begins_at_rest_and_what_is_flicked_does_not(step):
     t = step * np.arange(round(0.4 / step))

@@ -39,6 +39,8 @@ APART = 0.06
 """How much these must differ in one of their numbers."""
 OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
+MORE = 20.0
+"""Loss beyond noise from which it may be that a size differs along the way."""
 NOTHING = 0.1
 """Part of its step below which a strength is none."""
 LOST = 10.0
@@ -216,8 +218,21 @@ def refined(
     found = scored(estimator, hypothesis, min(fits, key=lambda f: f.loss))
     wider = hypothesis.unknowns.widened()
     if not hypothesis.unknowns.pressed(found.x) or wider is hypothesis.unknowns:
-        return _free(estimator, base, found)
+        return _uneven(estimator, base, _free(estimator, base, found))
     return refined(estimator, base, replace(hypothesis, unknowns=wider), [found.fit])
+
+
+def _uneven(
+    estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
+) -> FittedHypothesis:
+    """The candidate with a size that differs along the way, where it leaves more than noise
+    without and that is worth its numbers."""
+    uneven, noise = found.hypothesis.uneven, CAUCHY_SCALE * np.log(1 + 1 / CAUCHY_SCALE)
+    if uneven is None or found.fit.loss < estimator.samples * noise + MORE:
+        return found
+    x = np.append(found.fit.x, np.zeros(uneven.factors))
+    other = refined(estimator, base, uneven, [replace(found.fit, x=x)])
+    return min(found, other, key=lambda one: one.score)
 
 
 def beside(hypothesis: Hypothesis, found: FittedHypothesis) -> Hypothesis:
@@ -238,7 +253,8 @@ def perturbed(
     n = len(best.x)
     first = base.count
     places = [(k, by) for by in MOVES for k in range(n - found.hypothesis.ends, n)]
-    shapes = [(k, FAR * unknowns.step[k]) for k in range(first, n - found.hypothesis.ends)]
+    own = n - found.hypothesis.ends - found.hypothesis.factors
+    shapes = [(k, FAR * unknowns.step[k]) for k in range(first, own)]
     for k, by in places + shapes:
         for way in (-by, by):
             x = best.x.copy()

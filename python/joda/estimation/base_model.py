@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from joda._core import JointSimulator
 from joda.estimation.quasi_static import QuasiStaticJoint, curve_segments
-from joda.estimation.segmentation import segments_of
+from joda.estimation.segmentation import BEYOND, segments_of
 from joda.estimation.segments import GRID, Segments
 from joda.estimation.unknowns import Unknowns
 from joda.joints.joint_model import JointModel
@@ -36,8 +36,8 @@ FAR_AWAY = ((-4.0, -2.0, 10.0), (-2.0, -1.0, 3.0), (2.0, 1.0, 1.0))
 """Logarithms of gain and damping, and factors of friction, from which fits begin besides."""
 SOFT = (0.02, 1.0)
 """MuJoCo's own `solreflimit`: time constant (s) and damping ratio of the ends of a range."""
-BEYOND, STRAYS = 4.0, 3
-"""So many noises outside its range a joint is beyond it; at most so many samples are by chance."""
+STRAYS = 3
+"""At most so many samples are beyond the range by chance."""
 MIN_SAMPLES = 4
 """Fewest samples of a segment that counts."""
 

@@ -40,6 +40,8 @@ JOLTED = 0.03
 they would more, as where a hand pulls up between two samples, a segment begins after them."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a segment's samples share it."""
+BEYOND = 4.0
+"""Noises outside its range at which a joint is beyond it."""
 CLEAR = 1.5
 """How much larger the noise of fast samples must be to count as such."""
 
@@ -92,6 +94,7 @@ def segments_of(
             spread, push = _spread(time, position, sigma), run.part(piece).force_error()
             begins = _after_jolts(begins, index, time, push / inertia, JOLTED * span)
             begins, hits = _before_knocks(begins, index, (position - lo) / span, spread / span)
+            begins = _after_pressing(begins, index, (position - lo) / span, spread / span)
             many = len(begins)
             window = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST
@@ -332,6 +335,18 @@ def _before_knocks(
             more.append(hit)
     kept = np.setdiff1d(begins, np.array(fewer, int))
     return np.union1d(kept, index[np.array(more, int)] // GRID * GRID), hits
+
+
+def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -> Integers:
+    """Where segments begin, also where one that began beyond the range comes back into it: what an
+    end that yields does to the joint is not known."""
+    beyond = np.maximum(-s, s - 1) > BEYOND * noise
+    more = []
+    for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
+        own = beyond[row[row >= 0]]
+        if own[:1].any() and not own.all():
+            more.append(index[row[np.argmin(own)]])
+    return np.union1d(begins, -(-np.array(more, int) // GRID) * GRID)
 
 
 def _knocks(rows: Integers, s: Array, noise: Array, hits: NDArray[np.bool_]) -> NDArray[np.bool_]:

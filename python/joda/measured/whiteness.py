@@ -27,6 +27,8 @@ CLEAR = 3.0
 """How far off an end a joint must be, in noises, not to be at it."""
 SPIKE = 4.0
 """Errors beyond so many noises count as so many: single wrong samples."""
+DITHER = 2
+"""Levels of an encoder between which one that rests may dither, which averages nothing out."""
 TOLERATED = 0.1
 """Part of the noise by which a block's mean may be off: two solvers differ by as much."""
 
@@ -98,13 +100,13 @@ def drift(residual: Array, position: Array, step: float, moved: float = 0.0) -> 
     if count < FEW:
         return 1.0
     blocks = np.array_split(np.clip(residual, -SPIKE, SPIKE), count)
-    changes = np.array([np.sum(np.diff(own) != 0) for own in np.array_split(position, count)])
-    told = changes > 0 if step else np.ones(count, bool)
+    levels = np.array([len(np.unique(own)) for own in np.array_split(position, count)])
+    told = levels > DITHER if step else np.ones(count, bool)
     if told.sum() < FEW:
         return 1.0
     means, sizes = np.array([(own.mean(), len(own)) for own in blocks])[told].T
     doubt = max(long_run_variance(blocks), 1.0) / sizes + TOLERATED**2 + moved**2
-    doubt += step**2 / 12 / np.maximum(changes[told], 1)
+    doubt += step**2 / 12 / levels[told]
     return float(chi2.sf(np.sum(means**2 / doubt), told.sum() - 2))
 
 

@@ -77,6 +77,9 @@ class Hypothesis:
         itself: whether it is, with these numbers, what its name says: more than a simpler effect
             would be, and of no size at which forces no longer count.
         kept: how many rough fits are fitted to the end: several where the motion jumps in a number.
+        uneven: the same with a size that differs along the way: its numbers, and after them the
+            logarithms of factors; None of what has no such form.
+        factors: how many these are.
     """
 
     effect: str
@@ -92,6 +95,8 @@ class Hypothesis:
     misfit_tolerance: float = KNOWN_LAW
     itself: Callable[[Array], bool] = lambda x: True
     kept: int = 1
+    uneven: "Hypothesis | None" = None
+    factors: int = 0
 
     def placed(
         self, places: Sequence[Sequence[float]], strengths: Sequence[float] = (1.0,)

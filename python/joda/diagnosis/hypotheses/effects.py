@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from joda.diagnosis.hypotheses.base import (
     Bounds,
     Direction,
     Hypothesis,
+    Number,
     Units,
     everywhere,
+    known,
     unit_of,
     unknowns_of,
 )
@@ -62,6 +64,9 @@ joint: something else does."""
 BENDS = 2.0
 """How much a free curve bends at a control point (one standard deviation), in usual forces: where
 no segment has been, what is beside tells it."""
+FACTOR, UNEVEN = (-1.5, 1.5, 0.05), 0.3
+"""Logarithms by which a size differs along the way: bounds and step, and by how much it usually
+does (one standard deviation)."""
 TINY = 1e-12
 """As good as no force."""
 
@@ -75,24 +80,22 @@ def free_curves(units: Units) -> Iterator[Hypothesis]:
 def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
     power = int(channel == "damping")
     unit = units.force / units.speed**power
-    at = np.linspace(*units.visited, KNOTS)
-    beyond = int(at[0] > 0), int(at[-1] < 1)
-    knots = tuple(map(float, np.unique([0.0, *at, 1.0])))
+    knots, padded = _knots(units)
 
     def write(profile: Profile, x: Array) -> Profile:
-        y = tuple(unit * np.pad(x, beyond, mode="edge"))
+        y = tuple(unit * padded(x))
         return profile.with_component(
             channel, Component(label=effect, interval=(0, 1), x=knots, y=y)
         )
 
     def raised(x: Array) -> tuple[float, float]:
         """Where the curve is above its least value."""
-        y = tuple(np.pad(x - np.min(x) + TINY, beyond, mode="edge"))
+        y = tuple(padded(x - np.min(x) + TINY))
         return felt(Component(label=effect, interval=(0, 1), x=knots, y=y), RAISED, to_ends=False)
 
     def level(x: Array) -> bool:
         """Whether it is the same on so much of the range that it is called constant."""
-        y = np.interp(np.linspace(0, 1, GRID), knots, np.pad(x, beyond, mode="edge"))
+        y = np.interp(np.linspace(0, 1, GRID), knots, padded(x))
         usual = float(np.median(y))
         near = np.abs(y - usual) <= LEVEL * usual
         return usual > VARIED * float(y.max()) and bool(np.mean(near) >= WHOLE)
@@ -109,6 +112,14 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
         misfit_tolerance=FREE_CURVE,
         itself=lambda x: bool(np.ptp(x) > VARIED * np.mean(x)) and not level(x),
     )
+
+
+def _knots(units: Units) -> tuple[tuple[float, ...], Callable[[Array], Array]]:
+    """Control points of a curve that is level where no run has been, and how its values there
+    follow from the `KNOTS` ones where runs were."""
+    at = np.linspace(*units.visited, KNOTS)
+    beyond = int(at[0] > 0), int(at[-1] < 1)
+    return tuple(map(float, np.unique([0.0, *at, 1.0]))), lambda x: np.pad(x, beyond, mode="edge")
 
 
 def from_effects(units: Units) -> Iterator[Hypothesis]:
@@ -145,53 +156,91 @@ def _effect(
     )
 
 
+def _along(
+    units: Units,
+    power: int,
+    name: str,
+    make: Callable[[Array, dict[str, Any]], AnyEffect],
+    others: Sequence[tuple[Number, Sequence[float]]] = (),
+    direction: Direction = "both",
+    misfit_tolerance: float = KNOWN_LAW,
+) -> Hypothesis:
+    """An effect whose size is a curve over the range: the same everywhere, or uneven.
+
+    Args:
+        units: the joint's.
+        power: of speed, in its unit.
+        name: the effect's.
+        make: the effect, of its numbers and its curve.
+        others: what is known of its numbers after the size, and values to try.
+        direction, misfit_tolerance: see Hypothesis.
+    """
+    size, unit = units.force / units.speed**power, unit_of(units, power)
+    bounds = [STRENGTH, *(number for number, _ in others)]
+    knots, padded = _knots(units)
+
+    def curve(x: Array) -> Array:
+        return padded(size * x[0] * np.exp(x[len(bounds) :]))
+
+    flat = _effect(
+        name,
+        bounds,
+        list(product((TRIAL,), *(tries for _, tries in others))),
+        lambda x: make(x, {"y": (size * float(x[0]),) * 2}),
+        lambda x: size * float(x[0]),
+        unit,
+        direction,
+        misfit_tolerance,
+    )
+    uneven = _effect(
+        name,
+        [*bounds, *[FACTOR] * KNOTS],
+        [],
+        lambda x: make(x, {"x": knots, "y": tuple(curve(x))}),
+        lambda x: float(curve(x).max()),
+        unit,
+        direction,
+        misfit_tolerance,
+    )
+    unknowns = uneven.unknowns
+    for number in range(len(bounds), len(unknowns.low)):
+        unknowns = known(unknowns, number, 0.0, UNEVEN)
+    return replace(flat, uneven=replace(uneven, unknowns=unknowns, factors=KNOTS))
+
+
 def _resistances(units: Units) -> Iterator[Hypothesis]:
     """Effects of friction and damping."""
-    F, V = units.force, units.speed
-
-    def flat(value: float) -> tuple[float, float]:
-        return value, value
+    V = units.speed
 
     def asymmetric(way: Way) -> Hypothesis:
-        return _effect(
+        return _along(
+            units,
+            0,
             "asymmetric_friction",
-            [STRENGTH],
-            [[TRIAL]],
-            lambda x: AsymmetricFriction(direction=way, y=flat(F * x[0])),
-            lambda x: F * float(x[0]),
-            unit_of(units),
-            way,
+            lambda x, curve: AsymmetricFriction(direction=way, **curve),
+            direction=way,
         )
 
     def one_way(way: Way) -> Hypothesis:
-        return _effect(
+        return _along(
+            units,
+            1,
             "direction_dependent_damping",
-            [STRENGTH],
-            [[TRIAL]],
-            lambda x: DirectionDependentDamping(direction=way, y=flat(F / V * x[0])),
-            lambda x: F / V * float(x[0]),
-            unit_of(units, 1),
-            way,
+            lambda x, curve: DirectionDependentDamping(direction=way, **curve),
+            direction=way,
         )
 
     for build in (asymmetric, one_way):
         yield build("positive")
         yield build("negative")
-    yield _effect(
-        "quadratic_damping",
-        [STRENGTH],
-        [[TRIAL]],
-        lambda x: QuadraticDamping(y=flat(F / V**2 * x[0])),
-        lambda x: F / V**2 * float(x[0]),
-        unit_of(units, 2),
-    )
-    yield _effect(
+    yield _along(units, 2, "quadratic_damping", lambda x, curve: QuadraticDamping(**curve))
+    speeds = [np.log(v) for v in (0.02, 0.06, 0.2, 0.6)]
+    yield _along(
+        units,
+        0,
         "stribeck_friction",
-        [STRENGTH, (np.log(1e-3), np.log(3.0), 0.05, np.nan, np.log(6.0))],
-        [(TRIAL, np.log(v)) for v in (0.02, 0.06, 0.2, 0.6)],
-        lambda x: StribeckFriction(y=flat(F * x[0]), velocity=V * float(np.exp(x[1]))),
-        lambda x: F * float(x[0]),
-        unit_of(units),
+        lambda x, curve: StribeckFriction(velocity=V * float(np.exp(x[1])), **curve),
+        [((np.log(1e-3), np.log(3.0), 0.05, np.nan, np.log(6.0)), speeds)],
         misfit_tolerance=KNOWN_SHAPE,
     )
     if units.forced or units.weight:
