@@ -18,6 +18,7 @@ import traceback
 from pathlib import Path
 
 from assets import SHARED
+from hidden_cases import missed
 
 FOLDER = SHARED / "data" / "foreign_cases"
 
@@ -33,7 +34,7 @@ def examined(job: tuple[Path, bool]) -> dict:
 
 
 def _examined(folder: Path, adds: bool) -> dict:
-    from joda.diagnosis.adding import add_effect, error
+    from joda.diagnosis.adding import add_effect
     from joda.diagnosis.outcome import read_runs
     from joda.diagnosis.split import parted
     from joda.diagnosis.verdict import diagnosed
@@ -55,14 +56,14 @@ def _examined(folder: Path, adds: bool) -> dict:
         "floor": measured.floor,
     }
     held_out = read_measured(model, answer["joint"], unseen)
-    before = after = error(held_out)
+    before = after = missed(held_out)
     if adds and said.verdict == "missing_effect":
         first = said.effects[0]
         train, held = parted(measured)
         added_effect = add_effect(train, held, first.effect, first.direction, first.interval)
         row["added"] = added_effect.effect or added_effect.reason
         if added_effect.effect:
-            after = error(held_out, added_effect.profile)
+            after = missed(held_out, added_effect.profile)
     achievable = answer["achievable_held_out_rmse"]
     row |= {"before": before.whole / achievable, "after": after.whole / achievable}
     return row

@@ -30,13 +30,13 @@ import traceback
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from hidden_cases import Job, case_of, job_of, read, spread
+from hidden_cases import Job, case_of, job_of, missed, read, spread
 from hidden_families import by_effect
 from hidden_field import by_numbers
 from hidden_figures import fine, table, told
 from hidden_floor import floor_of
 
-from joda.diagnosis.adding import add_effect, error
+from joda.diagnosis.adding import add_effect
 from joda.diagnosis.improvement import improved
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
@@ -103,7 +103,7 @@ def said(train: Measured, exclude: tuple[str, ...] = ()) -> dict:
 def added(job: Job, row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
     """Held-out errors after adding what was named first, and after adding a wrong effect."""
     kept, held = parted(train)
-    before = error(held_out).window
+    before = missed(held_out).window
     out = {"before": before, "floor": floor_of(case, held_out)}
     tried = {"wrong": (job.wrong,)}
     if row["named"]:
@@ -112,20 +112,20 @@ def added(job: Job, row: dict, case: Case, train: Measured, held_out: Measured) 
         begun = time.perf_counter()
         added_effect = add_effect(kept, held, *effect)
         out[f"{key}_seconds"] = time.perf_counter() - begun
-        new = error(held_out, added_effect.profile).window if added_effect.effect else before
+        new = missed(held_out, added_effect.profile).window if added_effect.effect else before
         out[f"{key}_error"] = new
     return out
 
 
 def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
     """Errors on unseen whole runs, of what the true joint misses; after adding what was named."""
-    before = after = error(held_out).whole
+    before = after = missed(held_out).whole
     if row["verdict"] == "missing_effect":
         first = row["named"][0]
         added_effect = add_effect(
             *parted(train), first["effect"], first["direction"], first["interval"]
         )
-        after = error(held_out, added_effect.profile).whole if added_effect.effect else before
+        after = missed(held_out, added_effect.profile).whole if added_effect.effect else before
     least = case.achievable.together
     return {"unseen_before": before / least, "unseen": after / least}
 
@@ -138,15 +138,15 @@ def mended(case: Case, train: Measured, held_out: Measured) -> dict:
     return {
         "steps": [step.effect for step in steps[1:]],
         "why": why,
-        "unseen_before": error(held_out).whole / least,
-        "unseen": error(right, last.profile).whole / least,
+        "unseen_before": missed(held_out).whole / least,
+        "unseen": missed(right, last.profile).whole / least,
     }
 
 
 def few(case: Case, train: Measured, held_out: Measured) -> dict:
     """What is named of few runs, and the error on others before and after it is added."""
     row = said(train)
-    before = error(held_out).window
+    before = missed(held_out).window
     out = row | {"before": before, "after_error": before, "added": [], "reason": None}
     if not row["named"]:
         return out
@@ -154,7 +154,7 @@ def few(case: Case, train: Measured, held_out: Measured) -> dict:
     added_effect = add_effect(*parted(train), *first)
     if not added_effect.effect:
         return out | {"reason": added_effect.reason}
-    after = error(held_out, added_effect.profile).window
+    after = missed(held_out, added_effect.profile).window
     departs = list(added_effect.departs.sentences)
     return out | {"after_error": after, "added": [added_effect.effect], "departs": departs}
 
@@ -167,8 +167,8 @@ def both(case: Case, train: Measured, held_out: Measured) -> dict:
         "seconds": time.perf_counter() - begun,
         "added": [step.effect for step in steps[1:]],
         "why": why,
-        "before": error(held_out).window,
-        "after_error": error(held_out, steps[-1].profile).window,
+        "before": missed(held_out).window,
+        "after_error": missed(held_out, steps[-1].profile).window,
         "floor": floor_of(case, held_out),
     }
 

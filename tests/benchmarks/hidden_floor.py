@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from unittest import mock
 
 import numpy as np
+from hidden_cases import missed
 from hidden_model import true_profile
 from scipy.interpolate import CubicSpline
 
-from joda.diagnosis.adding import error
 from joda.hidden import Case, simulator
 from joda.hidden.handle import Handle
 from joda.hidden.laws import State
@@ -145,5 +145,5 @@ def _replayed(truth: Truth, forces, q, v, memory) -> np.ndarray:
 def floor_of(case: Case, held_out: Measured) -> float:
     """The true model's error (rad or m): by itself, or in MuJoCo where that is more, as MuJoCo's
     steps and soft ends of the range are in every model's."""
-    own = error(held_out, true_profile(case, held_out.profile)).window
+    own = missed(held_out, true_profile(case, held_out.profile)).window
     return max(true_error(case), own)

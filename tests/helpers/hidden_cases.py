@@ -9,7 +9,9 @@ import numpy as np
 
 from joda.hidden import EFFECTS, FAMILIES, Case, draw, write
 from joda.hidden.cases import FAMILY, PARTIAL, VISIBLE
+from joda.measured.errors import Errors, errors
 from joda.measured.reading import Measured, read_measured
+from joda.profile import Profile
 
 HARD = ("stribeck_friction", "presliding_friction", "backlash")
 BROAD = tuple(n for n in EFFECTS if n.startswith(("constant_p", "constant_n", "spring_return")))
@@ -150,3 +152,8 @@ def read(case: Case) -> tuple[Measured, Measured]:
             for runs in (case.train, case.held_out)
         )
     return train, held_out
+
+
+def missed(measured: Measured, profile: Profile | None = None) -> Errors:
+    """How far the model, or another profile, is off, also beyond the ends of the range."""
+    return errors(measured if profile is None else measured.changed(profile))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from joda.diagnosis.baseline import Baseline, fit_baseline
+from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.coverage import at_rest
 from joda.diagnosis.departures import FAITHFUL, SHARED, Departures, departures, restored
 from joda.diagnosis.hypotheses import Hypothesis
@@ -46,7 +46,7 @@ STRENGTHS = (1.0, 3.0, 10.0)
 
 @dataclass(frozen=True)
 class Error:
-    """How far a model is off.
+    """How far a model is off, by positions within the joint's range (see `errors`).
 
     Attributes:
         whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where none can be
@@ -88,7 +88,7 @@ def replayed(measured: Measured, profile: Profile | None = None) -> tuple[Error,
     model = measured if profile is None else measured.changed(profile)
     if not model.runs:
         return Error(None, rms(np.concatenate([curve.excess for curve in model.curves]))), None
-    found = errors(model)
+    found = errors(model, within=True)
     return Error(known(found.whole), found.window), found
 
 
@@ -122,7 +122,7 @@ def add_effect(
         return AddedEffect(train.profile, None, before, before, reason)
     progress("the effect's own numbers")
     given = given or train.profile
-    trials = Trials(train, held)
+    trials = Trials(train, held, bounces=effect == RESTITUTION)
     baseline = fit_baseline(train)
     begin = starts(baseline, effect, direction, near)
     tried = [one for start in begin for one in trials.reshaped(start, effect, progress)]

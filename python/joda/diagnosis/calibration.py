@@ -328,9 +328,16 @@ def _concluded(
     loss = fit.loss + found.price * len(names)
     samples = max(estimator.samples, 1.0)
     left, before = excess(fit.loss, samples), excess(baseline.fit.loss, samples)
-    alone = left < max(CALM, PART * before) and not any(
-        one.fit.loss + one.cost < loss - ALIKE * (one.hypothesis.effect != HEAVIER)
-        for one in _equivalent(baseline)
+    base = own.base
+    usual = base.unknowns.penalty(fit.x[: base.count]) < SURPRISE**2  # else something resists
+    calm = left < max(CALM, PART * before)
+    alone = (
+        usual
+        and calm
+        and not any(
+            one.fit.loss + one.cost < loss - ALIKE * (one.hypothesis.effect != HEAVIER)
+            for one in _equivalent(baseline)
+        )
     )
     others = []
     for name in names:

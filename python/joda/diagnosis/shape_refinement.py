@@ -20,6 +20,7 @@ from joda.estimation.base_model import MIN_SAMPLES, as_it_is, segments_for, usab
 from joda.estimation.estimator import CAUCHY_SCALE, SegmentEstimator
 from joda.estimation.profile_parameters import DOUBT as USUAL
 from joda.estimation.profile_parameters import NARROWEST, Kind, Parameters
+from joda.estimation.segments import Segments
 from joda.estimation.unknowns import Unknowns
 from joda.field import evaluate
 from joda.measured.reading import Measured
@@ -50,13 +51,21 @@ PRICE = 2.0
 class Likelihood:
     """Of measured runs, as MuJoCo would move the joint at the scene's own step, or of curves."""
 
-    def __init__(self, measured: Measured) -> None:
-        """Cuts the runs into segments."""
+    def __init__(self, measured: Measured, bounces: bool = False) -> None:
+        """Cuts the runs into segments.
+
+        Args:
+            measured: the joint and its runs or curves.
+            bounces: whether segments count that tell of an end of the range alone; so they do
+                where there are no others.
+        """
         self.joint_model, self.segments = (
             as_it_is(measured),
             segments_for(measured, LONGEST, fine=False),
         )
-        self.estimator = SegmentEstimator(self.segments, self.segments.count >= MIN_SAMPLES)
+        self.estimator = SegmentEstimator(
+            self.segments, _counted(self.segments, bounces or not usable(self.segments).any())
+        )
         self.given = measured.profile
         self.own = replace(self.joint_model, friction_row=measured.joint_model.friction_row)
 
@@ -85,10 +94,11 @@ class Tried:
 class Trials:
     """Scores profiles of a joint."""
 
-    def __init__(self, train: Measured, held: Measured) -> None:
-        """Args: the joint and runs to fit; the same with runs held out."""
+    def __init__(self, train: Measured, held: Measured, bounces: bool = False) -> None:
+        """Args: the joint and runs to fit; the same with runs held out; see `Likelihood`."""
         self.train = train
-        self.seen, self.unseen = Likelihood(train), Likelihood(held)
+        bounces = bounces or _bounces(train.profile)
+        self.seen, self.unseen = Likelihood(train, bounces), Likelihood(held, bounces)
         longer = LONGER if train.runs else (1.0,)  # curves' segments are all alike
         usual_length = segments_for(train).length
         self.lengths = [factor * usual_length for factor in longer]
@@ -234,10 +244,7 @@ def refitted(
         parts: whose numbers stay as they are.
     """
     segments = segments_for(train, length, fine=False)  # at the scene's own step
-    bounces = any(isinstance(effect, EndStopRestitution) for effect in profile.effects)
-    estimator = SegmentEstimator(
-        segments, segments.count >= MIN_SAMPLES if bounces else usable(segments)
-    )
+    estimator = SegmentEstimator(segments, _counted(segments, _bounces(profile)))
     if not estimator.counts.any():
         return profile
     kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
@@ -263,6 +270,16 @@ def refitted(
     for cauchy_scale in (CAUCHY_SCALE * usual(estimator, fit), CAUCHY_SCALE):
         fit = estimator.fit(make, unknowns, fit.x, fit.start, ROUNDS, cauchy_scale)
     return parameters.written(estimator.refit(make, unknowns, fit, ROUNDS).x)
+
+
+def _bounces(profile: Profile) -> bool:
+    """Whether it says how bouncy an end is."""
+    return any(isinstance(effect, EndStopRestitution) for effect in profile.effects)
+
+
+def _counted(segments: Segments, bounces: bool) -> NDArray[np.bool_]:
+    """Which segments count: without knocks and rests at the ends, unless `bounces`."""
+    return segments.count >= MIN_SAMPLES if bounces else usable(segments)
 
 
 def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
 """All measured runs replayed, whole and in windows: how far a model is off."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +96,7 @@ def errors(
     *,
     windows: bool = True,
     explained: bool = False,
+    within: bool = False,
     begin: Callable[[str], None] = lambda name: None,
 ) -> Errors:
     """Replays all runs in MuJoCo with the plugin.
@@ -105,17 +106,27 @@ def errors(
         windows: whether the errors of windows, which take longer, are wanted.
         explained: whether what errors of start and force make of whole runs is, which takes longer
             still; else it is 0.
+        within: whether a position beyond an end of the range counts as at it: how deep a joint
+            presses into a stop is no law of the joint's.
         begin: told the name of each run before its replay.
     """
+    bounds = measured.profile.joint.range if within else (-np.inf, np.inf)
+
+    def misfits(path: Array, position: Array) -> Array:
+        return np.clip(path, *bounds) - np.clip(position, *bounds)
+
     paths, rows, missed = [], [], []
     off, left = [np.zeros(0)], [np.zeros(0)]
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         begin(run.name)
         start = measured.replayer.start(run, sigma)
         paths.append(measured.replayer.whole(run, start))
-        misfit = paths[-1] - run.position
+        misfit = misfits(paths[-1], run.position)
         off.append(misfit[~np.isnan(paths[-1])])
-        pieces = measured.replayer.windows(run, sigma) if windows else []
+        pieces = []
+        for piece in measured.replayer.windows(run, sigma) if windows else []:
+            there = run.position[piece.samples]
+            pieces.append(replace(piece, misfit=misfits(there + piece.misfit, there)))
         left.append(joined(pieces))
         whole = rms(off[-1])
         scatter = measured.replayer.scatter(run, start) if explained and start else None

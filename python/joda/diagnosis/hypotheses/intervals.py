@@ -9,7 +9,8 @@ from joda.profile import Channel
 
 WIDTHS = (0.08, 0.13, 0.2, 0.3, 0.42, 0.6)
 """Of the intervals that are tried, in normalised position."""
-NARROWEST = 0.02
+NARROWEST, AT_STOP = 0.02, 0.01
+"""Interval; and how near an end of the range it ends at that."""
 FELT = 0.2
 """Part of its largest force from which a force is felt: where an effect that runs out slowly
 ends."""
@@ -23,7 +24,12 @@ END = (0.0, 1.0, 0.004)
 
 def ends(place: str, x: Array) -> tuple[float, float]:
     """The interval within the range, of which the last numbers are the ends; a rough trial's may be
-    outside."""
+    outside. One that ends at rest at a stop, of which no run tells, ends there."""
+    a, b = _ends(place, x)
+    return 0.0 if a < AT_STOP else a, 1.0 if b > 1 - AT_STOP else b
+
+
+def _ends(place: str, x: Array) -> tuple[float, float]:
     if place == "whole":
         return 0.0, 1.0
     if place == "low":
