@@ -6,6 +6,7 @@ import pytest
 from joda import templates
 from joda.component import Component
 from joda.diagnosis.shape_refinement import resolved
+from joda.effects import Backlash, EndStopRestitution, PreslidingFriction
 from joda.estimation.least_squares import bounded_step
 from joda.estimation.profile_parameters import KINDS, Parameters
 from joda.field import evaluate
@@ -115,6 +116,22 @@ def test_a_step_for_differences_may_not_turn_an_interval_round():
         theta = np.tile(ends, len(p.start) // 2)
         (a, b), *_ = (c.interval for c in p.written(theta, exact=True).channels.friction.components)
         assert 0 <= a < b <= 1
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        PreslidingFriction(stiffness=100.0, breakaway=1.0),
+        EndStopRestitution(restitution=0.95),
+        Backlash(play=0.02, inertia=1e-3, side="motor", share=0.99),
+    ],
+)
+def test_a_step_for_differences_may_not_lead_beyond_what_an_effect_may_be(effect):
+    p = Parameters(planted(NAMES[0]).with_effect(effect), ("effects",), inertia=1.0)
+    for way in (0.01 * np.eye(len(p.start)), -0.01 * np.eye(len(p.start))):
+        for step in way:
+            after = p.written(p.start + step, exact=True).effects[0]
+            assert type(after).model_validate(after.model_dump()) == after
 
 
 @pytest.mark.parametrize("kind", ["hinge", "slide"])

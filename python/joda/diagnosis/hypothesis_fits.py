@@ -218,20 +218,26 @@ def refined(
     found = scored(estimator, hypothesis, min(fits, key=lambda f: f.loss))
     wider = hypothesis.unknowns.widened()
     if not hypothesis.unknowns.pressed(found.x) or wider is hypothesis.unknowns:
-        return _uneven(estimator, base, _free(estimator, base, found))
+        found = _free(estimator, base, found)
+        return found if hypothesis.factors else uneven(estimator, base, found)
     return refined(estimator, base, replace(hypothesis, unknowns=wider), [found.fit])
 
 
-def _uneven(
+def uneven(
     estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
 ) -> FittedHypothesis:
-    """The candidate with a size that differs along the way, where it leaves more than noise
-    without and that is worth its numbers."""
-    uneven, noise = found.hypothesis.uneven, CAUCHY_SCALE * np.log(1 + 1 / CAUCHY_SCALE)
-    if uneven is None or found.fit.loss < estimator.samples * noise + MORE:
+    """The candidate with a size that differs along the way, or more finely so, where it leaves more
+    than noise without and that is worth its numbers."""
+    hypothesis, noise = found.hypothesis, CAUCHY_SCALE * np.log(1 + 1 / CAUCHY_SCALE)
+    finer = hypothesis.uneven
+    if finer is None or found.fit.loss < estimator.samples * noise + MORE:
         return found
-    x = np.append(found.fit.x, np.zeros(uneven.factors))
-    other = refined(estimator, base, uneven, [replace(found.fit, x=x)])
+    own, factors = np.split(found.fit.x, [len(found.fit.x) - hypothesis.factors])
+    x = np.append(own, np.zeros(finer.factors))
+    if len(factors):
+        there, here = (np.linspace(0, 1, one.factors) for one in (hypothesis, finer))
+        x[len(own) :] = np.interp(here, there, factors)
+    other = refined(estimator, base, finer, [replace(found.fit, x=x)])
     return min(found, other, key=lambda one: one.score)
 
 
@@ -247,7 +253,10 @@ def perturbed(
     estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
 ) -> FittedHypothesis:
     """The candidate after its numbers were tried elsewhere: a fit does not see across an edge that
-    few segments cross, nor past a speed at which the joint begins to stick."""
+    few segments cross, nor past a speed at which the joint begins to stick. What is uneven is so as
+    finely as is worth it."""
+    while found.hypothesis.factors and (finer := uneven(estimator, base, found)) is not found:
+        found = finer
     make, unknowns = joined(base, found.hypothesis)
     best = found.fit
     n = len(best.x)

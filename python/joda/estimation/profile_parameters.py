@@ -199,8 +199,8 @@ class Parameters:
                     y = list(effect["y"])
                     y[slot.index] = max(number, 0.0)
                     effect["y"] = y
-                else:
-                    effect[slot.key] = number
+                else:  # a step for differences may lead beyond
+                    effect[slot.key] = min(number, LARGEST.get(slot.key, np.inf))
             if slot.kind not in ("values", "intervals", "sizes", "places"):
                 continue
             components = content["channels"][slot.channel]["components"]

@@ -34,6 +34,10 @@ class Unknowns:
     widest: Array | None = None
     rough: Array | None = None
 
+    @property
+    def _widest(self) -> Array:
+        return np.full((2, len(self.low)), np.nan) if self.widest is None else self.widest
+
     def pressed(self, x: Array) -> bool:
         """Whether a number is as large or as small as is usual, but may be larger or smaller."""
         if self.widest is None:
@@ -65,7 +69,10 @@ class Unknowns:
         own = [(self.rough, before), (other.rough, after)]
         padded = [np.pad(part, ((0, 0), sides)) for part, sides in own if part is not None]
         rough = np.vstack(padded) if padded else None
-        return Unknowns(low, high, step, mean, prior_std, rough=rough)
+        widest = None
+        if self.widest is not None or other.widest is not None:
+            widest = np.hstack([self._widest, other._widest])
+        return Unknowns(low, high, step, mean, prior_std, widest=widest, rough=rough)
 
     def some(self, kept: NDArray[np.bool_]) -> "Unknowns":
         """Some of them, without what else must hold."""

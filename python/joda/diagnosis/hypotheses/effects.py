@@ -21,7 +21,6 @@ from joda.diagnosis.hypotheses.base import (
     Number,
     Units,
     everywhere,
-    known,
     unit_of,
     unknowns_of,
 )
@@ -40,6 +39,7 @@ from joda.effects import (
     StribeckFriction,
 )
 from joda.effects.mechanics import ENDS, HEAVIEST, End
+from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
 
 Way = Literal["positive", "negative"]
@@ -67,6 +67,8 @@ no segment has been, what is beside tells it."""
 FACTOR, UNEVEN = (-1.5, 1.5, 0.05), 0.3
 """Logarithms by which a size differs along the way: bounds and step, and by how much it usually
 does (one standard deviation)."""
+FINER = (KNOTS, 17, 33)
+"""Control points of such a size: where it leaves more than noise, more."""
 TINY = 1e-12
 """As good as no force."""
 
@@ -114,10 +116,10 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
     )
 
 
-def _knots(units: Units) -> tuple[tuple[float, ...], Callable[[Array], Array]]:
+def _knots(units: Units, count: int = KNOTS) -> tuple[tuple[float, ...], Callable[[Array], Array]]:
     """Control points of a curve that is level where no run has been, and how its values there
-    follow from the `KNOTS` ones where runs were."""
-    at = np.linspace(*units.visited, KNOTS)
+    follow from those where runs were."""
+    at = np.linspace(*units.visited, count)
     beyond = int(at[0] > 0), int(at[-1] < 1)
     return tuple(map(float, np.unique([0.0, *at, 1.0]))), lambda x: np.pad(x, beyond, mode="edge")
 
@@ -177,11 +179,6 @@ def _along(
     """
     size, unit = units.force / units.speed**power, unit_of(units, power)
     bounds = [STRENGTH, *(number for number, _ in others)]
-    knots, padded = _knots(units)
-
-    def curve(x: Array) -> Array:
-        return padded(size * x[0] * np.exp(x[len(bounds) :]))
-
     flat = _effect(
         name,
         bounds,
@@ -192,20 +189,36 @@ def _along(
         direction,
         misfit_tolerance,
     )
-    uneven = _effect(
-        name,
-        [*bounds, *[FACTOR] * KNOTS],
-        [],
-        lambda x: make(x, {"x": knots, "y": tuple(curve(x))}),
-        lambda x: float(curve(x).max()),
-        unit,
-        direction,
-        misfit_tolerance,
-    )
-    unknowns = uneven.unknowns
-    for number in range(len(bounds), len(unknowns.low)):
-        unknowns = known(unknowns, number, 0.0, UNEVEN)
-    return replace(flat, uneven=replace(uneven, unknowns=unknowns, factors=KNOTS))
+
+    def uneven(count: int, finer: Hypothesis | None) -> Hypothesis:
+        knots, padded = _knots(units, count)
+
+        def curve(x: Array) -> Array:
+            return padded(size * x[0] * np.exp(x[-count:]))
+
+        return replace(
+            flat,
+            unknowns=flat.unknowns.and_(_factors(count)),
+            trials=np.zeros((0, len(bounds) + count)),
+            write=lambda profile, x: profile.with_effect(
+                make(x, {"x": knots, "y": tuple(curve(x))})
+            ),
+            magnitude=lambda x: float(curve(x).max()),
+            misfit_tolerance=max(misfit_tolerance, FREE_CURVE),
+            uneven=finer,
+            factors=count,
+        )
+
+    finer = None
+    for count in reversed(FINER):
+        finer = uneven(count, finer)
+    return replace(flat, uneven=finer)
+
+
+def _factors(count: int) -> Unknowns:
+    """Logarithms of so many factors of a size along the way."""
+    low, high, step = (np.full(count, value) for value in FACTOR)
+    return Unknowns(low, high, step, np.zeros(count), np.full(count, UNEVEN))
 
 
 def _resistances(units: Units) -> Iterator[Hypothesis]:
