@@ -114,6 +114,11 @@ class _Fitted:
         """Numbers of the effect itself."""
         return np.arange(len(self.x) - len(self.found.x), len(self.x))
 
+    @property
+    def factors(self) -> NDArray[np.intp]:
+        """Of these, factors along the way, near 1 by what is known of them."""
+        return self.own[len(self.own) - self.found.hypothesis.factors :]
+
     def told(self, x: Array) -> Array:
         """Magnitude and ends of the interval, shape (3,)."""
         numbers = np.clip(x, self.unknowns.low, self.unknowns.high)[self.own]
@@ -171,8 +176,14 @@ def from_data(fitted: _Fitted, tolerance: float = 0.0) -> Array:
     normal = rng.multivariate_normal(x, covariance, DRAWS, "ignore", method="svd")
     drawn = _bootstrap(fitted, H, slopes, prior, rng)
     profiled = _profiled(fitted, (1 + tolerance / worse) * covariance, worse + tolerance)
+    factors = fitted.factors  # the largest of many that vary would be larger than the largest
+    normal[:, factors] = drawn[:, factors] = x[factors]
     parts = np.stack([_spread(fitted, normal), _spread(fitted, drawn), profiled])
-    return np.asarray(parts.max(axis=0))
+    out = np.asarray(parts.max(axis=0))
+    if len(factors):
+        largest = factors[int(np.argmax(x[factors]))]
+        out[0] = np.hypot(out[0], fitted.told(x)[0] * covariance[largest, largest] ** 0.5)
+    return out
 
 
 def _prior(fitted: _Fitted) -> Array:
@@ -292,7 +303,7 @@ def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Arra
     best, x = fitted.told(fitted.x), fitted.x
     least = estimator.loss(fitted.found.fit.squares) + unknowns.penalty(x)
     out = np.zeros(3)
-    for k in fitted.own:
+    for k in np.setdiff1d(fitted.own, fitted.factors):
         rest = np.arange(len(x)) != k
         others = unknowns.some(rest)
         step = max(float(np.sqrt(covariance[k, k])), float(unknowns.step[k]))
