@@ -245,6 +245,15 @@ def test_the_table_of_what_decides_has_every_setting():
     assert told == asdict(SETTINGS)
 
 
+def test_the_tests_that_pages_name_are_there():
+    pages = [*ROOT.glob("*.md"), *DOCS.rglob("*.md")]
+    named = {
+        name for page in pages for name in re.findall(r"tests/\w+\.py", page.read_text("utf-8"))
+    }
+    assert len(named) > 20
+    assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+
+
 def test_the_site_is_built_without_a_warning(tmp_path):
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "docs", tmp_path]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
