@@ -171,6 +171,17 @@ def test_what_no_run_visited_is_said_where_it_can_be_read(away, said):
     assert not said or said in told
 
 
+@pytest.mark.parametrize("uneven", [True, False])
+def test_the_size_of_what_is_uneven_is_said_to_be_the_largest(uneven):
+    joint = Joint(name="lid", type="hinge", range=(0.0, 2.0), unit="rad")
+    size, errors = (1.0, 0.1, "N·m"), (0.1, 0.01, 0.01)
+    told = explained(
+        "asymmetric_friction", "positive", (0, 1), (), size, errors, "rad", joint, uneven
+    )
+    assert ("1 ± 0.1 N·m where it is largest: " in told) == uneven
+    assert ("1 ± 0.1 N·m: " in told) != uneven
+
+
 @pytest.mark.long
 def test_a_recorded_force_that_is_off_by_a_factor_is_no_missing_inertia(tmp_path):
     model, runs = scene_of(door(), tmp_path), runs_of(door(), tmp_path, 4)

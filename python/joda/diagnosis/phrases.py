@@ -78,6 +78,7 @@ def explained(
     errors: tuple[float, float, float],
     error_unit: str,
     joint: Joint,
+    uneven: bool = False,
 ) -> str:
     """An effect as a sentence for a person.
 
@@ -90,8 +91,10 @@ def explained(
         errors: of held-out segments before and after, and the noise.
         error_unit: of these.
         joint: of which it is.
+        uneven: whether its size differs along the way.
     """
     value, doubt, unit = size
+    largest = " where it is largest" if uneven else ""
     way = f", {WAYS[direction]}" if direction in WAYS else ""
     of = "" if unit == "1" else f" {unit}"
     shows = _words(effect)[1]
@@ -99,7 +102,7 @@ def explained(
     name = named(effect)
     return (
         f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} "
-        f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}: {shows}. {extrapolated(unvisited)}"
+        f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}{largest}: {shows}. {extrapolated(unvisited)}"
         f"With it, windows held out of the fit are missed by {after:.2g} "
         f"instead of {before:.2g} {error_unit} (noise {noise:.2g} {error_unit})."
     )

@@ -470,6 +470,7 @@ def finding(
             (before, after, measured.floor),
             measured.unit,
             joint,
+            uneven=hypothesis.factors > 0,
         ),
         held_out_error_before=before,
         held_out_error_after=after,
