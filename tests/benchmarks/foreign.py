@@ -34,7 +34,7 @@ def examined(job: tuple[Path, bool]) -> dict:
 
 
 def _examined(folder: Path, adds: bool) -> dict:
-    from joda.diagnosis.adding import add_effect
+    from joda.diagnosis.adding import add_effect, by_all
     from joda.diagnosis.outcome import read_runs
     from joda.diagnosis.split import parted
     from joda.diagnosis.verdict import diagnosed
@@ -63,7 +63,8 @@ def _examined(folder: Path, adds: bool) -> dict:
         added_effect = add_effect(train, held, first.effect, first.direction, first.interval)
         row["added"] = added_effect.effect or added_effect.reason
         if added_effect.effect:
-            after = missed(held_out, added_effect.profile)
+            known = added_effect.profile, added_effect.effect, added_effect.departs
+            after = missed(held_out, by_all(measured, *known, first.interval))
     achievable = answer["achievable_held_out_rmse"]
     row |= {"before": before.whole / achievable, "after": after.whole / achievable}
     return row

@@ -36,7 +36,7 @@ from hidden_field import by_numbers
 from hidden_figures import fine, table, told
 from hidden_floor import floor_of
 
-from joda.diagnosis.adding import add_effect
+from joda.diagnosis.adding import add_effect, by_all
 from joda.diagnosis.improvement import improved
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
@@ -125,7 +125,9 @@ def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
         added_effect = add_effect(
             *parted(train), first["effect"], first["direction"], first["interval"]
         )
-        after = missed(held_out, added_effect.profile).whole if added_effect.effect else before
+        known = added_effect.profile, added_effect.effect, added_effect.departs
+        if added_effect.effect:
+            after = missed(held_out, by_all(train, *known, first["interval"])).whole
     least = case.achievable.together
     return {"unseen_before": before / least, "unseen": after / least}
 

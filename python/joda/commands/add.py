@@ -1,13 +1,13 @@
 """Adds a diagnosed effect to a joint's profile, if that lowers the error on runs held out."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from joda.commands.diagnose import check_effect
-from joda.diagnosis.adding import AddedEffect, Error, add_effect, error
+from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error
 from joda.diagnosis.applied_corrections import as_told
 from joda.diagnosis.findings import read_diagnosis
 from joda.diagnosis.learning.account import Account, account, learned_picture
@@ -153,6 +153,10 @@ def add(
         added_effect, law = learn(train, held, progress)
     else:
         added_effect = add_effect(train, held, name, direction, near, progress)
+        progress("all numbers once more, to all runs")
+        found, departs = added_effect.profile, added_effect.departs
+        found = by_all(measured, found, added_effect.effect, departs, near)
+        added_effect = replace(added_effect, profile=found)
     known = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
     told_law = account(train, held, law, added_effect.after.window, known) if law else None
     notes: list[str] = []

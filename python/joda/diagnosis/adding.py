@@ -17,7 +17,16 @@ from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.overlap import overlap
 from joda.diagnosis.paired_test import FALLEN, worse
 from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
-from joda.diagnosis.shape_refinement import Trials, Tried, checked, likeliest
+from joda.diagnosis.shape_refinement import (
+    LONGEST,
+    Likelihood,
+    Trials,
+    Tried,
+    bouncy,
+    checked,
+    likeliest,
+    refitted,
+)
 from joda.measured.errors import Errors, errors, known
 from joda.measured.misfit import rms
 from joda.measured.reading import Measured
@@ -171,6 +180,33 @@ def add_effect(
         if _as_good(without, first):
             return AddedEffect(train.profile, None, before, before, OWN)
     return AddedEffect(first.profile, effect, before, after, departs=departs)
+
+
+@one_blas_thread
+def by_all(
+    measured: Measured,
+    profile: Profile,
+    effect: str | None,
+    departs: Departures,
+    near: tuple[float, float] | None = None,
+) -> Profile:
+    """A profile with an effect more, all its numbers fitted once more, also to the runs that judged
+    it; as it was where that is not likelier, or departs from what was given in more.
+
+    Args:
+        measured: the joint, its profile as it was given, and all runs.
+        profile: what was accepted.
+        effect: that was added; None: nothing was.
+        departs: by what the profile is not what was given and diagnosed.
+        near: where the effect was diagnosed, in normalised position.
+    """
+    if not measured.runs or not effect:
+        return profile
+    anew = refitted(measured, profile, LONGEST)
+    more = departures(measured.profile, anew, effect, near)
+    if len(more.sentences) > len(departs.sentences):
+        return profile
+    return min(profile, anew, key=Likelihood(measured, bouncy(profile)).loss)
 
 
 def fallen(before: Error, after: Error) -> bool:

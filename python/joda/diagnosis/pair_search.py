@@ -1,10 +1,12 @@
 """Where no effect explains what is missing, perhaps two do: which of them?"""
 
 from collections.abc import Callable
+from dataclasses import replace
 
-from joda.diagnosis.baseline import fit_baseline
+from joda.diagnosis.baseline import Baseline, CoarseFit, fit_baseline
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.holdout import Holdout
+from joda.diagnosis.hypothesis_fits import FittedHypothesis
 from joda.diagnosis.search import Ranking, rank
 from joda.diagnosis.selection import weigh
 from joda.diagnosis.shape_refinement import checked
@@ -27,14 +29,28 @@ def pairs(
         ranking: of what may be missing.
         progress: what is being done.
     """
+    some = ranking.candidates[:AHEAD]
+    ranking = replace(ranking, candidates=tuple(_even(ranking.baseline, one) for one in some))
     tried = []
     for first, candidate in zip(_found(measured, ranking, AHEAD), ranking.candidates, strict=False):
         progress(f"what is missing beside {candidate.hypothesis.effect}")
         beside = measured.changed(checked(candidate.written(ranking.baseline.base)))
-        rest = rank(fit_baseline(beside), roughly=True)
+        anew = fit_baseline(beside)
+        even = tuple(replace(one, uneven=None) for one in anew.hypotheses)
+        rest = rank(replace(anew, hypotheses=even), roughly=True)
         loss = min((one.fit.loss + one.cost for one in rest.candidates), default=candidate.fit.loss)
         tried.append((loss + candidate.cost, (first, *_found(beside, rest, 1))))
     return tuple(pair for _, pair in sorted(tried, key=lambda one: one[0]))
+
+
+def _even(baseline: Baseline, candidate: FittedHypothesis) -> FittedHypothesis:
+    """The candidate as large everywhere: what differs along the way may stand in for a second."""
+    if not (count := candidate.hypothesis.factors):
+        return candidate
+    own = candidate.hypothesis.effect, candidate.hypothesis.direction
+    flat = next(one for one in baseline.hypotheses if (one.effect, one.direction) == own)
+    fit = replace(candidate.fit, x=candidate.fit.x[:-count])
+    return baseline.refined(CoarseFit(replace(flat, uneven=None), (fit,)))
 
 
 def _found(measured: Measured, ranking: Ranking, most: int) -> list[Finding]:

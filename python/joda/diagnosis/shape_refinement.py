@@ -97,7 +97,7 @@ class Trials:
     def __init__(self, train: Measured, held: Measured, bounces: bool = False) -> None:
         """Args: the joint and runs to fit; the same with runs held out; see `Likelihood`."""
         self.train = train
-        bounces = bounces or _bounces(train.profile)
+        bounces = bounces or bouncy(train.profile)
         self.seen, self.unseen = Likelihood(train, bounces), Likelihood(held, bounces)
         longer = LONGER if train.runs else (1.0,)  # curves' segments are all alike
         usual_length = segments_for(train).length
@@ -244,7 +244,7 @@ def refitted(
         parts: whose numbers stay as they are.
     """
     segments = segments_for(train, length, fine=False)  # at the scene's own step
-    estimator = SegmentEstimator(segments, _counted(segments, _bounces(profile)))
+    estimator = SegmentEstimator(segments, _counted(segments, bouncy(profile)))
     if not estimator.counts.any():
         return profile
     kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
@@ -272,7 +272,7 @@ def refitted(
     return parameters.written(estimator.refit(make, unknowns, fit, ROUNDS).x)
 
 
-def _bounces(profile: Profile) -> bool:
+def bouncy(profile: Profile) -> bool:
     """Whether it says how bouncy an end is."""
     return any(isinstance(effect, EndStopRestitution) for effect in profile.effects)
 
