@@ -231,7 +231,8 @@ def refine(
             numbers = (first, first.start), (parameters, result.theta)
             before, after = (Problem(own, which).error(theta) for which, theta in numbers)
             return before, after
-        return error(one), error(one.changed(mended, joint_model=body))
+        right = one.changed(mended, joint_model=body)
+        return error(one, within=False), error(right, within=False)
 
     errors = beside(at_first)
     apart = beside(taken(compiled, number, found, whole, other, servo=servo)) if other else None

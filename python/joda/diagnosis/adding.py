@@ -55,7 +55,7 @@ STRENGTHS = (1.0, 3.0, 10.0)
 
 @dataclass(frozen=True)
 class Error:
-    """How far a model is off, by positions within the joint's range (see `errors`).
+    """How far a model is off.
 
     Attributes:
         whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where none can be
@@ -87,17 +87,20 @@ class AddedEffect:
     departs: Departures = FAITHFUL
 
 
-def error(measured: Measured, profile: Profile | None = None) -> Error:
-    """How far the model, or another profile, is off: of runs, in MuJoCo with the plugin."""
-    return replayed(measured, profile)[0]
+def error(measured: Measured, profile: Profile | None = None, *, within: bool = True) -> Error:
+    """How far the model, or another profile, is off: of runs, in MuJoCo with the plugin; by
+    positions `within` the joint's range (see `errors`) or all."""
+    return replayed(measured, profile, within=within)[0]
 
 
-def replayed(measured: Measured, profile: Profile | None = None) -> tuple[Error, Errors | None]:
+def replayed(
+    measured: Measured, profile: Profile | None = None, *, within: bool = True
+) -> tuple[Error, Errors | None]:
     """The same, and the replays; None where there are only curves."""
     model = measured if profile is None else measured.changed(profile)
     if not model.runs:
         return Error(None, rms(np.concatenate([curve.excess for curve in model.curves]))), None
-    found = errors(model, within=True)
+    found = errors(model, within=within)
     return Error(known(found.whole), found.window), found
 
 
