@@ -69,6 +69,8 @@ FACTOR, UNEVEN = (-1.5, 1.5, 0.05), 0.3
 does (one standard deviation)."""
 FINER = (KNOTS, 17, 33)
 """Control points of such a size: where it leaves more than noise, more."""
+ONE_OF_TWO = 2 * float(np.log(2))
+"""How much rarer each direction of an effect is than the effect, see `neg_log_prior`."""
 TINY = 1e-12
 """As good as no force."""
 
@@ -189,6 +191,7 @@ def _along(
         direction,
         misfit_tolerance,
     )
+    flat = replace(flat, neg_log_prior=0.0 if direction == "both" else ONE_OF_TWO)
 
     def uneven(count: int, finer: Hypothesis | None) -> Hypothesis:
         knots, padded = _knots(units, count)
