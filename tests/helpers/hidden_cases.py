@@ -7,9 +7,9 @@ from zlib import crc32
 
 import numpy as np
 
+from joda.diagnosis.adding import Error, error
 from joda.hidden import EFFECTS, FAMILIES, Case, draw, write
 from joda.hidden.cases import FAMILY, PARTIAL, VISIBLE
-from joda.measured.errors import Errors, errors
 from joda.measured.reading import Measured, read_measured
 from joda.profile import Profile
 
@@ -154,6 +154,6 @@ def read(case: Case) -> tuple[Measured, Measured]:
     return train, held_out
 
 
-def missed(measured: Measured, profile: Profile | None = None) -> Errors:
+def missed(measured: Measured, profile: Profile | None = None) -> Error:
     """How far the model, or another profile, is off, also beyond the ends of the range."""
-    return errors(measured if profile is None else measured.changed(profile))
+    return error(measured, profile, within=False)

@@ -153,12 +153,12 @@ def add(
         added_effect, law = learn(train, held, progress)
     else:
         added_effect = add_effect(train, held, name, direction, near, progress)
-        progress("all numbers once more, to all runs")
-        found, departs = added_effect.profile, added_effect.departs
-        found = by_all(measured, found, added_effect.effect, departs, near)
-        added_effect = replace(added_effect, profile=found)
-    known = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
-    told_law = account(train, held, law, added_effect.after.window, known) if law else None
+        if added_effect.effect:
+            progress("all numbers once more, to all runs")
+            known = added_effect.profile, name, added_effect.departs
+            added_effect = replace(added_effect, profile=by_all(measured, *known, near))
+    nearest = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
+    told_law = account(train, held, law, added_effect.after.window, nearest) if law else None
     notes: list[str] = []
     corrections: Path | None = corrections_beside(target)
     if added_effect.effect:

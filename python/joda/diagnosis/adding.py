@@ -189,7 +189,7 @@ def add_effect(
 def by_all(
     measured: Measured,
     profile: Profile,
-    effect: str | None,
+    effect: str,
     departs: Departures,
     near: tuple[float, float] | None = None,
 ) -> Profile:
@@ -199,11 +199,11 @@ def by_all(
     Args:
         measured: the joint, its profile as it was given, and all runs.
         profile: what was accepted.
-        effect: that was added; None: nothing was.
+        effect: that was added.
         departs: by what the profile is not what was given and diagnosed.
         near: where the effect was diagnosed, in normalised position.
     """
-    if not measured.runs or not effect:
+    if not measured.runs:
         return profile
     anew = refitted(measured, profile, LONGEST)
     more = departures(measured.profile, anew, effect, near)

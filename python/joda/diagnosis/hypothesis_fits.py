@@ -13,7 +13,14 @@ from joda.diagnosis.force_balance import balanced
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypotheses.base import FREE_CURVE
 from joda.estimation.base_model import BaseModel
-from joda.estimation.estimator import CAUCHY_SCALE, Fit, Linearization, Make, SegmentEstimator
+from joda.estimation.estimator import (
+    CAUCHY_SCALE,
+    Fit,
+    Linearization,
+    Make,
+    SegmentEstimator,
+    excess,
+)
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
 
@@ -228,9 +235,9 @@ def uneven(
 ) -> FittedHypothesis:
     """The candidate with a size that differs along the way, or more finely so, where it leaves more
     than noise without and that is worth its numbers."""
-    hypothesis, noise = found.hypothesis, CAUCHY_SCALE * np.log(1 + 1 / CAUCHY_SCALE)
+    hypothesis, samples = found.hypothesis, estimator.samples
     finer = hypothesis.uneven
-    if finer is None or found.fit.loss < estimator.samples * noise + MORE:
+    if finer is None or samples * excess(found.fit.loss, samples) < MORE:
         return found
     own, factors = np.split(found.fit.x, [len(found.fit.x) - hypothesis.factors])
     x = np.append(own, np.zeros(finer.factors))

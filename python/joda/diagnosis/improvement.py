@@ -119,19 +119,19 @@ def improved(
             last = steps[-1]
             steps += [replace(step, servo=last.servo, right=last.right) for step in stairs]
             steps = _named_anew(parts, steps, progress)
-        if steps[-1].added:
+        if effect := steps[-1].effect:
             progress("all numbers once more, to all runs")
-            steps[-1] = _by_all(measured, steps[-1])
+            steps[-1] = _by_all(measured, steps[-1], effect)
     except KeyboardInterrupt:
         why = INTERRUPTED
     return tuple(steps), why
 
 
-def _by_all(measured: Measured, last: Step) -> Step:
+def _by_all(measured: Measured, last: Step, effect: str) -> Step:
     """The last stair, fitted once more to all runs as they were set right."""
     whole = last.right.of(measured) if last.right else measured
     whole, _ = _driven((whole, whole), last.servo)
-    return replace(last, profile=by_all(whole, last.profile, last.effect, last.departs))
+    return replace(last, profile=by_all(whole, last.profile, effect, last.departs))
 
 
 def _numbers_first(parts: Parts, before: Error, progress: Progress) -> Step | None:

@@ -93,8 +93,9 @@ def segments_of(
             index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
             spread, push = _spread(time, position, sigma), run.part(piece).force_error()
             begins = _after_jolts(begins, index, time, push / inertia, JOLTED * span)
-            begins, hits = _before_knocks(begins, index, (position - lo) / span, spread / span)
-            begins = _after_pressing(begins, index, (position - lo) / span, spread / span)
+            place_noise = (position - lo) / span, spread / span
+            begins, hits = _before_knocks(begins, index, *place_noise)
+            begins = _after_pressing(begins, index, *place_noise)
             many = len(begins)
             window = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST

@@ -69,9 +69,7 @@ class Unknowns:
         own = [(self.rough, before), (other.rough, after)]
         padded = [np.pad(part, ((0, 0), sides)) for part, sides in own if part is not None]
         rough = np.vstack(padded) if padded else None
-        widest = None
-        if self.widest is not None or other.widest is not None:
-            widest = np.hstack([self._widest, other._widest])
+        widest = np.hstack([self._widest, other._widest])
         return Unknowns(low, high, step, mean, prior_std, widest=widest, rough=rough)
 
     def some(self, kept: NDArray[np.bool_]) -> "Unknowns":

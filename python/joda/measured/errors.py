@@ -123,10 +123,13 @@ def errors(
         paths.append(measured.replayer.whole(run, start))
         misfit = misfits(paths[-1], run.position)
         off.append(misfit[~np.isnan(paths[-1])])
-        pieces = []
-        for piece in measured.replayer.windows(run, sigma) if windows else []:
-            there = run.position[piece.samples]
-            pieces.append(replace(piece, misfit=misfits(there + piece.misfit, there)))
+        pieces = measured.replayer.windows(run, sigma) if windows else []
+        if within:
+            there = [run.position[piece.samples] for piece in pieces]
+            pieces = [
+                replace(piece, misfit=misfits(own + piece.misfit, own))
+                for piece, own in zip(pieces, there, strict=True)
+            ]
         left.append(joined(pieces))
         whole = rms(off[-1])
         scatter = measured.replayer.scatter(run, start) if explained and start else None
