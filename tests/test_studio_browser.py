@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import os
 import re
 import shutil
@@ -9,6 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from contextlib import closing
 from types import SimpleNamespace
 from urllib.parse import urlsplit
@@ -222,7 +224,18 @@ class Page:
         return self.browser.execute_script("return window.unsaved")
 
     def save(self, name):
-        self.keys(Keys.CONTROL, "s")
+        pressed = -math.inf
+
+        def asked():  # a dialog that is just closing may take the key
+            nonlocal pressed
+            if any(button.is_displayed() for button in self.all(".save-yes")):
+                return True
+            if time.monotonic() - pressed > 5.0:
+                self.keys(Keys.CONTROL, "s")
+                pressed = time.monotonic()
+            return False
+
+        self.until(asked)
         self.fill("input[aria-label='Scene, in the project folder']", name)
         self.click(".save-yes")
 
