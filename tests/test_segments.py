@@ -236,6 +236,44 @@ def test_a_segment_begins_after_a_force_that_changed_between_two_samples(each):
     assert segments.length == pytest.approx(0.6, abs=0.01)
 
 
+def squares(runs, moved, **more):
+    """What positions that are off by so much (m) add to a run's sum of squares: 1 for a motion in
+    one way that is as uncertain as that, and far more where it is believed to be certain."""
+    segments = segments_of(runs, [SIGMA] * len(runs), 1.0, 0.0, 1.0, STEP, 0.6, **more)
+    return np.sum(segments.residuals(np.concatenate(moved)) ** 2) / len(runs)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_an_end_that_is_pressed_within_the_noise_may_throw_the_joint_back(every):
+    """Pressed by a depth within the noise, a limit of 150 rad/s gives the joint a speed of 150
+    times that: also where only every third sample is looked at."""
+    rng = np.random.default_rng(every)
+    time = STEP / every * np.arange(600 * every)
+    since = np.maximum(time - 0.1, 0.0)
+    runs, moved = [], []
+    for k in range(40):
+        moved.append(150 * SIGMA * abs(rng.standard_normal()) * since)
+        position = 2.0 * since**2 + moved[-1] + SIGMA * rng.standard_normal(len(time))
+        runs.append(Run(f"{k}.csv", time, position, None, 0.001 * np.ones(len(time)), True))
+    assert 200 * squares(runs, moved, limit_rate=150.0) < squares(runs, moved)
+
+
+def test_when_a_force_jumped_between_two_samples_is_not_known():
+    """A jump of 1 N at any moment between them gives 1 kg up to 1 N · 10 ms more or less."""
+    rng = np.random.default_rng(3)
+    time = 10 * STEP * np.arange(60)
+    runs, moved = [], []
+    for k in range(40):
+        moment = 0.2 + 0.01 * rng.random()
+        since = np.maximum(time - moment, 0.0)
+        position = 0.2 + 0.5 * since**2
+        noisy = position + SIGMA * rng.standard_normal(len(time))
+        force = 0.01 * np.sin(5 * time) + (since > 0)
+        runs.append(Run(f"{k}.csv", time, noisy, None, force, True))
+        moved.append((0.205 - moment) * since)
+    assert 0.5 < squares(runs, moved) < 2
+
+
 def _spans(segments):
     """First and last times of the segments that have enough samples."""
     rows = [row[row >= 0] for row in segments.rows]

@@ -56,6 +56,7 @@ def segments_of(
     length: float | None = None,
     fine: bool = True,
     diverges: Callable[[Array], Array] = np.zeros_like,
+    limit_rate: float = 0.0,
 ) -> Segments:
     """Cuts runs into segments; parts where the force is not known are left out.
 
@@ -70,6 +71,8 @@ def segments_of(
             steps; else they are the scene's.
         diverges: how fast (1/s) the joint runs away from positions (rad or m), as a force that
             drives it on makes it; 0 where it does not.
+        limit_rate: natural frequency of the joint at an end of its range, 1/s: how fast the end,
+            pressed as deep as the noise hides, may throw it back.
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
@@ -96,6 +99,10 @@ def segments_of(
             place_noise = (position - lo) / span, spread / span
             begins, hits = _before_knocks(begins, index, *place_noise)
             begins = _after_pressing(begins, index, *place_noise)
+            for left in _leaves(begins, index, *place_noise):  # in one of these gaps
+                gaps = np.diff(time[left.start : left.stop + 1])
+                thrown = limit_rate * spread[left] / gaps / np.sqrt(len(gaps))
+                push[left] = np.hypot(push[left], inertia * thrown)
             many = len(begins)
             window = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST
@@ -253,6 +260,7 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array, rate: Array)
     (1 - 1 / sqrt(1 + l)) u uᵀ.
     """
     found = []
+    given = np.cumsum(np.append(0.0, (push[:-1] * np.maximum(np.diff(time), 0.0)) ** 2))
     for row in rows:
         own = row[row >= 0]
         if not push[own].any():
@@ -260,7 +268,9 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array, rate: Array)
             continue
         t = time[own] - time[own[0]]
         gaps = np.diff(t, append=t[-1])
-        moved = _responses(t, gaps, rate[own]) * (gaps * push[own]) / sigma[own][:, None]
+        between = np.sqrt(np.diff(given[own], append=given[own[-1:]]))  # in samples left out, too
+        speeds = np.maximum(gaps * push[own], between)
+        moved = _responses(t, gaps, rate[own]) * speeds / sigma[own][:, None]
         size, way = np.linalg.eigh(moved @ moved.T)
         much = size > SHARED
         found.append(way[:, much] * np.sqrt(1 - 1 / np.sqrt(1 + size[much])))
@@ -348,6 +358,20 @@ def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -
         if own[:1].any() and not own.all():
             more.append(index[row[np.argmin(own)]])
     return np.union1d(begins, -(-np.array(more, int) // GRID) * GRID)
+
+
+def _leaves(begins: Integers, index: Integers, s: Array, noise: Array) -> list[slice]:
+    """Of each segment that begins at an end of the range and leaves it, the samples at which it may
+    do so: from the last one that is there as far as noise tells, until one that is clearly not."""
+    inside = np.minimum(s, 1 - s) / noise
+    found = []
+    for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
+        own = inside[row[row >= 0]]
+        clear = int(np.argmax(own >= BEYOND))
+        if clear:
+            there = int(np.flatnonzero(np.append(0.0, own[1:clear]) <= 1)[-1])
+            found.append(slice(row[there], row[clear]))
+    return found
 
 
 def _knocks(rows: Integers, s: Array, noise: Array, hits: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -42,6 +42,9 @@ SHOWN, GROWS = 6.0, 1.7
 more than so many times as far: at constant acceleration three times, at constant velocity once."""
 KEPT = 0.8
 """Part of the departures, the smaller ones, that tell the noise."""
+JUMP = 2.0
+"""How many times as much as before and after it a force changes from one sample to the next where
+it jumps between them."""
 CONFIDENCE = 1.0
 """Half width of the intervals, in standard deviations."""
 
@@ -129,7 +132,13 @@ def force_error(time: Array, force: Array, forced: bool) -> Array:
         return np.zeros(len(time))
     bends = np.zeros(len(force))
     bends[1:-1] = np.abs(np.diff(force, 2)) / 8  # a line through a parabola misses it by as much
-    return np.hypot(noise(time, force), np.maximum(bends, np.roll(bends, -1)))
+    between = np.maximum(bends, np.roll(bends, -1))
+    step = np.abs(np.diff(force))
+    around = np.pad(step, 1)
+    jumps = step > JUMP * np.maximum(around[:-2], around[2:])
+    # when it jumped is not known: its mean from sample to sample is uniformly distributed
+    between[:-1][jumps] = np.maximum(between[:-1], step / np.sqrt(12))[jumps]
+    return np.hypot(noise(time, force), between)
 
 
 def deviation(values: Array) -> float:
