@@ -18,6 +18,7 @@ from joda.diagnosis.hypothesis_fits import (
     refined,
     scored,
     simplex_searched,
+    uneven,
 )
 from joda.diagnosis.impacts import Impacts, Rebound, ends_of, impacts_at, restitution_fit
 from joda.diagnosis.units import units_of
@@ -121,6 +122,10 @@ class Baseline:
         x, start = found.best.x, found.best.start
         fit = self.estimator.fit(make, unknowns, x, start, iterations=0)
         return scored(self.estimator, found.hypothesis, fit)
+
+    def uneven(self, found: FittedHypothesis) -> FittedHypothesis:
+        """The candidate with a size that differs along the way, where that leaves much less."""
+        return uneven(self.estimator, self.base, found)
 
     def perturbed(self, found: FittedHypothesis) -> FittedHypothesis:
         """The candidate with its numbers tried elsewhere."""

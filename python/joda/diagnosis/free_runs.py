@@ -177,9 +177,8 @@ class _Whole:
         (lo, hi), inertia = measured.profile.joint.range, measured.joint_model.inertia
         longest = max(float(np.ptp(run.time)) for run in runs)
         self.parts = parts
-        self.segments = segments_of(
-            runs, sigmas, hi - lo, lo, inertia, measured.timestep, longest, accurate
-        )
+        fixed = runs, sigmas, hi - lo, lo, inertia, measured.timestep
+        self.segments = segments_of(*fixed, longest, accurate, thinned=False)
         self.estimator = SegmentEstimator(self.segments, np.ones(len(self.segments.at), bool))
         self.base = base.in_steps(self.segments.h, accurate)
 

@@ -48,6 +48,9 @@ OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
 MORE = 20.0
 """Loss beyond noise from which it may be that a size differs along the way."""
+MUCH_LESS, FINEST = 0.5, 3
+"""Part of the loss beyond noise, at most, that a size which differs along the way leaves; and how
+many times the places at which it does become more."""
 NOTHING = 0.1
 """Part of its step below which a strength is none."""
 LOST = 10.0
@@ -226,26 +229,37 @@ def refined(
     wider = hypothesis.unknowns.widened()
     if not hypothesis.unknowns.pressed(found.x) or wider is hypothesis.unknowns:
         found = _free(estimator, base, found)
-        return found if hypothesis.factors else uneven(estimator, base, found)
+        return found if hypothesis.factors else uneven(estimator, base, found, steps=1)
     return refined(estimator, base, replace(hypothesis, unknowns=wider), [found.fit])
 
 
 def uneven(
-    estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
+    estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis, steps: int = FINEST
 ) -> FittedHypothesis:
-    """The candidate with a size that differs along the way, or more finely so, where it leaves more
-    than noise without and that is worth its numbers."""
-    hypothesis, samples = found.hypothesis, estimator.samples
-    finer = hypothesis.uneven
-    if finer is None or samples * excess(found.fit.loss, samples) < MORE:
-        return found
-    own, factors = np.split(found.fit.x, [len(found.fit.x) - hypothesis.factors])
-    x = np.append(own, np.zeros(finer.factors))
-    if len(factors):
-        there, here = (np.linspace(0, 1, one.factors) for one in (hypothesis, finer))
-        x[len(own) :] = np.interp(here, there, factors)
-    other = refined(estimator, base, finer, [replace(found.fit, x=x)])
-    return min(found, other, key=lambda one: one.score)
+    """The candidate with a size that differs along the way, where it leaves more than noise as it
+    is and much less so, and that is worth its numbers: else factors would only be bent to whatever
+    else is missing.
+
+    Args:
+        estimator, base: what is fitted to.
+        found: the candidate.
+        steps: how many times the places at which the size differs may become more.
+    """
+    samples, tried = estimator.samples, [found]
+    for _ in range(steps):
+        last = tried[-1]
+        finer = last.hypothesis.uneven
+        if finer is None or samples * excess(last.fit.loss, samples) < MORE:
+            break
+        own, factors = np.split(last.fit.x, [len(last.fit.x) - last.hypothesis.factors])
+        x = np.append(own, np.zeros(finer.factors))
+        if len(factors):
+            there, here = (np.linspace(0, 1, one.factors) for one in (last.hypothesis, finer))
+            x[len(own) :] = np.interp(here, there, factors)
+        tried.append(refined(estimator, base, finer, [replace(last.fit, x=x)]))
+    least = min(tried, key=lambda one: one.score)
+    much = MUCH_LESS * excess(found.fit.loss, samples)
+    return least if excess(least.fit.loss, samples) < much else found
 
 
 def beside(hypothesis: Hypothesis, found: FittedHypothesis) -> Hypothesis:
@@ -262,8 +276,8 @@ def perturbed(
     """The candidate after its numbers were tried elsewhere: a fit does not see across an edge that
     few segments cross, nor past a speed at which the joint begins to stick. What is uneven is so as
     finely as is worth it."""
-    while found.hypothesis.factors and (finer := uneven(estimator, base, found)) is not found:
-        found = finer
+    if found.hypothesis.factors:
+        found = uneven(estimator, base, found)
     make, unknowns = joined(base, found.hypothesis)
     best = found.fit
     n = len(best.x)

@@ -191,7 +191,7 @@ def _perturbed(
     best = _best(candidates)[:PERTURBED]
     names = {one.hypothesis.effect for one in best}
     others = [one for one in candidates if one.hypothesis.effect in names and one is not best[0]]
-    perturbed = work.all(baseline.perturbed, best[:1])
+    perturbed = work.all(baseline.perturbed, work.all(baseline.uneven, best[:1]))
     least = min((one.fit.loss for one in (*candidates, *perturbed)), default=0.0)
     part = min(QUICK / max(baseline.estimator.samples, 1.0), 1.0)
     most = max(NEAR * least, part * baseline.fit.loss)

@@ -57,6 +57,7 @@ def segments_of(
     fine: bool = True,
     diverges: Callable[[Array], Array] = np.zeros_like,
     limit_rate: float = 0.0,
+    thinned: bool = True,
 ) -> Segments:
     """Cuts runs into segments; parts where the force is not known are left out.
 
@@ -73,6 +74,7 @@ def segments_of(
             drives it on makes it; 0 where it does not.
         limit_rate: natural frequency of the joint at an end of its range, 1/s: how fast the end,
             pressed as deep as the noise hides, may throw it back.
+        thinned: whether of many samples, or where the joint rests, only some count.
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
@@ -114,12 +116,11 @@ def segments_of(
             given = np.zeros(len(time)) if run.command is None else run.command[piece]
             command = held(time, given, edges)
             parts.append((force, command, step + begins, fresh, start, prior_std, same))
-            acted = run.command is not None or bool(np.any(run.force[piece]))
-            window = np.where(
-                enough[window] & _thinned(index // chunk, position / spread, not acted),
-                window + count,
-                -1,
-            )
+            counts = enough[window]
+            if thinned:
+                acted = run.command is not None or bool(np.any(run.force[piece]))
+                counts &= _thinned(index // chunk, position / spread, not acted)
+            window = np.where(counts, window + count, -1)
             own = position, time, window, hits, spread, push
             samples.append((step + index, place - index, *own))
             step, count = step + steps, count + many

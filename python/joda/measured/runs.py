@@ -271,15 +271,20 @@ def held(time: Array, values: Array, edges: Array) -> Array:
 def until_end(run: Run, span: tuple[float, float], clear: float) -> Run:
     """A run up to where the joint comes to an end of its range from elsewhere.
 
+    What a pressed end does to the joint is not known: where it begins beyond its range, from where
+    it comes back.
+
     Args:
         run: which may begin at an end.
         span: the range, rad or m.
         clear: how far off an end the joint must be, rad or m, not to be at it.
     """
-    away = np.minimum(run.position - span[0], span[1] - run.position) > clear
+    inside = np.minimum(run.position - span[0], span[1] - run.position)
+    begin = int(np.argmax(inside >= 0)) if inside[0] < -clear else 0
+    away = inside[begin:] > clear
     left = int(np.argmax(away)) if away.any() else len(away)
     back = np.flatnonzero(~away[left:])
-    return run.part(slice(0, left + int(back[0]) if len(back) else len(away)))
+    return run.part(slice(begin, begin + left + int(back[0]) if len(back) else None))
 
 
 def write_run(path: Path, run: Run) -> None:
