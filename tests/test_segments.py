@@ -258,6 +258,24 @@ def test_an_end_that_is_pressed_within_the_noise_may_throw_the_joint_back(every)
     assert 200 * squares(runs, moved, limit_rate=150.0) < squares(runs, moved)
 
 
+def test_a_segment_that_begins_just_after_an_end_threw_the_joint_back_begins_within_the_range():
+    """At 1 kHz every eighth sample, so that a parabola through the corner lies beyond the end."""
+    rng = np.random.default_rng(5)
+    time = 8 * STEP * np.arange(60)
+    for late in np.linspace(0, 0.008, 9):
+        since = time - 0.2 - late
+        position = 1 - np.where(since < 0, -3.5 * since, 0.3 * np.maximum(since - 0.012, 0))
+        position += 0.004 * ((since >= 0) & (since < 0.012))
+        noisy = position + 8e-5 * rng.standard_normal(len(time))
+        run = Run("run.csv", time, noisy, None, 0 * time, False)
+        segments = segments_of([run], [8e-5], 1.0, 0.0, 1.0, STEP, 0.1)
+        first = [row[0] for row in segments.rows if row[0] >= 0]
+        begun = segments.start[segments.rows[:, 0] >= 0, 0]
+        inside = segments.position[first] < 1 - 4 * 8e-5
+        assert inside.sum() > 2
+        assert np.all(begun[inside] <= 1)
+
+
 def test_when_a_force_jumped_between_two_samples_is_not_known():
     """A jump of 1 N at any moment between them gives 1 kg up to 1 N · 10 ms more or less."""
     rng = np.random.default_rng(3)

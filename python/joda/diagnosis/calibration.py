@@ -385,7 +385,8 @@ def covariance(
     make, unknowns = wider.make, wider.unknowns
     if hypothesis:
         make, unknowns = joined(with_numbers(wider), hypothesis)
-    prior_std = unknowns.prior_std.copy()
+    # an end of an interval that no run came to is within its bounds, and no more is known of it
+    prior_std = np.minimum(unknowns.prior_std, unknowns.high - unknowns.low)
     prior_std[first:last] = ANYTHING
     precision = np.linalg.inv(estimator.covariance(make, unknowns, there, prior_std))
 

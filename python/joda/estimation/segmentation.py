@@ -109,6 +109,9 @@ def segments_of(
             window = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST
             start, prior_std = starts(time, position, time[0] + h * begins, sigma)
+            seen = np.minimum(np.searchsorted(index, begins), len(index) - 1)
+            clear = _inside(*place_noise)[seen] > BEYOND  # not beyond the end that threw it back
+            start[clear, 0] = np.clip(start[clear, 0], lo, lo + span)
             force = np.interp(time[0] + h * np.arange(steps), time, run.force[piece])
             fresh = np.arange(many) == 0
             same = np.full(many, number)
@@ -349,10 +352,15 @@ def _before_knocks(
     return np.union1d(kept, index[np.array(more, int)] // GRID * GRID), hits
 
 
+def _inside(s: Array, noise: Array) -> Array:
+    """How far from the ends of the range, in noises; negative beyond them."""
+    return np.asarray(np.minimum(s, 1 - s) / noise)
+
+
 def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -> Integers:
     """Where segments begin, also where one that began beyond the range comes back into it: what an
     end that yields does to the joint is not known."""
-    beyond = np.maximum(-s, s - 1) > BEYOND * noise
+    beyond = _inside(s, noise) < -BEYOND
     more = []
     for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
         own = beyond[row[row >= 0]]
@@ -364,7 +372,7 @@ def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -
 def _leaves(begins: Integers, index: Integers, s: Array, noise: Array) -> list[slice]:
     """Of each segment that begins at an end of the range and leaves it, the samples at which it may
     do so: from the last one that is there as far as noise tells, until one that is clearly not."""
-    inside = np.minimum(s, 1 - s) / noise
+    inside = _inside(s, noise)
     found = []
     for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
         own = inside[row[row >= 0]]
