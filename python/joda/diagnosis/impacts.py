@@ -85,7 +85,7 @@ class Rebound:
     Attributes:
         ratios: of the speed after a impact to that before it, rising, shape (n,).
         losses: of the segments with each of them, shape (n,).
-        own: loss with the model's own restitution.
+        own: loss with the model's own restitution, or one that is not clearly larger.
         samples: how many there are.
     """
 
@@ -164,7 +164,8 @@ class Impacts:
 
     def rebound(self, profile: Profile) -> Rebound:
         """How well restitutions suit the impacts of a joint with a profile."""
-        own = min(self._loss(self.given, profile), self._best(self.own, profile))
+        alike = (self._best(ratio, profile) for ratio in (self.own, self.own + CLEARLY))
+        own = min(self._loss(self.given, profile), *alike)
         losses = np.array([self._best(ratio, profile) for ratio in self.ratios])
         return Rebound(self.ratios, losses, own, self.estimator.samples)
 
