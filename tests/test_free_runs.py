@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from lids import FRICTION, INERTIA, SIGMA, SPAN, thrown
+from lids import FRICTION, INERTIA, RATE, SIGMA, SPAN, thrown
 
 from joda import compare
 from joda.diagnosis.baseline import fit_baseline
@@ -14,7 +14,7 @@ from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
 from joda.measured.comparison import sentences
 from joda.measured.reading import read_measured
-from joda.measured.runs import write_run
+from joda.measured.runs import Run, write_run
 from joda.measured.whiteness import drift, drifts, free_parts, long_run_variance
 
 SAMPLES = 600
@@ -149,6 +149,20 @@ def test_a_joint_that_friction_holds_is_followed_at_its_mean_position(tmp_path, 
     rests.position[:30] += 0.7 * SIGMA  # from where its start seems to be
     left, _ = measured.replayer.followed(rests, SIGMA)
     assert np.mean(left) == pytest.approx(0, abs=0.05 * SIGMA)
+
+
+def test_a_run_in_which_the_joint_rests_counts_with_all_its_samples(tmp_path, rng):
+    """Of a few of them the mean position may be off by more than all of them allow."""
+    told = []
+    for _ in range(6):
+        moving = thrown(tmp_path, rng, 1, drag=1e-6)
+        rest = rng.uniform(1, 3) + SIGMA * rng.standard_normal(400)
+        time = np.arange(400) / RATE
+        write_run(tmp_path / "rest.csv", Run("rest.csv", time, rest, None, 0 * time, False))
+        names = [tmp_path / "run0.csv", tmp_path / "rest.csv"]
+        measured = read_measured(tmp_path / "model.xml", "lid", names)
+        told.append(free_runs(measured, fit_baseline(moving)).drifting)
+    assert not any(told)
 
 
 def louder(measured, folder, rng, times):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from joda.diagnosis.baseline import RESTITUTION, fit_baseline
-from joda.diagnosis.impacts import mean_of, speed_ratios
+from joda.diagnosis.impacts import AROUND, mean_of, speed_ratios
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.reading import read_measured
 from joda.measured.runs import Run, write_run
@@ -102,6 +102,35 @@ def test_a_stop_of_another_stiffness_is_not_taken_for_a_bouncy_one(tmp_path, hig
     if not restitution:
         assert found.verdict == "adequate"
         assert "From where the joint comes to an end" in found.summary
+
+
+def buffered(start, speed, rate, seconds):
+    """Positions of the same mass that meets a spring and a damper at the high end, critically
+    damped, which push only: v t exp(-r t) deep until t = 2 / r, then thrown back at v exp(-2)."""
+    c, t = 0.05, np.arange(round(seconds * HERTZ)) / HERTZ
+    hit = -np.log(1 - c * (0.5 - start) / speed) / c
+    v = speed * np.exp(-c * hit)
+    since = np.maximum(t - hit, 0.0)
+    off = np.maximum(since - 2 / rate, 0.0)
+    deep = 2 / rate * np.exp(-2) - np.exp(-2) / c * (1 - np.exp(-c * off))
+    inside = v * np.where(off > 0, deep, since * np.exp(-rate * since))
+    return np.where(t < hit, start + speed / c * (1 - np.exp(-c * t)), 0.5 + inside)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [80, 113])
+def test_a_buffer_that_throws_back_hardly_more_than_the_models_stop_is_none(tmp_path, rng, rate):
+    (tmp_path / "slide.xml").write_text(SLIDE.replace('damping="0.05"/>', SOLREF.format("0.005 1")))
+    runs = [tmp_path / f"run{k}.csv" for k in range(5)]
+    for run, speed in zip(runs, rng.uniform(0.4, 1.2, len(runs)), strict=True):
+        position = buffered(rng.uniform(0.1, 0.3), speed, rate, 1.2)
+        off = int(np.argmax(position > 0.5)) + round(2 / rate * HERTZ)
+        position = position[: off + AROUND - 1]  # too few samples to tell the speed after it
+        time = np.arange(len(position)) / HERTZ
+        noisy = position + SIGMA * rng.standard_normal(len(time))
+        write_run(run, Run(run.name, time, noisy, None, 0 * time, False))
+    found = diagnosed(read_measured(tmp_path / "slide.xml", "slide", runs)).diagnosis
+    assert found.verdict == "adequate"
 
 
 def test_windows_by_themselves_are_missed_as_among_all(tmp_path):

@@ -259,21 +259,32 @@ def test_an_end_that_is_pressed_within_the_noise_may_throw_the_joint_back(every)
 
 
 def test_a_segment_that_begins_just_after_an_end_threw_the_joint_back_begins_within_the_range():
-    """At 1 kHz every eighth sample, so that a parabola through the corner lies beyond the end."""
+    """A parabola through the samples before and after the corner lies beyond the end."""
     rng = np.random.default_rng(5)
-    time = 8 * STEP * np.arange(60)
-    for late in np.linspace(0, 0.008, 9):
-        since = time - 0.2 - late
-        position = 1 - np.where(since < 0, -3.5 * since, 0.3 * np.maximum(since - 0.012, 0))
-        position += 0.004 * ((since >= 0) & (since < 0.012))
-        noisy = position + 8e-5 * rng.standard_normal(len(time))
-        run = Run("run.csv", time, noisy, None, 0 * time, False)
-        segments = segments_of([run], [8e-5], 1.0, 0.0, 1.0, STEP, 0.1)
-        first = [row[0] for row in segments.rows if row[0] >= 0]
-        begun = segments.start[segments.rows[:, 0] >= 0, 0]
-        inside = segments.position[first] < 1 - 4 * 8e-5
-        assert inside.sum() > 2
-        assert np.all(begun[inside] <= 1)
+    noise, time = 8e-5, 0.0078 * np.arange(60)
+    counted = 0
+    for late in np.linspace(0, 0.0078, 9):
+        since = time - 0.17 - late
+        thrown = 0.34 * (since - 0.022) * (1 - (since - 0.022) / 0.08)  # a hop under gravity
+        pressed = 0.004 * np.sin(np.pi * since / 0.022)
+        position = 1 - np.where(since < 0, -3.7 * since, np.maximum(thrown, 0.0))
+        position = np.where((since >= 0) & (since < 0.022), 1 + pressed, position)
+        seen = position + noise * rng.standard_normal(len(time))
+        run = Run("run.csv", time, seen, None, 0 * time, False)
+        segments = segments_of([run], [noise], 1.0, 0.0, 1.0, STEP / 3, 0.097)
+        first = segments.rows[:, 0]
+        inside = (first >= 0) & (segments.position[first] < 1 - 5 * noise)
+        assert np.all(segments.start[inside, 0] <= 1)
+        counted += inside.sum()
+    assert counted > 20
+
+
+def test_a_gap_in_a_run_is_no_segment():
+    time = STEP * np.r_[:300, 900:1200]
+    position = np.where(time < 0.5, 0.0, time - 0.9) + SIGMA * np.cos(1e3 * time)
+    run = Run("run.csv", time, position, None, np.ones(len(time)), True)
+    segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP, 0.2, limit_rate=100.0)
+    assert 2 <= (segments.count > 0).sum() <= 4
 
 
 def test_when_a_force_jumped_between_two_samples_is_not_known():

@@ -376,7 +376,7 @@ def _leaves(begins: Integers, index: Integers, s: Array, noise: Array) -> list[s
     found = []
     for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
         own = inside[row[row >= 0]]
-        clear = int(np.argmax(own >= BEYOND))
+        clear = int(np.argmax(own >= BEYOND)) if len(own) else 0
         if clear:
             there = int(np.flatnonzero(np.append(0.0, own[1:clear]) <= 1)[-1])
             found.append(slice(row[there], row[clear]))
