@@ -42,6 +42,8 @@ CLEARLY = 3.0
 SURPRISE = 4.0
 """How many of its widths a number may be off where something is left: a zero that is far off looks
 like a force beside a spring."""
+LEAST_FACTOR = 1e-3
+"""Below which a factor of the model's own strengths counts as that."""
 UNUSUAL = 2.0
 """The same where an effect explains as much in its place."""
 EARLIER: dict[NuisanceName, float] = {"force_offset": float(np.sqrt(ALIKE))}
@@ -329,7 +331,10 @@ def _concluded(
     samples = max(estimator.samples, 1.0)
     left, before = excess(fit.loss, samples), excess(baseline.fit.loss, samples)
     base = own.base
-    usual = base.unknowns.penalty(fit.x[: base.count]) < SURPRISE**2  # else something resists
+    off = np.log(np.maximum(fit.x[: base.count], LEAST_FACTOR)) / base.unknowns.prior_std
+    if "force_scale" in names and len(off):  # masses and strengths may all be off by one factor
+        off = off - off.mean()
+    usual = float(off @ off) < SURPRISE**2  # else something resists
     calm = left < max(CALM, PART * before)
     alone = (
         usual
