@@ -65,9 +65,10 @@ class Holdout:
 
 
 def _misfit(segments: Segments, make: Make, fit: Fit, counts: NDArray[np.bool_]) -> Array:
-    """Misfit of some segments from their best starts, rad or m."""
+    """Misfit of some segments from their best starts, rad or m, but for what errors of the recorded
+    force make of it."""
     simulator = make(fit.x)
     best = SegmentEstimator(segments, counts).started(simulator, near=fit.start)
-    misfit = segments.misfit(simulator, best.start)
-    rows = segments.rows[counts]
-    return np.asarray(misfit[rows[rows >= 0]])
+    left = segments.residuals(segments.misfit(simulator, best.start))[counts]
+    there = segments.rows[counts] >= 0
+    return np.asarray(left[there] / segments.sharpness[counts][there])

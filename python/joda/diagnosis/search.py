@@ -158,13 +158,17 @@ def _fitted(
 ) -> list[FittedHypothesis]:
     """All hypotheses fitted; where one leaves only noise, those that are far off, roughly."""
     coarse_fits = sorted(work.all(baseline.coarse, tried), key=lambda one: one.best.loss)
-    candidates = work.all(baseline.refined, coarse_fits[:PERTURBED])
+    effects = [one.hypothesis.effect for one in coarse_fits]
+    best = sorted(map(effects.index, set(effects)))[:PERTURBED]
+    first = [coarse_fits[k] for k in best]
+    others = [one for k, one in enumerate(coarse_fits) if k not in best]
+    candidates = work.all(baseline.refined, first)
     if roughly:
-        return candidates + work.all(baseline.coarse_scored, coarse_fits[PERTURBED:])
+        return candidates + work.all(baseline.coarse_scored, others)
     least = min((one.fit.loss for one in candidates), default=0.0)
     most = FAR * least if least < ENOUGH * baseline.estimator.samples else np.inf
-    near = [one for one in coarse_fits[PERTURBED:] if one.best.loss < most]
-    far = [one for one in coarse_fits[PERTURBED:] if one.best.loss >= most]
+    near = [one for one in others if one.best.loss < most]
+    far = [one for one in others if one.best.loss >= most]
     return candidates + work.all(baseline.refined, near) + work.all(baseline.coarse_scored, far)
 
 
