@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gauging import FRICTION, SCENE
+from hidden_cases import read
 from scenes import write as write_scene
 from test_compare import door, runs_of, scene_of
 
@@ -18,6 +19,7 @@ from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.summary import summarised
+from joda.diagnosis.verdict import diagnosed
 from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
 from joda.measured.reading import read_measured
@@ -267,3 +269,21 @@ def test_a_ripple_that_is_another_on_the_way_back_clears_no_curve(period, tmp_pa
     assert diagnose(model, "door", [tmp_path / "curve.csv"]).verdict != "adequate"
     found = compare(model, "door", [tmp_path / "curve.csv"])
     assert found.curves_adequacy != "within_noise"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("family", "effect", "seed"),
+    [
+        # one that a rough fit has not found yet: with twice the friction a constant force does as well
+        ("laboratory", "asymmetric_friction", 2010171645),
+        # a button of 3 g, whose held-out windows the errors of the force move by more than noise
+        ("switches", "constant_damping_hinge", 1689445993),
+    ],
+)
+def test_what_was_missed_once_is_named(family, effect, seed):
+    found = diagnosed(read(draw(seed, effect, True, family=family))[0]).diagnosis
+    assert found.verdict == "missing_effect"
+    first = found.effects[0]
+    assert first.effect == effect
+    assert first.held_out_error_after < first.held_out_error_before
