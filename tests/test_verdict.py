@@ -275,7 +275,7 @@ def test_a_ripple_that_is_another_on_the_way_back_clears_no_curve(period, tmp_pa
 @pytest.mark.parametrize(
     ("family", "effect", "seed"),
     [
-        # one that a rough fit has not found yet: with twice the friction a constant force does as well
+        # a rough fit has not found it yet: with twice the friction a constant force does as well
         ("laboratory", "asymmetric_friction", 2010171645),
         # a button of 3 g, whose held-out windows the errors of the force move by more than noise
         ("switches", "constant_damping_hinge", 1689445993),
