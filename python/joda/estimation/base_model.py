@@ -18,6 +18,7 @@ from joda.measured.reading import Measured
 from joda.measured.trust import USUAL, Trust
 from joda.profile import CHANNELS, Profile
 from joda.scenes.actuators import Servo
+from joda.scenes.limits import stiffness_of
 from joda.scenes.native import DAMPING, FRICTION, SPRING
 
 Array = NDArray[np.float64]
@@ -193,25 +194,10 @@ def segments_for(measured: Measured, length: float | None = None, fine: bool = T
     if not measured.runs:
         return curve_segments(measured)
     lo, hi = measured.profile.joint.range
-    joint_model = measured.joint_model
-    fixed = lo, joint_model.inertia, measured.timestep
+    fixed = lo, measured.joint_model.inertia, measured.timestep
+    ends = float(np.sqrt(stiffness_of(measured.joint_model.solref, measured.timestep)))
     diverges = partial(divergence_rate, measured)
-    return segments_of(
-        measured.runs,
-        measured.sigma,
-        hi - lo,
-        *fixed,
-        length,
-        fine,
-        diverges,
-        _limit_rate(joint_model.solref),
-    )
-
-
-def _limit_rate(solref: tuple[float, ...]) -> float:
-    """Natural frequency (1/s) of a joint at a limit with these solver parameters of MuJoCo."""
-    first, second = solref
-    return float(np.sqrt(-first)) if first <= 0 else 1 / (first * second)
+    return segments_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine, diverges, ends)
 
 
 def joint_model_for(measured: Measured, h: float) -> JointModel:

@@ -22,6 +22,8 @@ IMPEDANCE = 0.99
 """As kStopImpedance there."""
 YIELDING, FIRM = 1e-2, 1e-3
 """A stop that yields by more than the first share of the range is made to yield by the second."""
+LEAST_TIME = 1e-7
+"""Of a stop's time constant times its damping ratio, s, that makes a stiffness."""
 IMPEDANCES = 1e-4, 0.9999
 """Smallest and largest impedance that MuJoCo takes."""
 
@@ -50,6 +52,18 @@ def limit_parameters(restitution: float, timestep: float) -> tuple[str, str]:
     return f"{stiffness:.6g} {damping:.6g}", f"{IMPEDANCE:g} {IMPEDANCE:g} 0.001"
 
 
+def stiffness_of(solref: Sequence[float], timestep: float) -> float:
+    """Of a limit, per unit of inertia, 1/s² (MuJoCo's docs, "Solver parameters").
+
+    Args:
+        solref: time constant (s) and damping ratio; or less the stiffness and less the damping.
+        timestep: s; the time constant is two of it at the least.
+    """
+    if solref[0] <= 0:
+        return -solref[0]
+    return 1 / max(max(solref[0], 2 * timestep) * solref[1], LEAST_TIME) ** 2
+
+
 def firm_limit(
     pressed: float, span: float, solref: Sequence[float], solimp: Sequence[float], timestep: float
 ) -> tuple[str, str] | None:
@@ -71,7 +85,7 @@ def firm_limit(
     """
     direct = solref[0] <= 0
     ratio = 1.0 if direct else solref[1]
-    stiffness = -solref[0] if direct else (max(solref[0], 2 * timestep) * ratio) ** -2
+    stiffness = stiffness_of(solref, timestep)
     if stiffness <= 0 or pressed * (1 - solimp[1]) / stiffness <= YIELDING * span:
         return None
     hardest = (2 * timestep * ratio) ** -2
