@@ -5,6 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from hidden_cases import read
 from lids import FRICTION, INERTIA, RATE, SIGMA, SPAN, thrown
 
 from joda import compare
@@ -12,6 +13,7 @@ from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.free_runs import free_runs
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
+from joda.hidden import draw
 from joda.measured.comparison import sentences
 from joda.measured.reading import read_measured
 from joda.measured.runs import Run, write_run
@@ -245,3 +247,14 @@ def test_what_a_spreadsheet_writes_for_no_value_is_no_comment(tmp_path, rng):
     file.write_text("\n".join(rows) + "\n")
     with pytest.raises(JodaError, match=r"run0\.csv, line 41: time is '#N/A'"):
         compared(tmp_path, 1)
+
+
+@pytest.mark.long
+def test_a_part_of_a_run_in_which_the_joint_is_at_rest_is_fitted_from_rest():
+    """A noisy position of a joint that stops near an end is cut there, as if it came to the end; at
+    the speed that a parabola tells, the rest of the run is far off."""
+    case = draw(8203, None, False, family="household")
+    found = diagnosed(read(case)[0]).diagnosis
+    assert found.verdict == "adequate"
+    friction = next(one for one in found.corrections if one.parameter == "frictionloss")
+    assert friction.value == pytest.approx(case.truth.friction, abs=3 * friction.error)

@@ -247,16 +247,17 @@ class SegmentEstimator:
         Args:
             simulator: the joint.
             iterations: at most.
-            near: starts of a fit nearby, shape (m, d); each segment begins there or at the measured
-                one, whichever it misses less from.
+            near: starts of a fit nearby, shape (m, d); each segment begins there, at the measured
+                one, or at rest, whichever it misses least from.
         """
         segments = self.segments
-        start = segments.start
+        start, still = segments.start, segments.start.copy()
+        still[:, 1] = 0.0
         squares = self.squares(simulator, start)[1]
-        if near is not None:
-            from_near = self.squares(simulator, near)[1]
-            start = np.where((from_near < squares)[:, None], near, start)
-            squares = np.minimum(from_near, squares)
+        for other in (still,) if near is None else (still, near):
+            from_other = self.squares(simulator, other)[1]
+            start = np.where((from_other < squares)[:, None], other, start)
+            squares = np.minimum(from_other, squares)
         damping, unit = np.full(len(start), 1e-3), np.eye(start.shape[1])
         for _ in range(iterations):
             about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
