@@ -50,6 +50,7 @@ FLAGS = (
 )  # fmt: skip
 PATIENCE = 240
 EFFECT = "constant_friction_hinge"
+NAME = "input[aria-label='Scene, in the project folder']"
 LID = """\
 <mujoco model="box">
   <compiler angle="radian"/>
@@ -158,15 +159,16 @@ class Page:
             (one) => one[arguments[1]] ?? one.getAttribute(arguments[1]))"""
         return self.browser.execute_script(code, selector, what)
 
-    def click(self, selector):
-        def clicked():
-            found = self.all(selector)
-            if not (found and found[0].is_displayed() and found[0].is_enabled()):
-                return False
-            found[0].click()
-            return True
+    def clicked(self, selector):
+        """Clicks on it, if it is there to be clicked on."""
+        found = self.all(selector)
+        if not (found and found[0].is_displayed() and found[0].is_enabled()):
+            return False
+        found[0].click()
+        return True
 
-        self.until(clicked)
+    def click(self, selector):
+        self.until(lambda: self.clicked(selector))
 
     def drawn(self, chart):
         """The paths of a chart's red line: the model as it is now."""
@@ -192,16 +194,16 @@ class Page:
             chain.key_up(key)
         chain.perform()
 
+    def typed(self, selector, text):
+        """Types it; whether the field holds it then: a dialog that opens may take the focus."""
+        if not self.clicked(selector):
+            return False
+        self.keys(Keys.CONTROL, "a")
+        ActionChains(self.browser).send_keys(text).perform()
+        return self.read(selector, "value") == [text]
+
     def fill(self, selector, text):
-        """Types until that is what the field holds: a dialog that opens may take the focus."""
-
-        def holds():
-            self.click(selector)
-            self.keys(Keys.CONTROL, "a")
-            ActionChains(self.browser).send_keys(text).perform()
-            return self.read(selector, "value") == [text]
-
-        self.until(holds)
+        self.until(lambda: self.typed(selector, text))
 
     def upload(self, path):
         def sent():
@@ -226,7 +228,7 @@ class Page:
     def save(self, name):
         pressed = -math.inf
 
-        def asked():  # a dialog that is just closing may take the key
+        def asked():
             nonlocal pressed
             if any(button.is_displayed() for button in self.all(".save-yes")):
                 return True
@@ -235,9 +237,8 @@ class Page:
                 pressed = time.monotonic()
             return False
 
-        self.until(asked)
-        self.fill("input[aria-label='Scene, in the project folder']", name)
-        self.click(".save-yes")
+        # a dialog that is just closing may take the key, and be seen before it is gone
+        self.until(lambda: asked() and self.typed(NAME, name) and self.clicked(".save-yes"))
 
 
 @pytest.mark.long
@@ -302,7 +303,7 @@ def test_nothing_is_replaced_unasked_nor_written_elsewhere(page, project):
     page.until(lambda: "exists already" in page.text(".outcome"))
     assert precious.read_text() == "precious"
     for name in ("../out.xml", str(project.elsewhere / "out.xml"), "model.xml", "run.csv"):
-        page.fill("input[aria-label='Scene, in the project folder']", name)
+        page.fill(NAME, name)
         page.click(".save-yes")
         page.said(name, "outside" if "out" in name else "must end" if "csv" in name else "at work")
     assert not (project.elsewhere / "out.xml").exists()
