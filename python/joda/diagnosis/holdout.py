@@ -21,6 +21,8 @@ FEW = 6
 """Of fewer segments held out, all are in turn."""
 FOLDS = 4
 """In so many parts."""
+SHOWN = 3.0
+"""How many of its standard errors a mean square is beyond noise where segments show anything."""
 
 
 class Holdout:
@@ -36,7 +38,9 @@ class Holdout:
         own = baseline.base.simulator, baseline.base.unknowns, baseline.fit
         self.before = self._error(*own) if self.folds[0].any() else 0.0
         every = np.flatnonzero(counts)
-        silent = self.before < measured.floor or np.count_nonzero(self.folds[0]) < FEW
+        count = max(int(baseline.estimator.segments.count[self.folds[0]].sum()), 1)
+        noise = measured.floor * np.sqrt(1 + SHOWN * np.sqrt(2 / count))
+        silent = self.before < noise or np.count_nonzero(self.folds[0]) < FEW
         if silent and len(every) > 1:
             parts = (every[k::FOLDS] for k in range(min(FOLDS, len(every))))
             self.folds = [np.isin(np.arange(len(counts)), part) for part in parts]

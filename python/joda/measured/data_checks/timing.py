@@ -58,7 +58,8 @@ def repeated(run: Run, position: Array, step: float) -> str:
         return ""
     step = max(step, float(np.abs(np.diff(value)).min()))
     sigma = smoothing.noise(run.time[first], value)
-    analogue = np.sqrt(max(sigma**2 - step**2 / 4, 0.0))
+    # values that differ are off by a step at the least, so that they seem to be noisier
+    analogue = np.sqrt(max(smoothing.noise(run.time, position) ** 2 - step**2 / 4, 0.0))
     before = value - position[np.maximum(first - SIDES, 0)]
     after = position[np.minimum(first + length - 1 + SIDES, n - 1)] - value
     moving = _least(before, after) > 6 * (sigma + step)
