@@ -154,7 +154,7 @@ def free_runs(measured: Measured, baseline: Baseline) -> FreeRuns | None:
     best = int(np.argmin([fit.loss for fit in fits]))
     samples = sum(len(run.time) for run in measured.runs)
     return FreeRuns(
-        denied=all(way.denied(way.given) for way in ways),
+        denied=all(way.denied_as_it_is(fit) for way, fit in zip(ways, fits, strict=True)),
         drifting=all(way.denied(fit) for way, fit in zip(ways, fits, strict=True)),
         covered=sum(len(run.time) for run, _ in parts) / samples,
         numbers=fits[best].x,
@@ -185,13 +185,12 @@ class _Whole:
     @cached_property
     def given(self) -> Fit:
         """The model as it is, from the starts that suit it best."""
-        as_it_is = self.base.unknowns.mean
-        return replace(self.estimator.started(self.base.simulator(as_it_is)), x=as_it_is)
+        return self._begun(self.base.unknowns.mean)
 
     def fitted(self, near: Array) -> Fit:
         """Its strengths fitted, from where they are and from what shorter segments told."""
         make, unknowns = self.base.simulator, self.base.unknowns
-        begins = (self.given, replace(self.estimator.started(make(near)), x=near))
+        begins = (self.given, self._begun(near))
         fits = [self.estimator.fit(make, unknowns, one.x, one.start) for one in begins]
         return self.estimator.refit(make, unknowns, min(fits, key=lambda fit: fit.loss))
 
@@ -201,6 +200,17 @@ class _Whole:
         each = np.split(missed, np.cumsum([len(run.time) for run, _ in self.parts])[:-1])
         left = [own / sigma for own, (_, sigma) in zip(each, self.parts, strict=True)]
         return drifts(self.parts, left) < CHANCE
+
+    def denied_as_it_is(self, fit: Fit) -> bool:
+        """The same of the model with its own strengths, and with such as another simulator may ask
+        for: towards those that were fitted."""
+        own = self.base.unknowns.mean
+        nearly = np.clip(fit.x, own - APART * np.abs(own), own + APART * np.abs(own))
+        return self.denied(self.given) and self.denied(self._begun(nearly))
+
+    def _begun(self, x: Array) -> Fit:
+        """The model with some numbers, from the starts that suit it best."""
+        return replace(self.estimator.started(self.base.simulator(x)), x=x)
 
     def errors(self, fit: Fit) -> Array:
         """Standard errors of the fitted numbers, shape (k,)."""
