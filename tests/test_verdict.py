@@ -295,15 +295,14 @@ def test_what_was_missed_once_is_named(family, effect, seed):
 @pytest.mark.parametrize(
     ("family", "seed"),
     [
-        (
-            "machinery",
-            8301,
-        ),  # the stop throws back a little more than the model's, once at each end
-        ("laboratory", 8303),  # free runs tell of a damping that is 0.5 % off
-        ("switches", 8301),  # an encoder so coarse that positions repeat
+        # a stop throws back a little more than the model's, once at each end
+        ("machinery", 8301),
+        # free runs tell of a damping that is 0.5 % off
+        ("laboratory", 8303),
+        # an encoder so coarse that positions repeat
+        ("switches", 8301),
     ],
 )
 def test_what_was_accused_once_is_adequate(family, seed):
-    assert (
-        diagnosed(read(draw(seed, None, False, family=family))[0]).diagnosis.verdict == "adequate"
-    )
+    measured = read(draw(seed, None, False, family=family))[0]
+    assert diagnosed(measured).diagnosis.verdict == "adequate"
