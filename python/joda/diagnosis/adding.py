@@ -243,7 +243,8 @@ def starts(
     candidates.sort(key=lambda found: found.score)
     close = [g for g in candidates if near and overlap(g.hypothesis.interval(g.x), near) >= SHARED]
     firsts = candidates[:1] if not close or close[0] is candidates[0] else [candidates[0], close[0]]
-    return [checked(baseline.perturbed(one).written(baseline.base)) for one in firsts]
+    shaped = [baseline.perturbed(baseline.uneven(one)) for one in firsts]
+    return [checked(one.written(baseline.base)) for one in shaped]
 
 
 def _placed(hypothesis: Hypothesis, near: tuple[float, float] | None) -> Hypothesis | None:
