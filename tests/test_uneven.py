@@ -5,6 +5,7 @@ import pytest
 from hidden_cases import read
 
 from joda import templates
+from joda.diagnosis.adding import starts
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.hypotheses import Units, hypotheses
 from joda.diagnosis.search import rank
@@ -70,3 +71,15 @@ def test_a_friction_that_ripples_along_the_way_is_found_with_its_largest_size(se
     size = first.hypothesis.magnitude(first.x)
     known = uncertainty(ranking.baseline, first, first.fit.loss / baseline.fit.loss)
     assert abs(size - case.seal["magnitude"]) < 3 * known.magnitude < size
+
+
+@pytest.mark.long
+def test_what_is_added_begins_with_the_ripples():
+    """Of a slide's one-way friction, ten periods of which lie in the range."""
+    case = draw(2003795171, "asymmetric_friction", True, None, "machinery")
+    begun = starts(fit_baseline(read(case)[0]), "asymmetric_friction", "positive", (0.0, 1.0))[0]
+    (effect,) = begun.effects
+    s = np.linspace(0.03, 0.97, 201)
+    found = np.interp(s, effect.x, effect.y)
+    true = 1 + 0.191 * np.sin(2 * np.pi * (s - 0.2589) / 0.10406)
+    assert np.corrcoef(found, true)[0, 1] > 0.95
