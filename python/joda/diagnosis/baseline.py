@@ -70,6 +70,17 @@ class Baseline:
             self.base.simulator, unknowns, self.fit, unknowns.prior_std
         )
 
+    @property
+    def only_noise(self) -> bool:
+        """Whether the model leaves no more of segments than noise makes."""
+        return excess(self.fit.loss, max(self.estimator.samples, 1.0)) <= 0
+
+    @cached_property
+    def coarse_loss(self) -> float:
+        """What the model leaves, fitted as roughly as hypotheses are at first."""
+        estimator, base = self.estimator.coarser, self.base.coarser()
+        return estimator.fit(base.simulator, base.unknowns, self.fit.x, self.fit.start).loss
+
     @cached_property
     def impacts(self) -> dict[int, Impacts]:
         """At each end that has some, -1 low and 1 high."""

@@ -23,6 +23,8 @@ SEARCHED, FEW = 2, 8
 ENOUGH, FAR = 1.5, 5.0
 """Loss per sample at which nothing more can be found, and from how many times the least a rough fit
 is then left as it is."""
+HARDLY = 20.0
+"""Gain in loss of a rough fit below which nothing comes of it, where the model leaves only noise."""
 NARROWED = 6
 """How many effects are looked at again in longer segments, where the first is not sure."""
 WELLS = {"detent_internal", "bistable_mechanism_internal"}
@@ -156,7 +158,8 @@ class _Work:
 def _fitted(
     baseline: Baseline, tried: Sequence[Hypothesis], work: _Work, roughly: bool
 ) -> list[FittedHypothesis]:
-    """All hypotheses fitted; where one leaves only noise, those that are far off, roughly."""
+    """All hypotheses fitted; where one leaves only noise, those that are far off, roughly; where the
+    model itself does, those that gain hardly anything, too."""
     coarse_fits = sorted(work.all(baseline.coarse, tried), key=lambda one: one.best.loss)
     effects = [one.hypothesis.effect for one in coarse_fits]
     best = sorted(map(effects.index, set(effects)))[:PERTURBED]
@@ -167,6 +170,8 @@ def _fitted(
         return candidates + work.all(baseline.coarse_scored, others)
     least = min((one.fit.loss for one in candidates), default=0.0)
     most = FAR * least if least < ENOUGH * baseline.estimator.samples else np.inf
+    if baseline.only_noise:
+        most = min(most, baseline.coarse_loss - HARDLY)
     near = [one for one in others if one.best.loss < most]
     far = [one for one in others if one.best.loss >= most]
     return candidates + work.all(baseline.refined, near) + work.all(baseline.coarse_scored, far)
@@ -193,6 +198,8 @@ def _perturbed(
 ) -> list[FittedHypothesis]:
     """The best effects, in every variant that is near, with their numbers tried elsewhere."""
     best = _best(candidates)[:PERTURBED]
+    if baseline.only_noise and all(baseline.fit.loss - one.fit.loss < HARDLY for one in best):
+        return []
     names = {one.hypothesis.effect for one in best}
     others = [one for one in candidates if one.hypothesis.effect in names and one is not best[0]]
     perturbed = work.all(baseline.perturbed, work.all(baseline.uneven, best[:1]))
