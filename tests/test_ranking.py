@@ -86,6 +86,23 @@ def test_what_is_left_rough_changes_nothing_of_the_best(baseline, ranked, monkey
     assert whole.level == pytest.approx(ranked.level, rel=0.01)
 
 
+@pytest.mark.slow
+def test_where_the_model_leaves_only_noise_few_are_fitted_to_the_end(monkeypatch):
+    refined, rng = [], np.random.default_rng()
+    measured = read(draw(int(rng.integers(2**31)), None))[0].changed(runs=[0, 4])
+    baseline = fit_baseline(replace(measured, sigma=tuple(1.2 * one for one in measured.sigma)))
+    assert baseline.only_noise
+    monkeypatch.setattr(
+        fits, "refined", lambda *args, make=fits.refined: refined.append(0) or make(*args)
+    )
+    few, some = rank(baseline), len(refined)
+    monkeypatch.setattr(search, "HARDLY", -np.inf)
+    whole = rank(baseline)
+    assert some < (len(refined) - some) / 2
+    assert weigh(few).verdict == weigh(whole).verdict == "adequate"
+    assert evidence(whole).gain - evidence(few).gain < 20
+
+
 def test_progress_counts_and_never_exceeds_the_total(ranked, progress):
     assert [done for done, _ in progress] == list(range(1, len(progress) + 1))
     assert all(done <= total for done, total in progress)

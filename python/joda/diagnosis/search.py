@@ -24,7 +24,8 @@ ENOUGH, FAR = 1.5, 5.0
 """Loss per sample at which nothing more can be found, and from how many times the least a rough fit
 is then left as it is."""
 HARDLY = 20.0
-"""Gain in loss of a rough fit below which nothing comes of it, where the model leaves only noise."""
+"""Gain in loss of a rough fit from which on something may come of it, where a model leaves only
+noise."""
 NARROWED = 6
 """How many effects are looked at again in longer segments, where the first is not sure."""
 WELLS = {"detent_internal", "bistable_mechanism_internal"}
@@ -158,8 +159,8 @@ class _Work:
 def _fitted(
     baseline: Baseline, tried: Sequence[Hypothesis], work: _Work, roughly: bool
 ) -> list[FittedHypothesis]:
-    """All hypotheses fitted; where one leaves only noise, those that are far off, roughly; where the
-    model itself does, those that gain hardly anything, too."""
+    """All hypotheses fitted; roughly those that are far off, where one leaves only noise, and those
+    that gain hardly anything, where the model itself does."""
     coarse_fits = sorted(work.all(baseline.coarse, tried), key=lambda one: one.best.loss)
     effects = [one.hypothesis.effect for one in coarse_fits]
     best = sorted(map(effects.index, set(effects)))[:PERTURBED]
