@@ -301,6 +301,8 @@ def test_what_was_missed_once_is_named(family, effect, seed):
         ("laboratory", 8303),
         # an encoder so coarse that positions repeat
         ("switches", 8301),
+        # a door that is flicked up and creeps back: the loss of its whole run is jagged
+        ("household", 8502),
     ],
 )
 def test_what_was_accused_once_is_adequate(family, seed):

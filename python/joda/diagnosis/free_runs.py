@@ -6,6 +6,7 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from joda.diagnosis.baseline import Baseline
 from joda.estimation.base_model import BaseModel
@@ -33,6 +34,11 @@ FINER = 4
 CHANCE = 1e-4
 """Probability, for a model that lacks nothing, of a drift of free runs as clear as one that counts:
 two simulators differ a little."""
+SEARCHED, EACH, TIMES = 16, 100, 2
+"""Numbers, with those of the runs' starts, up to which they are searched without derivatives; how
+often each is tried, and how often all is begun anew."""
+ASIDE, AWAY = 4.0, 0.1
+"""How far from the fit that begins: numbers in their steps, starts in what is not known of them."""
 DRAWS = 8
 """Strengths that are drawn, to tell how far their errors move a run."""
 
@@ -150,15 +156,21 @@ def free_runs(measured: Measured, baseline: Baseline) -> FreeRuns | None:
     if not (parts := free_parts(measured)):
         return None
     ways = [_Whole(measured, baseline.base, parts, accurate) for accurate in (True, False)]
-    fits = [way.fitted(baseline.fit.x) for way in ways]
+    smooth = [way.fitted(baseline.fit.x) for way in ways]
+    fits = [
+        way.searched(fit) if way.denied(fit) else fit for way, fit in zip(ways, smooth, strict=True)
+    ]
     best = int(np.argmin([fit.loss for fit in fits]))
     samples = sum(len(run.time) for run in measured.runs)
+    errors = ways[best].errors(fits[best])
+    if fits[best] is not smooth[best]:  # of a jagged loss its curvature tells nothing
+        errors = np.hypot(errors, np.sqrt(np.diag(baseline.covariance)))
     return FreeRuns(
         denied=all(way.denied_as_it_is(fit) for way, fit in zip(ways, fits, strict=True)),
         drifting=all(way.denied(fit) for way, fit in zip(ways, fits, strict=True)),
         covered=sum(len(run.time) for run, _ in parts) / samples,
         numbers=fits[best].x,
-        errors=ways[best].errors(fits[best]),
+        errors=errors,
     )
 
 
@@ -193,6 +205,33 @@ class _Whole:
         begins = (self.given, self._begun(near))
         fits = [self.estimator.fit(make, unknowns, one.x, one.start) for one in begins]
         return self.estimator.refit(make, unknowns, min(fits, key=lambda fit: fit.loss))
+
+    def searched(self, found: Fit) -> Fit:
+        """A fit after a search without derivatives (Nelder and Mead 1965) of its numbers and the
+        runs' starts, if these are not too many: where a joint sticks, the loss is jagged."""
+        make, unknowns, unknown = self.base.simulator, self.base.unknowns, self.segments.prior_std
+        k = len(found.x)
+        scale = np.append(ASIDE * unknowns.step, AWAY * unknown.ravel())
+        if len(scale) > SEARCHED:
+            return found
+
+        def at(z: Array) -> tuple[Array, Array]:
+            off = scale * z
+            x = np.clip(found.x + off[:k], unknowns.low, unknowns.high)
+            return x, found.start + off[k:].reshape(unknown.shape)
+
+        def loss(z: Array) -> float:
+            x, start = at(z)
+            left = self.estimator.loss(self.estimator.squares(make(x), start)[1])
+            return left + unknowns.penalty(x)
+
+        z = np.zeros(len(scale))
+        for _ in range(TIMES):
+            simplex = z + np.vstack([np.zeros(len(z)), np.eye(len(z))])
+            options = {"initial_simplex": simplex, "maxfev": EACH * len(z), "adaptive": True}
+            z = minimize(loss, z, method="Nelder-Mead", options=options).x
+        fit = self.estimator.fit(make, unknowns, *at(z))
+        return min(found, self.estimator.refit(make, unknowns, fit), key=lambda one: one.loss)
 
     def denied(self, fit: Fit) -> bool:
         """Whether more is left than noise makes."""
