@@ -16,7 +16,7 @@ from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside, joined, price
 from joda.diagnosis.search import NARROWED, WELLS, WORST, _shown_without_impacts, narrowed, rank
-from joda.diagnosis.selection import decide, evidence, excess_of, weigh
+from joda.diagnosis.selection import decide, evidence, weigh
 from joda.diagnosis.verdict import diagnosed
 from joda.effects import EndStopRestitution, QuadraticDamping
 from joda.estimation.estimator import CAUCHY_SCALE
@@ -199,7 +199,7 @@ def test_one_segment_of_many_tells_of_no_effect(ranked, disturbed, verdict):
     one = replace(
         ranked, baseline=replace(ranked.baseline, fit=fits[0]), candidates=(own,), level=1
     )
-    assert estimator.counts.sum() > 10 and excess_of(one.baseline) < 0
+    assert estimator.counts.sum() > 10 and one.baseline.excess < 0
     gain = estimator.losses(off) - estimator.losses(calm)
     told = evidence(one).gain + first.cost
     assert told == pytest.approx(gain.sum() - gain.max())

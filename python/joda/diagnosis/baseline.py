@@ -71,9 +71,14 @@ class Baseline:
         )
 
     @property
+    def excess(self) -> float:
+        """Of the model as it is, per sample, beyond what noise makes."""
+        return excess(self.fit.loss, max(self.estimator.samples, 1.0))
+
+    @property
     def only_noise(self) -> bool:
         """Whether the model leaves no more of segments than noise makes."""
-        return excess(self.fit.loss, max(self.estimator.samples, 1.0)) <= 0
+        return self.excess <= 0
 
     @cached_property
     def coarse_loss(self) -> float:
@@ -193,11 +198,11 @@ def _fitted(
     plain = base_of(measured.profile, joint_model, segments.h, measured.trust, accurate)
     base = corrected_base(plain, measured.doubtful)
     as_it_is = base.unknowns.mean
-    given = replace(estimator.started(base.simulator(as_it_is)), x=as_it_is)
+    given = estimator.begun(base.simulator, as_it_is)
     tried = [(as_it_is, segments.start), (as_it_is, given.start)]
     if near is not None:
         tried.append((near, estimator.started(base.simulator(near)).start))
-    away = [replace(estimator.started(base.simulator(x)), x=x) for x in base.beginnings()]
+    away = [estimator.begun(base.simulator, x) for x in base.beginnings()]
     tried += [(one.x, one.start) for one in away if one.loss < given.loss]
     fits = [estimator.fit(base.simulator, base.unknowns, x, start) for x, start in tried]
     fit = estimator.refit(base.simulator, base.unknowns, min(fits, key=lambda f: f.loss))

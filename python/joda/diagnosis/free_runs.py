@@ -197,12 +197,12 @@ class _Whole:
     @cached_property
     def given(self) -> Fit:
         """The model as it is, from the starts that suit it best."""
-        return self._begun(self.base.unknowns.mean)
+        return self.estimator.begun(self.base.simulator, self.base.unknowns.mean)
 
     def fitted(self, near: Array) -> Fit:
         """Its strengths fitted, from where they are and from what shorter segments told."""
         make, unknowns = self.base.simulator, self.base.unknowns
-        begins = (self.given, self._begun(near))
+        begins = (self.given, self.estimator.begun(make, near))
         fits = [self.estimator.fit(make, unknowns, one.x, one.start) for one in begins]
         return self.estimator.refit(make, unknowns, min(fits, key=lambda fit: fit.loss))
 
@@ -245,11 +245,8 @@ class _Whole:
         for: towards those that were fitted."""
         own = self.base.unknowns.mean
         nearly = np.clip(fit.x, own - APART * np.abs(own), own + APART * np.abs(own))
-        return self.denied(self.given) and self.denied(self._begun(nearly))
-
-    def _begun(self, x: Array) -> Fit:
-        """The model with some numbers, from the starts that suit it best."""
-        return replace(self.estimator.started(self.base.simulator(x)), x=x)
+        begun = self.estimator.begun(self.base.simulator, nearly)
+        return self.denied(self.given) and self.denied(begun)
 
     def errors(self, fit: Fit) -> Array:
         """Standard errors of the fitted numbers, shape (k,)."""

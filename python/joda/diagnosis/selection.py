@@ -140,11 +140,6 @@ class Selection:
         return left[0] / own if left and own > LITTLE else 1.0
 
 
-def excess_of(baseline: Baseline) -> float:
-    """Of the model as it is, per sample, beyond what noise makes."""
-    return excess(baseline.fit.loss, max(baseline.estimator.samples, 1.0))
-
-
 def evidence(ranking: Ranking) -> Evidence:
     """What the fits of a ranking leave."""
     estimator, fit, candidates = (
@@ -160,7 +155,7 @@ def evidence(ranking: Ranking) -> Evidence:
         n_effective=ranking.n_effective,
         noisy=ranking.level > WORST,
         restitution=ranking.restitution,
-        model=excess_of(ranking.baseline),
+        model=ranking.baseline.excess,
         tolerant=excess(tolerant, samples),
         own=excess(rescaled(estimator, fit, ranking.level), samples),
         gain=_gain(ranking),
@@ -179,7 +174,7 @@ def _gain(ranking: Ranking) -> float:
         return 0.0
     first = ranking.candidates[0]
     gain = fit.loss - first.fit.loss - first.cost
-    if excess_of(ranking.baseline) > 0 or np.count_nonzero(estimator.counts) < SETTINGS.many:
+    if ranking.baseline.excess > 0 or np.count_nonzero(estimator.counts) < SETTINGS.many:
         return gain
     each = estimator.losses(fit.squares) - estimator.losses(first.fit.squares)
     return gain - max(float(each[estimator.counts].max()), 0.0)
@@ -239,7 +234,7 @@ def decide(
 def shows(first: Ranking, longer: Baseline, settings: Settings = SETTINGS) -> bool:
     """Whether more than noise is left of longer segments, be noise what was taken for it or what
     the best candidate left of a first ranking's segments, for each degree of freedom."""
-    if excess_of(longer) > settings.noticed:
+    if longer.excess > settings.noticed:
         return True
     best = min(
         (candidate.fit.loss for candidate in first.candidates), default=first.baseline.fit.loss

@@ -272,6 +272,10 @@ class SegmentEstimator:
             damping = np.where(better, np.maximum(damping / 10, 1e-9), 10 * damping)
         return Fit(EMPTY, start, squares, self.loss(squares))
 
+    def begun(self, make: Make, x: Array) -> Fit:
+        """The joint with numbers, shape (k,), as they are, from the starts that suit it best."""
+        return replace(self.started(make(x)), x=x)
+
     def refit(self, make: Make, unknowns: Unknowns, found: Fit, iterations: int = 12) -> Fit:
         """A fit that goes on where some segments do better from a start that is sought anew."""
         anew = self.started(simulator := make(found.x))
