@@ -16,7 +16,7 @@ from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside, joined, price
 from joda.diagnosis.search import NARROWED, WELLS, WORST, _shown_without_impacts, narrowed, rank
-from joda.diagnosis.selection import decide, evidence, weigh
+from joda.diagnosis.selection import Selection, decide, doubted, evidence, weigh
 from joda.diagnosis.verdict import diagnosed
 from joda.effects import EndStopRestitution, QuadraticDamping
 from joda.estimation.estimator import CAUCHY_SCALE
@@ -182,6 +182,27 @@ def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
     strange = weigh(more, wholly=True)
     assert strange.verdict == "unexplained"
     assert strange.probabilities[0] <= 0.5  # and an unknown one is as likely
+
+
+@pytest.mark.parametrize(
+    ("before", "closer", "likely", "verdict"),
+    [
+        (0.8, 0.15, 0.475, "unexplained"),
+        (0.8, 0.3, 0.55, "missing_effect"),
+        (0.8, None, 0.4, "unexplained"),
+    ],
+)
+def test_what_a_closer_look_contradicts_is_believed_half(before, closer, likely, verdict):
+    names = ("asymmetric_friction", "backlash")
+    first = Selection("missing_effect", (before, 0.1), (0.6, (0.1, 0.2)), names)
+    other = names[:1] if closer is not None else ()
+    said = (closer,) if closer is not None else ()
+    denied = Selection("unexplained", said, (7.0, (1.5,) * len(other)), other)
+    found = doubted(first, denied)
+    assert (found.verdict, found.effects) == (verdict, names)
+    assert found.probabilities == pytest.approx((likely, 0.05))
+    assert found.unknown == pytest.approx(0.95 - likely)
+    assert doubted(first, replace(denied, verdict="missing_effect")) == first
 
 
 @pytest.mark.parametrize(("disturbed", "verdict"), [(1, "adequate"), (3, "missing_effect")])

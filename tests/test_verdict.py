@@ -292,6 +292,14 @@ def test_what_was_missed_once_is_named(family, effect, seed):
 
 
 @pytest.mark.long
+def test_what_was_named_though_longer_segments_deny_it_is_unexplained():
+    """A cushion of air, which was told as friction of one direction at 84 %."""
+    found = diagnosed(read(draw(77709080, "air_cushion", True, family="machinery"))[0]).diagnosis
+    assert found.verdict == "unexplained"
+    assert found.effects[0].probability < 0.5
+
+
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("family", "seed"),
     [

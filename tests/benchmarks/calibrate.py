@@ -25,6 +25,7 @@ from joda.diagnosis.selection import (
     Settings,
     closer_counts,
     decide,
+    doubted,
     second_counts,
 )
 
@@ -55,6 +56,7 @@ def decided(row: dict, settings: Settings) -> Selection:
     for closer in more:
         anew = decide(closer, settings=settings)
         if not closer_counts(said, anew):
+            said = doubted(said, anew)
             break
         said = anew
     return said

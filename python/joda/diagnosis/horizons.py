@@ -19,6 +19,7 @@ from joda.diagnosis.selection import (
     Selection,
     closer_counts,
     decide,
+    doubted,
     evidence,
     second_counts,
     shows,
@@ -99,6 +100,7 @@ def looked(
         found.append(evidence(closer))
         anew = decide(found[-1], strictness)
         if not closer_counts(selection, anew):
+            selection = doubted(selection, anew)
             break
         ranking, selection = closer, anew
     return HorizonSearch(ranking, selection, first, tuple(found), free)

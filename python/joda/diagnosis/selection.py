@@ -4,7 +4,7 @@ What the fits leave is the `Evidence`, every number that decides on it is one of
 `decide` is a function of these two alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -252,6 +252,18 @@ def closer_counts(before: Selection, closer: Selection) -> bool:
     """Whether a look at the best effects in longer segments tells more: one is still missing, and
     what the first leaves is no larger a part."""
     return closer.verdict == "missing_effect" and closer.share <= before.share
+
+
+def doubted(before: Selection, closer: Selection) -> Selection:
+    """A look after a closer one that does not count: where that one finds that none of the effects
+    explains the runs, the two are believed alike (a linear opinion pool), and an effect is named
+    only if it is more likely than not all the same."""
+    if closer.verdict != "unexplained":
+        return before
+    other = dict(closer.named)
+    likely = tuple(0.5 * (p + other.get(name, 0.0)) for name, p in before.named)
+    verdict: Verdict = "missing_effect" if likely[0] > EVEN else "unexplained"
+    return replace(before, verdict=verdict, probabilities=likely)
 
 
 def second_counts(first: Selection, second: Selection, settings: Settings = SETTINGS) -> bool:
