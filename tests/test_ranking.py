@@ -16,7 +16,14 @@ from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside, joined, price
 from joda.diagnosis.search import NARROWED, WELLS, WORST, _shown_without_impacts, narrowed, rank
-from joda.diagnosis.selection import Selection, decide, doubted, evidence, weigh
+from joda.diagnosis.selection import (
+    Selection,
+    closer_counts,
+    decide,
+    doubted,
+    evidence,
+    weigh,
+)
 from joda.diagnosis.verdict import diagnosed
 from joda.effects import EndStopRestitution, QuadraticDamping
 from joda.estimation.estimator import CAUCHY_SCALE
@@ -203,6 +210,17 @@ def test_what_a_closer_look_contradicts_is_believed_half(before, closer, likely,
     assert found.probabilities == pytest.approx((likely, 0.05))
     assert found.unknown == pytest.approx(0.95 - likely)
     assert doubted(first, replace(denied, verdict="missing_effect")) == first
+
+
+@pytest.mark.parametrize(
+    ("likely", "left", "counts"),
+    [(0.7, 0.19, True), (0.2, 0.19, False), (0.2, 0.0, True)],
+)
+def test_a_closer_look_counts_that_is_surer_or_leaves_less(likely, left, counts):
+    first = Selection("missing_effect", (0.3,), (0.11, (0.0,)), ("bistable_mechanism",))
+    closer = Selection("missing_effect", (likely,), (1.3, (left,)), first.effects)
+    assert closer_counts(first, closer) == counts
+    assert not closer_counts(first, replace(closer, verdict="unexplained"))
 
 
 @pytest.mark.parametrize(("disturbed", "verdict"), [(1, "adequate"), (3, "missing_effect")])

@@ -17,6 +17,10 @@ WHAT: dict[NuisanceName, str] = {
     "position_offset": "the recorded position is {:.3g}{} {} too large",
 }
 """With the number, its error and its unit."""
+SAME_EFFECT: dict[NuisanceName, str] = {
+    "force_offset": " A constant force that the model lacks would do the same.",
+}
+"""What no data tell from a number."""
 
 
 def correction_of(
@@ -49,7 +53,7 @@ def correction_of(
         value=whole * value,
         error=whole * error,
         unit=unit,
-        explanation=f"{words[0].upper()}{words[1:]}.{more}",
+        explanation=f"{words[0].upper()}{words[1:]}.{more}{SAME_EFFECT.get(name, '')}",
     )
 
 

@@ -250,8 +250,9 @@ def _freedom(estimator: SegmentEstimator) -> float:
 
 def closer_counts(before: Selection, closer: Selection) -> bool:
     """Whether a look at the best effects in longer segments tells more: one is still missing, and
-    what the first leaves is no larger a part."""
-    return closer.verdict == "missing_effect" and closer.share <= before.share
+    the first is likelier, or what it leaves no larger a part."""
+    surer = closer.probabilities[:1] > before.probabilities[:1]
+    return closer.verdict == "missing_effect" and (surer or closer.share <= before.share)
 
 
 def doubted(before: Selection, closer: Selection) -> Selection:
