@@ -136,8 +136,12 @@ class Calibration:
         self, baseline: Baseline, candidates: Sequence[FittedHypothesis], clearly: bool
     ) -> bool:
         """Whether no effect explains as much, or each clearly less."""
-        least = min((g.fit.loss + g.cost for g in candidates), default=baseline.fit.loss)
-        return self.loss < least + (-ALIKE if clearly else ALIKE)
+
+        def least(of: FittedHypothesis) -> float:
+            alike = ALIKE * (of.hypothesis.effect != HEAVIER)
+            return of.fit.loss + of.cost + (-ALIKE if clearly else alike)
+
+        return self.loss < min(map(least, candidates), default=baseline.fit.loss)
 
     def corrections(self, measured: Measured) -> tuple[Correction, ...]:
         """What is off, for the user.

@@ -1,7 +1,7 @@
 """Looks at the measurements: in the usual segments, and in longer ones where these leave a question
 or name no effect for sure."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -11,7 +11,7 @@ from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.free_runs import FreeRuns, free_runs
 from joda.diagnosis.plausible import Needs
-from joda.diagnosis.search import WORST, Progress, Ranking, narrowed, rank
+from joda.diagnosis.search import WORST, Progress, Ranking, always, narrowed, rank
 from joda.diagnosis.selection import (
     SETTINGS,
     SURE,
@@ -23,9 +23,11 @@ from joda.diagnosis.selection import (
     evidence,
     second_counts,
     shows,
+    weigh,
 )
 from joda.measured.instability import longest_followed
 from joda.measured.reading import Measured
+from joda.profile import Profile
 
 LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5
 """How much longer the segments of each further look are, at the least, and at most how long, s."""
@@ -53,11 +55,25 @@ class HorizonSearch:
     free: FreeRuns | None = None
 
 
-def ranked(needs: Needs, model: Baseline, exclude: Collection[str], progress: Progress) -> Ranking:
-    """What a model may lack that needs no more force than the measurements can."""
-    return rank(
-        model, exclude, progress, possible=lambda *one: not needs.exceeded(needs.exerted(*one))
-    )
+def ranked(
+    needs: Needs,
+    model: Baseline,
+    exclude: Collection[str],
+    progress: Progress,
+    promising: Callable[[Ranking], bool] = always,
+) -> Ranking:
+    """What a model may lack that needs no more force than the measurements can; `promising`: as of
+    `rank`."""
+
+    def possible(profile: Profile, effect: str) -> bool:
+        return not needs.exceeded(needs.exerted(profile, effect))
+
+    return rank(model, exclude, progress, promising, possible)
+
+
+def hopeful(rough: Ranking) -> bool:
+    """Whether some effect might explain the runs once it is fitted to the end."""
+    return sum(weigh(rough).probabilities) > SETTINGS.hope
 
 
 def looked(
@@ -87,7 +103,8 @@ def looked(
         drifts = bool(free and free.drifting)
         other = _shown(longer, first, drifts) if measured.runs else _noisier(measured, first)
         if other is not None:
-            again = ranked(needs, other, exclude, progress)
+            puzzled = selection.verdict == "unexplained" and bool(measured.runs)
+            again = ranked(needs, other, exclude, progress, hopeful if puzzled else always)
             found.append(evidence(again))
             if measured.runs:
                 anew = decide(found[-1], SETTINGS.strictly, wholly=True)

@@ -62,20 +62,26 @@ A = TypeVar("A", Hypothesis, CoarseFit, FittedHypothesis)
 T = TypeVar("T", CoarseFit, FittedHypothesis)
 
 
+def always(rough: Ranking) -> bool:
+    """Every ranking is promising."""
+    return True
+
+
 def rank(
     baseline: Baseline,
     exclude: Collection[str] = (),
     progress: Progress = lambda done, total, what: None,
-    roughly: bool = False,
+    promising: Callable[[Ranking], bool] = always,
     possible: Callable[[Profile, str], bool] = lambda profile, effect: True,
 ) -> Ranking:
-    """Fits every hypothesis to measured runs.
+    """Fits every hypothesis to measured runs: all roughly, and the best effects to the end; the
+    others too where these are promising.
 
     Args:
         baseline: the model and its runs.
         exclude: effects that are not tried.
         progress: told how many hypotheses are done, of how many, and the last one's name.
-        roughly: whether only the most promising ones are fitted to the end.
+        promising: whether by the best few effects it is worth it to go on.
         possible: whether a profile with an effect can be meant.
     """
     tried = [h for h in baseline.hypotheses if h.effect not in {*exclude, RESTITUTION}]
@@ -83,8 +89,11 @@ def rank(
     silent = RESTITUTION in exclude
     with ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, progress, 2 * len(tried) + PERTURBED)
-        candidates = _fitted(baseline, tried, work, roughly)
-        if not roughly:
+        best, rest = _roughly_fitted(baseline, tried, work)
+        candidates = best + [baseline.coarse_scored(one) for one in rest]
+        rough = Ranking(baseline, *_scored(baseline.estimator, candidates), restitution=False)
+        if promising(rough):
+            candidates = best + _fitted(baseline, best, rest, work)
             candidates += _beside(baseline, tried, candidates, work)
             candidates += _perturbed(baseline, candidates, work)
             candidates += _simplex_searched(baseline, candidates, work)
@@ -156,26 +165,32 @@ class _Work:
         return out
 
 
-def _fitted(
-    baseline: Baseline, tried: Sequence[Hypothesis], work: _Work, roughly: bool
-) -> list[FittedHypothesis]:
-    """All hypotheses fitted; roughly those that are far off, where one leaves only noise, and those
-    that gain hardly anything, where the model itself does."""
+def _roughly_fitted(
+    baseline: Baseline, tried: Sequence[Hypothesis], work: _Work
+) -> tuple[list[FittedHypothesis], list[CoarseFit]]:
+    """All hypotheses fitted roughly, the best one of each of the best effects to the end."""
     coarse_fits = sorted(work.all(baseline.coarse, tried), key=lambda one: one.best.loss)
     effects = [one.hypothesis.effect for one in coarse_fits]
     best = sorted(map(effects.index, set(effects)))[:PERTURBED]
-    first = [coarse_fits[k] for k in best]
     others = [one for k, one in enumerate(coarse_fits) if k not in best]
-    candidates = work.all(baseline.refined, first)
-    if roughly:
-        return candidates + work.all(baseline.coarse_scored, others)
-    least = min((one.fit.loss for one in candidates), default=0.0)
+    return work.all(baseline.refined, [coarse_fits[k] for k in best]), others
+
+
+def _fitted(
+    baseline: Baseline,
+    best: Sequence[FittedHypothesis],
+    others: Sequence[CoarseFit],
+    work: _Work,
+) -> list[FittedHypothesis]:
+    """The others fitted to the end; not those that are far off, where one leaves only noise, nor
+    those that gain hardly anything, where the model itself does."""
+    least = min((one.fit.loss for one in best), default=0.0)
     most = FAR * least if least < ENOUGH * baseline.estimator.samples else np.inf
     if baseline.only_noise:
         most = min(most, baseline.coarse_loss - HARDLY)
     near = [one for one in others if one.best.loss < most]
     far = [one for one in others if one.best.loss >= most]
-    return candidates + work.all(baseline.refined, near) + work.all(baseline.coarse_scored, far)
+    return work.all(baseline.refined, near) + work.all(baseline.coarse_scored, far)
 
 
 def _beside(

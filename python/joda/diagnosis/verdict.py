@@ -25,7 +25,7 @@ from joda.diagnosis.experiments import Model, means_of, next_experiment, there_a
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
-from joda.diagnosis.horizons import HorizonSearch, looked, ranked
+from joda.diagnosis.horizons import HorizonSearch, hopeful, looked, ranked
 from joda.diagnosis.hypothesis_fits import joined
 from joda.diagnosis.joint_calibration import jointly, needed
 from joda.diagnosis.phrases import explained
@@ -209,7 +209,7 @@ def _together(
     if not (measured.runs and widths):
         return None
     free = replace(measured, doubtful=widths)
-    ranking = ranked(Needs(measured), fit_baseline(free), exclude, progress)
+    ranking = ranked(Needs(measured), fit_baseline(free), exclude, progress, hopeful)
     if not decide(evidence(ranking)).likely:
         return None
     other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
