@@ -9,9 +9,12 @@ from hidden_coverage import coverage, reliability
 
 from joda.diagnosis.overlap import overlap
 from joda.hidden.cases import FAMILY
+from joda.hidden.measuring import LATE
 
 SURE = 0.9
 BINS = (0.0, 0.5, 0.7, SURE, 1.0 + 1e-9)
+PART = 0.02
+"""Part by which a delay may be told wrong."""
 NEAR = 1.5
 """Error on runs held out, in units of the true model's, that counts as mended."""
 
@@ -44,6 +47,15 @@ def alike(row: dict) -> bool:
 
 def unexplained(row: dict) -> bool:
     return row.get("verdict") == "unexplained"
+
+
+def late(row: dict) -> bool:
+    """Whether a law of no catalogue is a delay, and that is said of the measurement."""
+    if row["effect"] != LATE:
+        return False
+    told = [one for one in row.get("corrections", ()) if one["parameter"] == "time_delay"]
+    true = row["seal"]["magnitude"]
+    return any(abs(one["value"] - true) < 2 * one["error"] + PART * true for one in told)
 
 
 def silent(row: dict) -> bool:
@@ -81,7 +93,7 @@ def fine(row: dict) -> bool:
     if hides(row) == "nothing":
         return row.get("verdict") == "adequate"
     if hides(row) == "outside":
-        return unexplained(row)
+        return unexplained(row) or late(row)
     if row["group"] == "few":
         return not (refused(row) or rose(row))
     return found(row) if row["second"] else right(row)
