@@ -1,5 +1,7 @@
 """How measured runs are cut into segments, and what simulates the joint in them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -323,9 +325,49 @@ def test_rest_at_an_end_does_not_count_and_rest_elsewhere_does_by_few_samples():
     t = STEP * np.arange(1000)
     segments = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0), 0.4 + 0 * t)
     told = usable(segments)
-    assert segments.rests[segments.run == 0].sum() == 4
+    assert segments.rests[segments.run == 0].sum() == 5  # that with the knock ends in the first
     assert not told[segments.run == 0][2:].any()
     assert told[segments.run == 1][0] and 4 <= segments.count[segments.run == 1].sum() <= 16
+
+
+@pytest.mark.parametrize("high", [True, False])
+@pytest.mark.parametrize(
+    ("pulled", "recorded", "friction", "missed"),
+    [
+        (0.5, True, 0.0, True),  # it would leave
+        (0.5, True, 1.0, False),  # friction holds it
+        (0.5, False, 0.0, False),  # a hand may have held it
+        (-0.5, True, 0.0, False),  # it is pressed into the end, as deep as that lets it
+    ],
+)
+def test_where_a_joint_stays_at_an_end_a_model_must_not_leave_it(
+    pulled, recorded, friction, missed, high, tmp_path
+):
+    """1 kg at an end, which a force of 0.5 N pulls off it, or presses into it."""
+    force = np.full(1000, -pulled if high else pulled)
+    run = replace(run_of(np.full(1000, float(high))), force=force, forced=recorded)
+    write_run(tmp_path / "run.csv", run)
+    text = SLIDE.format(more=f'frictionloss="{friction}"')
+    (tmp_path / "model.xml").write_text(text)
+    found = read_measured(tmp_path / "model.xml", "slide", [tmp_path / "run.csv"])
+    segments = segments_for(found, 0.2)
+    estimator = SegmentEstimator(segments, usable(segments))
+    assert segments.rests.all() and estimator.samples == 0  # of noise it tells nothing
+    base = base_of(found.profile, joint_model_for(found, segments.h), segments.h)
+    fit = estimator.begun(base.simulator, base.unknowns.mean)
+    assert fit.loss == pytest.approx(0.0, abs=1e-9) or missed
+    assert (fit.loss > 100) == missed
+
+
+def test_a_long_segment_with_a_knock_ends_where_the_joint_stays():
+    """It comes to the end in 0.15 s, stays for a second, and leaves it again."""
+    t = STEP * np.arange(1500)
+    path = np.where(t < 0.15, 0.9 * (1 - (t / 0.15) ** 2), 0.5 * np.maximum(t - 1.15, 0.0) ** 2)
+    segments = segments_of([run_of(path)], [SIGMA], 1.0, 0.0, 1.0, STEP, 1.5)
+    (leaves,) = np.flatnonzero(usable(segments) & (segments.count > 100))
+    own = segments.time[segments.rows[leaves]]
+    assert 0.15 < own[own > 0].min() < 1.0 and own.max() > 1.4
+    assert segments.impacts[:leaves].any() and not segments.impacts[leaves:].any()
 
 
 def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():

@@ -141,6 +141,14 @@ class SegmentEstimator:
         return float(self.segments.count[self.counts].sum())
 
     @cached_property
+    def tells(self) -> NDArray[np.bool_]:
+        """Segments that count, and those in which the joint stays at an end: they tell that a model
+        must not leave it, and nothing of noise; shape (m,)."""
+        first = self.segments.rows[:, :1]
+        stays = (first >= 0) & (self.segments.stays[first] != 0)
+        return np.asarray(self.counts | stays.any(axis=1))
+
+    @cached_property
     def coarser(self) -> "SegmentEstimator":
         """The same in longer steps, see `Segments.coarser`."""
         return replace(self, segments=self.segments.coarser())
@@ -154,7 +162,7 @@ class SegmentEstimator:
 
     def loss(self, squares: Array, cauchy_scale: float = CAUCHY_SCALE, level: float = 1.0) -> float:
         """Robust sum over the segments that count, where noise makes squares of `level`."""
-        return float(np.sum(self.losses(squares, cauchy_scale, level)[self.counts]))
+        return float(np.sum(self.losses(squares, cauchy_scale, level)[self.tells]))
 
     def losses(
         self, squares: Array, cauchy_scale: float = CAUCHY_SCALE, level: float = 1.0
@@ -197,7 +205,7 @@ class SegmentEstimator:
         r, squares = self.squares(simulator, start)
         J, S = self.slopes(make, simulator, unknowns, x, start, r, central)
         room = cauchy_scale * np.maximum(segments.count, 1)
-        weight = np.where(self.counts, 1 / (1 + squares / room), 0.0)
+        weight = np.where(self.tells, 1 / (1 + squares / room), 0.0)
         z = (start - segments.start) / segments.prior_std
         return Linearization(r, J, S, z, weight)
 

@@ -91,5 +91,6 @@ def curve_segments(measured: Measured) -> CurveWindows:
         shared=np.zeros((*rows.shape, 0)),
         impacts=np.zeros(count, bool),
         rests=np.zeros(count, bool),
+        stays=np.zeros(n, int),
         model=model,
     )

@@ -101,6 +101,8 @@ def segments_of(
             place_noise = (position - lo) / span, spread / span
             begins, hits = _before_knocks(begins, index, *place_noise)
             begins = _after_pressing(begins, index, *place_noise)
+            if thinned and each > chunk:
+                begins = _where_it_stays(begins, index, chunk, *place_noise)
             for left in _leaves(begins, index, *place_noise):  # in one of these gaps
                 gaps = np.diff(time[left.start : left.stop + 1])
                 thrown = limit_rate * spread[left] / gaps / np.sqrt(len(gaps))
@@ -134,6 +136,7 @@ def segments_of(
         np.concatenate(x) for x in zip(*samples, strict=True)
     )
     rows = rows_of(window, count)
+    place, noise = (position - lo) / span, spread / span
     return Segments(
         h=h,
         length=float(h * np.median(apart)),
@@ -150,8 +153,9 @@ def segments_of(
         rows=rows,
         sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
         shared=_shared(rows, time, spread, push / inertia, diverges(position)),
-        impacts=_knocks(rows, (position - lo) / span, spread / span, hits),
-        rests=_rests(rows, (position - lo) / span, spread / span),
+        impacts=_knocks(rows, place, noise, hits),
+        rests=_rests(rows, place, noise),
+        stays=_stays(rows, place, noise) * np.array([run.forced for run in runs])[run_of[window]],
         command=command if driven else None,
     )
 
@@ -369,6 +373,26 @@ def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -
     return np.union1d(begins, -(-np.array(more, int) // GRID) * GRID)
 
 
+def _where_it_stays(
+    begins: Integers, index: Integers, chunk: int, s: Array, noise: Array
+) -> Integers:
+    """Where long segments begin, also within a stay at an end of `chunk` steps or more: what is after
+    half of these tells of the joint, whatever the end did to it before."""
+    at_end = np.abs(np.minimum(s, 1 - s)) < BEYOND * noise
+    rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
+    more = []
+    for row, impact in zip(rows, _each_knock(rows, s, noise), strict=True):
+        own = row[row >= 0]
+        if impact is None:
+            continue
+        moves = np.append(np.flatnonzero(~at_end[own]), len(own))
+        first = np.append(0, moves[:-1] + 1)  # of each stretch at the end, and how long it is
+        last = np.minimum(moves, len(own) - 1)
+        long = (first > impact) & (index[own[last]] - index[own[np.minimum(first, last)]] >= chunk)
+        more.extend(index[own[first[long]]] + chunk // 2)
+    return np.union1d(begins, -(-np.array(more, int) // GRID) * GRID)
+
+
 def _leaves(begins: Integers, index: Integers, s: Array, noise: Array) -> list[slice]:
     """Of each segment that begins at an end of the range and leaves it, the samples at which it may
     do so: from the last one that is there as far as noise tells, until one that is clearly not."""
@@ -401,6 +425,20 @@ def _rests(rows: Integers, s: Array, noise: Array) -> NDArray[np.bool_]:
     reach = STOP + 3 * noise
     low, high = s < reach, s > 1 - reach
     return np.array([low[own].all() or high[own].all() for own in (r[r >= 0] for r in rows)], bool)
+
+
+def _stays(rows: Integers, s: Array, noise: Array) -> Integers:
+    """At which end the joint stays, see `Segments`: where all of a segment is still and at that end
+    itself, not pressed into it, nor just thrown back by it."""
+    stays = np.zeros(len(s), int)
+    for row in rows:
+        own = row[row >= 0]
+        if not len(own) or np.ptp(s[own] / noise[own]) > STILL:
+            continue
+        for side, away in ((-1, s[own]), (1, 1 - s[own])):
+            if np.abs(away.mean()) < BEYOND * noise[own].mean():
+                stays[own] = side
+    return stays
 
 
 def _each_knock(rows: Integers, s: Array, noise: Array) -> list[int | None]:

@@ -7,6 +7,7 @@ with the covariance of both noises.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +19,8 @@ Integers = NDArray[np.intp]
 GRID = 3
 """Segments of runs begin and end at multiples of so many steps: they can be simulated in as many
 times longer ones."""
+STAYS = 4.0
+"""Noises by which a model must leave an end, at which the joint stays, to miss that."""
 LOOSE = 10.0
 """How much further than its measurement's error a start may be from the measured one."""
 
@@ -65,6 +68,9 @@ class Segments:
             that (1 - V Vᵀ) leaves residuals of variance 1; shape (m, most samples, r).
         impacts: whether the joint hits an end of its range there, shape (m,).
         rests: whether it only rests at one, which tells of the stop and not of the joint.
+        stays: at which end a sample's segment stays though nothing but the recorded force holds it,
+            -1 low, 1 high, 0 elsewhere; shape (n,). A model that leaves the end there misses it;
+            what is beyond it, the stop alone decides.
     """
 
     h: float
@@ -84,6 +90,7 @@ class Segments:
     shared: Array
     impacts: NDArray[np.bool_]
     rests: NDArray[np.bool_]
+    stays: Integers
     command: Array | None = field(default=None, kw_only=True)
 
     @property
@@ -136,6 +143,7 @@ class Segments:
             share=self.share[samples],
             position=self.position[samples],
             time=self.time[samples],
+            stays=self.stays[samples],
             run=self.run[kept],
             rows=rows,
             sharpness=self.sharpness[kept],
@@ -145,12 +153,28 @@ class Segments:
         )
 
     def misfit(self, simulator: Simulator, start: Array) -> Array:
-        """Predicted minus measured positions, rad or m, shape (n,)."""
+        """Predicted minus measured positions, rad or m, shape (n,); where the joint stays at an
+        end, only how far it is said to leave that by more than noise."""
         starts = self.at, start, self.fresh
-        return (
-            self.sampled(*simulator.replay(self.force, *starts, self.h, self.command))
-            - self.position
-        )
+        moved = simulator.replay(self.force, *starts, self.h, self.command)
+        misfit = self.sampled(*moved) - self.position
+        at, side = self._staying
+        misfit[at] = side * np.minimum(side * misfit[at] + self._room, 0.0)
+        return misfit
+
+    @cached_property
+    def _staying(self) -> tuple[Integers, Integers]:
+        """Samples at which the joint stays at an end, and which that is."""
+        at = np.flatnonzero(self.stays)
+        return at, self.stays[at]
+
+    @cached_property
+    def _room(self) -> Array:
+        """Within what noise makes of these, rad or m."""
+        noise = np.zeros(len(self.position))
+        there = self.rows >= 0
+        noise[self.rows[there]] = 1 / self.sharpness[there]
+        return STAYS * noise[self._staying[0]]
 
     def sampled(self, before: Array, after: Array) -> Array:
         """What is known before and after each step, shape (steps, ...), at the samples."""
@@ -231,6 +255,7 @@ def evenly(
         shared=np.zeros((*rows.shape, 0)),
         impacts=np.zeros(len(at), bool),
         rests=np.zeros(len(at), bool),
+        stays=np.zeros(n, int),
     )
 
 

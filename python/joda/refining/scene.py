@@ -230,6 +230,7 @@ class SceneEngine:
             share=np.tile(own.share, len(self.units)),
             position=np.concatenate(position),
             time=np.tile(own.time, len(self.units)),
+            stays=np.pad(own.stays, (0, count * len(others))),
             rows=np.where(same >= 0, same + count * several, -1),
             sharpness=np.tile(own.sharpness, len(self.units)),
             shared=shared,
