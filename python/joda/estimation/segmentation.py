@@ -376,8 +376,8 @@ def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -
 def _where_it_stays(
     begins: Integers, index: Integers, chunk: int, s: Array, noise: Array
 ) -> Integers:
-    """Where long segments begin, also within a stay at an end of `chunk` steps or more: what is after
-    half of these tells of the joint, whatever the end did to it before."""
+    """Where long segments begin, also within a stay at an end of `chunk` steps or more: what is
+    after half of these tells of the joint, whatever the end did to it before."""
     at_end = np.abs(np.minimum(s, 1 - s)) < BEYOND * noise
     rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
     more = []
