@@ -10,6 +10,7 @@ from joda.commands.templates import templates
 from joda.diagnosis import baseline as fits
 from joda.diagnosis import search
 from joda.diagnosis.baseline import fit_baseline
+from joda.diagnosis.horizons import hopeful
 from joda.diagnosis.hypotheses import Units, hypotheses
 from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
 from joda.diagnosis.hypotheses.effects import KNOTS
@@ -108,6 +109,31 @@ def test_where_the_model_leaves_only_noise_few_are_fitted_to_the_end(monkeypatch
     assert some < (len(refined) - some) / 2
     assert weigh(few).verdict == weigh(whole).verdict == "adequate"
     assert evidence(whole).gain - evidence(few).gain < 20
+
+
+@pytest.mark.parametrize("promising", [True, False])
+def test_all_are_fitted_to_the_end_only_if_the_best_few_are_promising(
+    baseline, ranked, promising, monkeypatch
+):
+    refined, asked = [], []
+    monkeypatch.setattr(search, "ENOUGH", 0.0)  # else what is far off is left rough all the same
+    monkeypatch.setattr(
+        fits, "refined", lambda *args, make=fits.refined: refined.append(0) or make(*args)
+    )
+    found = rank(baseline, without(baseline), promising=lambda few: asked.append(few) or promising)
+    assert len(asked[0].candidates) <= search.PERTURBED and hopeful(asked[0])
+    assert (len(refined) > search.PERTURBED) == promising
+    assert found.candidates[0].hypothesis.effect == ranked.candidates[0].hypothesis.effect
+
+
+def test_what_no_effect_comes_near_gives_no_hope(ranked):
+    estimator = ranked.baseline.estimator
+    squares = 30.0 * estimator.segments.count
+    loss = estimator.loss(squares)
+    far = replace(ranked.baseline, fit=replace(ranked.baseline.fit, squares=squares, loss=loss))
+    left = 0.9 * loss * ranked.n_effective / estimator.samples
+    candidates = tuple(replace(one, score=left) for one in ranked.candidates)
+    assert not hopeful(replace(ranked, baseline=far, candidates=candidates))
 
 
 def test_progress_counts_and_never_exceeds_the_total(ranked, progress):

@@ -71,9 +71,9 @@ def ranked(
     return rank(model, exclude, progress, promising, possible)
 
 
-def hopeful(rough: Ranking) -> bool:
-    """Whether some effect might explain the runs once it is fitted to the end."""
-    return sum(weigh(rough).probabilities) > SETTINGS.hope
+def hopeful(few: Ranking) -> bool:
+    """Whether, by the best effects that are fitted, some might explain the runs."""
+    return sum(weigh(few).probabilities) > SETTINGS.hope
 
 
 def looked(

@@ -37,7 +37,7 @@ def pairs(
         beside = measured.changed(checked(candidate.written(ranking.baseline.base)))
         anew = fit_baseline(beside)
         even = tuple(replace(one, uneven=None) for one in anew.hypotheses)
-        rest = rank(replace(anew, hypotheses=even), promising=lambda rough: False)
+        rest = rank(replace(anew, hypotheses=even), promising=lambda few: False)
         loss = min((one.fit.loss + one.cost for one in rest.candidates), default=candidate.fit.loss)
         tried.append((loss + candidate.cost, (first, *_found(beside, rest, 1))))
     return tuple(pair for _, pair in sorted(tried, key=lambda one: one[0]))

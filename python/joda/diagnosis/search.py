@@ -62,7 +62,7 @@ A = TypeVar("A", Hypothesis, CoarseFit, FittedHypothesis)
 T = TypeVar("T", CoarseFit, FittedHypothesis)
 
 
-def always(rough: Ranking) -> bool:
+def always(few: Ranking) -> bool:
     """Every ranking is promising."""
     return True
 
@@ -89,11 +89,12 @@ def rank(
     silent = RESTITUTION in exclude
     with ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, progress, 2 * len(tried) + PERTURBED)
-        best, rest = _roughly_fitted(baseline, tried, work)
-        candidates = best + [baseline.coarse_scored(one) for one in rest]
-        rough = Ranking(baseline, *_scored(baseline.estimator, candidates), restitution=False)
-        if promising(rough):
-            candidates = best + _fitted(baseline, best, rest, work)
+        candidates, rest = _roughly_fitted(baseline, tried, work)
+        few = Ranking(baseline, *_scored(baseline.estimator, candidates), restitution=False)
+        if not promising(few):
+            candidates += work.all(baseline.coarse_scored, rest)
+        else:
+            candidates += _fitted(baseline, candidates, rest, work)
             candidates += _beside(baseline, tried, candidates, work)
             candidates += _perturbed(baseline, candidates, work)
             candidates += _simplex_searched(baseline, candidates, work)

@@ -41,9 +41,9 @@ class Settings:
         much: excess that is, even if no effect lowers it.
         strictly: factor of what a true effect may leave in a second look.
         noticed: excess of the model in a second look from which that tells of effects.
-        hope: probability of all effects together, the best few fitted to the end and the others
-            roughly, from which on these are so too: in longer segments where usual ones are
-            unexplained, and where numbers may be off beside an effect.
+        hope: probability of the best few effects together from which on all are fitted to the end:
+            in longer segments where usual ones are unexplained, and where numbers may be off beside
+            an effect.
         many: segments; of so many, all of which leave no more than noise, the gain of the one that
             gains most does not count.
     """
