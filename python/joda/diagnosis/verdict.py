@@ -38,8 +38,6 @@ from joda.diagnosis.selection import (
     SURE,
     Evidence,
     Selection,
-    decide,
-    evidence,
     weigh,
 )
 from joda.diagnosis.summary import BOUNCY, FALLEN, SAME, far_off, helps, other_unit, summarised
@@ -210,7 +208,7 @@ def _together(
         return None
     free = replace(measured, doubtful=widths)
     ranking = ranked(Needs(measured), fit_baseline(free), exclude, progress, hopeful)
-    if not decide(evidence(ranking)).likely:
+    if not weigh(ranking).likely:
         return None
     other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
     if (found := Calibrator(other).numbers(fit_baseline(other))) is None:

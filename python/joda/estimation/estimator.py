@@ -161,7 +161,7 @@ class SegmentEstimator:
         return r, (r**2).sum(axis=1) + (z**2).sum(axis=1)
 
     def loss(self, squares: Array, cauchy_scale: float = CAUCHY_SCALE, level: float = 1.0) -> float:
-        """Robust sum over the segments that count, where noise makes squares of `level`."""
+        """Robust sum over the segments that tell, where noise makes squares of `level`."""
         return float(np.sum(self.losses(squares, cauchy_scale, level)[self.tells]))
 
     def losses(

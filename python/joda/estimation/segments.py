@@ -158,23 +158,17 @@ class Segments:
         starts = self.at, start, self.fresh
         moved = simulator.replay(self.force, *starts, self.h, self.command)
         misfit = self.sampled(*moved) - self.position
-        at, side = self._staying
-        misfit[at] = side * np.minimum(side * misfit[at] + self._room, 0.0)
+        at, side, room = self._staying
+        misfit[at] = side * np.minimum(side * misfit[at] + room, 0.0)
         return misfit
 
     @cached_property
-    def _staying(self) -> tuple[Integers, Integers]:
-        """Samples at which the joint stays at an end, and which that is."""
-        at = np.flatnonzero(self.stays)
-        return at, self.stays[at]
-
-    @cached_property
-    def _room(self) -> Array:
-        """Within what noise makes of these, rad or m."""
-        noise = np.zeros(len(self.position))
+    def _staying(self) -> tuple[Integers, Integers, Array]:
+        """Samples at which the joint stays at an end, which that is, and what noise makes there."""
         there = self.rows >= 0
-        noise[self.rows[there]] = 1 / self.sharpness[there]
-        return STAYS * noise[self._staying[0]]
+        there[there] = self.stays[self.rows[there]] != 0
+        at = self.rows[there]
+        return at, self.stays[at], STAYS / self.sharpness[there]
 
     def sampled(self, before: Array, after: Array) -> Array:
         """What is known before and after each step, shape (steps, ...), at the samples."""
