@@ -46,8 +46,8 @@ LEAST_FACTOR = 1e-3
 """Below which a factor of the model's own strengths counts as that."""
 UNUSUAL = 2.0
 """The same where an effect explains as much in its place."""
-EARLIER: dict[NuisanceName, float] = {"force_offset": float(np.sqrt(ALIKE))}
-"""The same, whatever is left, of a number that is an effect where it surprises: a constant one."""
+ALSO_AN_EFFECT: NuisanceName = "force_offset"
+"""A number that an effect always explains as much in place of: a constant force."""
 LONGEST = 1.5
 """Length of the segments in which numbers are fitted at last, s."""
 BETWEEN = 0.04
@@ -65,8 +65,9 @@ where it is any likelier."""
 EQUIVALENT = (
     *(HEAVIER, "gravity_offset"),
     *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
+    *("constant_friction_hinge", "constant_damping_hinge"),
 )
-"""Effects that may be the same as one of the numbers."""
+"""Effects that may be the same as one of the numbers, or as all others off by one factor."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +208,8 @@ def as_recorded(
     joint_model = replace(
         joint_model_for(measured, segments.h), friction_row=fitted.joint_model.friction_row
     )
-    base = base_of(measured.profile, joint_model, segments.h, measured.trust, fitted.accurate)
+    own = measured.trust, fitted.accurate, segments.pushed
+    base = base_of(measured.profile, joint_model, segments.h, *own)
     return SegmentEstimator(segments, usable(segments)), replace(found.numbers, base=base)
 
 
@@ -231,8 +233,8 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
     own = every.only(names)
     widths = np.abs(best.x[baseline.base.count :]) / own.prior_stds
     off = dict(zip(names, widths, strict=True))
-    far = {name for name in EARLIER if off.get(name, 0.0) > EARLIER[name]}
     unusual = {name for name in names if off[name] > UNUSUAL}
+    far = unusual & {ALSO_AN_EFFECT}
     if excess(best.loss, count) > CALM:
         far |= {name for name in names if off[name] > SURPRISE}
     if unusual - far and _effect_instead(found, best, own, unusual):
@@ -338,7 +340,9 @@ def _concluded(
     off = np.log(np.maximum(fit.x[: base.count], LEAST_FACTOR)) / base.unknowns.prior_std
     if "force_scale" in names and len(off):  # masses and strengths may all be off by one factor
         off = off - off.mean()
-    usual = float(off @ off) < SURPRISE**2  # else something resists
+    most = (own.unknowns.high - own.unknowns.step)[: base.count]
+    at_most = np.any(fit.x[: base.count] > most)
+    usual = float(off @ off) < SURPRISE**2 and not at_most  # else something resists
     calm = left < max(CALM, PART * before)
     alone = (
         usual

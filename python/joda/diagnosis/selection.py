@@ -260,13 +260,13 @@ def closer_counts(before: Selection, closer: Selection) -> bool:
 
 
 def doubted(before: Selection, closer: Selection) -> Selection:
-    """A look after a closer one that does not count: where that one finds that none of the effects
-    explains the runs, the two are believed alike (a linear opinion pool), and an effect is named
-    only if it is more likely than not all the same."""
+    """A look after a closer one that does not count: where that one, in which errors add up, finds
+    that none of the effects explains the runs, it is believed twice as much (a linear opinion
+    pool), and an effect is named only if it is more likely than not all the same."""
     if closer.verdict != "unexplained":
         return before
     other = dict(closer.named)
-    likely = tuple(0.5 * (p + other.get(name, 0.0)) for name, p in before.named)
+    likely = tuple((p + 2 * other.get(name, 0.0)) / 3 for name, p in before.named)
     verdict: Verdict = "missing_effect" if likely[0] > EVEN else "unexplained"
     return replace(before, verdict=verdict, probabilities=likely)
 
