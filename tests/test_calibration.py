@@ -95,24 +95,6 @@ def test_a_mass_that_is_off_is_told(tmp_path, rng):
     check(*found_of(tmp_path, rng, mass=factor), "mass", factor)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("times", "named"), [(1.5, False), (2.2, True)])
-def test_friction_far_beyond_the_models_own_is_missing(times, named, tmp_path, rng):
-    """A model's friction may be off, but where the force is known not by any factor."""
-    runs, own = logged(tmp_path, rng), 'frictionloss="{:.9g}"'
-    assert own.format(0.15) in arm()
-    (tmp_path / "arm.xml").write_text(arm().replace(own.format(0.15), own.format(0.15 / times)))
-    found = joda.diagnose(tmp_path / "arm.xml", "arm", runs)
-    if named:
-        first = found.effects[0]
-        assert found.verdict == "missing_effect" and first.effect == "constant_friction_hinge"
-        assert abs(first.magnitude - 0.15 * (1 - 1 / times)) < 3 * first.magnitude_error
-    else:
-        (told,) = found.corrections
-        assert found.verdict == "adequate" and told.parameter == "frictionloss"
-        assert abs(told.factor - times) < 0.1
-
-
 @pytest.mark.sweep(2, "one number")
 def test_a_force_of_another_scale_is_told(tmp_path, rng):
     factor = float(rng.choice([rng.uniform(0.6, 0.8), rng.uniform(1.25, 1.5)]))

@@ -220,12 +220,13 @@ def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
 @pytest.mark.parametrize(
     ("before", "closer", "likely", "verdict"),
     [
-        (0.8, 0.15, 0.475, "unexplained"),
-        (0.8, 0.3, 0.55, "missing_effect"),
-        (0.8, None, 0.4, "unexplained"),
+        (0.8, 0.15, 1.1 / 3, "unexplained"),
+        (0.8, 0.3, 1.4 / 3, "unexplained"),
+        (0.8, 0.4, 1.6 / 3, "missing_effect"),
+        (0.8, None, 0.8 / 3, "unexplained"),
     ],
 )
-def test_what_a_closer_look_contradicts_is_believed_half(before, closer, likely, verdict):
+def test_what_a_closer_look_contradicts_is_believed_less(before, closer, likely, verdict):
     names = ("asymmetric_friction", "backlash")
     first = Selection("missing_effect", (before, 0.1), (0.6, (0.1, 0.2)), names)
     other = names[:1] if closer is not None else ()
@@ -233,8 +234,8 @@ def test_what_a_closer_look_contradicts_is_believed_half(before, closer, likely,
     denied = Selection("unexplained", said, (7.0, (1.5,) * len(other)), other)
     found = doubted(first, denied)
     assert (found.verdict, found.effects) == (verdict, names)
-    assert found.probabilities == pytest.approx((likely, 0.05))
-    assert found.unknown == pytest.approx(0.95 - likely)
+    assert found.probabilities == pytest.approx((likely, 0.1 / 3))
+    assert found.unknown == pytest.approx(1 - 0.1 / 3 - likely)
     assert doubted(first, replace(denied, verdict="missing_effect")) == first
 
 

@@ -181,8 +181,10 @@ class _Fitted:
 
     @property
     def calm(self) -> bool:
-        """Whether hardly more than noise is left, so that nothing else is missing."""
-        return excess(self.fit.loss, max(self.estimator.samples, 1.0)) < CALM
+        """Whether hardly more than noise is left, so that nothing else is missing, be the model's
+        own strengths as far off as they may."""
+        left = self.estimator.loss(self.fit.squares)
+        return excess(left, max(self.estimator.samples, 1.0)) < CALM
 
 
 def _fitted(
@@ -194,7 +196,9 @@ def _fitted(
 ) -> _Fitted:
     """The model in steps that stand for none or in MuJoCo's, with a row of friction that yields."""
     estimator = SegmentEstimator(segments, usable(segments))
-    base = _base(measured, segments, accurate, row)
+    joint_model = replace(joint_model_for(measured, segments.h), friction_row=row)
+    plain = base_of(measured.profile, joint_model, segments.h, measured.trust, accurate)
+    base = corrected_base(plain, measured.doubtful)
     as_it_is = base.unknowns.mean
     given = estimator.begun(base.simulator, as_it_is)
     tried = [(as_it_is, segments.start), (as_it_is, given.start)]
@@ -205,31 +209,6 @@ def _fitted(
     fits = [estimator.fit(base.simulator, base.unknowns, x, start) for x, start in tried]
     fit = estimator.refit(base.simulator, base.unknowns, min(fits, key=lambda f: f.loss))
     return _Fitted(estimator, base, fit, given)
-
-
-def _base(
-    measured: Measured, segments: Segments, accurate: bool, row: Row | None, pushed: bool = False
-) -> BaseModel:
-    """The model with its numbers; `pushed`: whether its resistances are bounded, see `base_of`."""
-    joint_model = replace(joint_model_for(measured, segments.h), friction_row=row)
-    own = measured.trust, accurate, pushed
-    return corrected_base(
-        base_of(measured.profile, joint_model, segments.h, *own), measured.doubtful
-    )
-
-
-def _limited(measured: Measured, found: _Fitted) -> _Fitted:
-    """The same where a known force bounds what the model's own resistances may be."""
-    estimator, row = found.estimator, found.base.joint_model.friction_row
-    base = _base(measured, estimator.segments, found.base.accurate, row, pushed=True)
-    unknowns = base.unknowns
-    if np.all(found.fit.x <= unknowns.high):
-        return replace(found, base=base)
-    near = np.clip(found.fit.x, unknowns.low, unknowns.high)
-    tried = [(near, found.fit.start), (found.given.x, found.given.start)]
-    fits = [estimator.fit(base.simulator, unknowns, x, start) for x, start in tried]
-    fit = estimator.refit(base.simulator, unknowns, min(fits, key=lambda one: one.loss))
-    return replace(found, base=base, fit=fit)
 
 
 def _as_made(
@@ -268,8 +247,6 @@ def fit_baseline(
     found = _fitted(measured, segments_for(measured, length), near)
     if measured.runs:
         found = _as_made(measured, length, near, found)
-    if found.estimator.segments.pushed:
-        found = _limited(measured, found)
     estimator, base = found.estimator, found.base
     every = hypotheses(units_of(estimator.segments, measured), measured.templates, measured.profile)
     points = initial_points(estimator.coarser, base.coarser(), found.given, found.fit)

@@ -65,9 +65,8 @@ where it is any likelier."""
 EQUIVALENT = (
     *(HEAVIER, "gravity_offset"),
     *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
-    *("constant_friction_hinge", "constant_damping_hinge"),
 )
-"""Effects that may be the same as one of the numbers, or as all others off by one factor."""
+"""Effects that may be the same as one of the numbers."""
 
 
 @dataclass(frozen=True)
@@ -208,8 +207,7 @@ def as_recorded(
     joint_model = replace(
         joint_model_for(measured, segments.h), friction_row=fitted.joint_model.friction_row
     )
-    own = measured.trust, fitted.accurate, segments.pushed
-    base = base_of(measured.profile, joint_model, segments.h, *own)
+    base = base_of(measured.profile, joint_model, segments.h, measured.trust, fitted.accurate)
     return SegmentEstimator(segments, usable(segments)), replace(found.numbers, base=base)
 
 
@@ -340,9 +338,7 @@ def _concluded(
     off = np.log(np.maximum(fit.x[: base.count], LEAST_FACTOR)) / base.unknowns.prior_std
     if "force_scale" in names and len(off):  # masses and strengths may all be off by one factor
         off = off - off.mean()
-    most = (own.unknowns.high - own.unknowns.step)[: base.count]
-    at_most = np.any(fit.x[: base.count] > most)
-    usual = float(off @ off) < SURPRISE**2 and not at_most  # else something resists
+    usual = float(off @ off) < SURPRISE**2  # else something resists
     calm = left < max(CALM, PART * before)
     alone = (
         usual

@@ -23,7 +23,6 @@ from joda.estimation.estimator import (
 )
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
-from joda.scenes.native import DAMPING, FRICTION
 
 Array = NDArray[np.float64]
 
@@ -52,8 +51,6 @@ MORE = 20.0
 MUCH_LESS, FINEST = 0.5, 3
 """Part of the loss beyond noise, at most, that a size which differs along the way leaves; and how
 many times the places at which it does become more."""
-RESISTS = {"constant_friction_hinge": FRICTION, "constant_damping_hinge": DAMPING}
-"""Effects that are more of the model's own, by the label of that."""
 NOTHING = 0.1
 """Part of its step below which a strength is none."""
 LOST = 10.0
@@ -231,7 +228,7 @@ def refined(
     found = scored(estimator, hypothesis, min(fits, key=lambda f: f.loss))
     wider = hypothesis.unknowns.widened()
     if not hypothesis.unknowns.pressed(found.x) or wider is hypothesis.unknowns:
-        found = _given_back(estimator, base, _free(estimator, base, found))
+        found = _free(estimator, base, found)
         return found if hypothesis.factors else uneven(estimator, base, found, steps=1)
     return refined(estimator, base, replace(hypothesis, unknowns=wider), [found.fit])
 
@@ -310,25 +307,6 @@ def _free(
     make, unknowns = joined(base, replace(hypothesis, unknowns=hypothesis.unknowns.inside()))
     fit = estimator.fit(make, unknowns, found.fit.x, found.fit.start)
     return scored(estimator, hypothesis, fit) if fit.loss < found.fit.loss + AS_GOOD else found
-
-
-def _given_back(
-    estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
-) -> FittedHypothesis:
-    """A constant resistance beside the model's own as that is given, if it is as good: the two are
-    one number to the runs, and where a joint sticks no fit goes all the way along such a valley."""
-    hypothesis, n = found.hypothesis, base.count
-    per = hypothesis.magnitude(found.x) / found.x[0] if found.x[0] > 0 else 0.0
-    own = base.resistance(RESISTS.get(hypothesis.effect, ""))
-    if own is None or not per:
-        return found
-    (make, unknowns), x = joined(base, hypothesis), found.fit.x.copy()
-    k, level = own
-    x[n] += (x[k] - unknowns.mean[k]) * level / per
-    x[k] = unknowns.mean[k]
-    x = np.clip(x, unknowns.low, unknowns.high)
-    fit = estimator.fit(make, unknowns, x, found.fit.start)
-    return scored(estimator, hypothesis, min(found.fit, fit, key=lambda one: one.loss))
 
 
 def simplex_searched(

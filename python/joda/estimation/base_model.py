@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda._core import JointSimulator
-from joda.component import Component
 from joda.estimation.quasi_static import QuasiStaticJoint, curve_segments
 from joda.estimation.segmentation import BEYOND, segments_of
 from joda.estimation.segments import GRID, Segments
@@ -28,11 +27,6 @@ BASE_DOUBT = 0.15
 """How far off (one standard deviation, relative) the model's own strengths may be."""
 DRIVEN_DOUBT = 3.0
 """The same of joints that an actuator drives, whose friction few models know."""
-LARGEST = 20.0
-"""Largest factor of the model's own strengths."""
-UNUSUAL = 5.0
-"""How many of its doubts the model's own friction or damping is too small by at the most, where a
-recorded force tells how large it is: what resists beyond that is missing."""
 GAIN_AT_MOST, GAIN_DOUBT = 7.0, 0.7
 """Largest logarithm of the factor by which an actuator's gain may be off, and its doubt."""
 HELD = 1e-6
@@ -116,22 +110,6 @@ class BaseModel:
         shared = shared_damping(self.profile, self.joint_model.servo)
         return own + [(place, float(np.exp(x[len(self.places) + 1]))) for place in shared]
 
-    @property
-    def unbounded(self) -> Unknowns:
-        """The numbers, of which each strength may be as large as any."""
-        high = self.unknowns.high.copy()
-        high[: len(self.places)] = np.maximum(high[: len(self.places)], LARGEST)
-        return replace(self.unknowns, high=high)
-
-    def resistance(self, label: str) -> tuple[int, float] | None:
-        """Which number the factor of the scene's own friction or damping is, by its label, and how
-        much that is, in its unit; None if it has none."""
-        for k, (channel, number) in enumerate(self.places):
-            part: Component = getattr(self.profile.channels, channel).components[number]
-            if part.label == label:
-                return k, float(part.y[0])
-        return None
-
     def in_steps(self, h: float, accurate: bool) -> Self:
         """The same for steps of h, s."""
         return replace(self, h=h, accurate=accurate)
@@ -159,15 +137,8 @@ def base_of(
     h: float,
     trust: Trust = USUAL,
     accurate: bool = True,
-    pushed: bool = False,
 ) -> BaseModel:
-    """The model as it is.
-
-    Args:
-        profile, joint_model, h, accurate: see `BaseModel`.
-        trust: how far off its numbers may be.
-        pushed: whether a recorded force moves it, which tells how large forces are.
-    """
+    """The model as it is; `trust`: how far off its numbers may be; the rest: see `BaseModel`."""
     shared = shared_damping(profile, joint_model.servo)
     places = tuple(
         (name, number)
@@ -176,13 +147,9 @@ def base_of(
         if any(part.y) and (name, number) not in shared
     )
     k = len(places)
-    prior_std, most = (BASE_DOUBT, LARGEST) if joint_model.servo is None else (DRIVEN_DOUBT, 100.0)
+    prior_std, most = (BASE_DOUBT, 20.0) if joint_model.servo is None else (DRIVEN_DOUBT, 100.0)
     prior_stds = np.array([_doubt(profile, place, trust, prior_std) for place in places])
-    high = np.full(k, most)
-    if pushed and joint_model.servo is None:
-        resists = np.array([_label(profile, place) in (DAMPING, FRICTION) for place in places])
-        high = np.where(resists, np.minimum(high, 1 + UNUSUAL * prior_stds), high)
-    unknowns = Unknowns(np.zeros(k), high, np.full(k, 0.01), np.ones(k), prior_stds)
+    unknowns = Unknowns(np.zeros(k), np.full(k, most), np.full(k, 0.01), np.ones(k), prior_stds)
     if joint_model.servo is not None:
         unknowns = unknowns.and_(_of_servo(joint_model.servo, trust))
     return BaseModel(profile, joint_model, h, places, unknowns, accurate)
@@ -198,17 +165,11 @@ def shared_damping(profile: Profile, servo: Servo | None) -> list[tuple[str, int
 
 def _doubt(profile: Profile, place: tuple[str, int], trust: Trust, usual: float) -> float:
     """How far off a component's strength may be: those of a profile as usual."""
-    label = _label(profile, place)
+    channel, number = place
+    label = getattr(profile.channels, channel).components[number].label
     named = {DAMPING: "damping", FRICTION: "frictionloss", SPRING: "stiffness"}
     width = trust.width(named[label], usual) if label in named else usual
     return max(width, HELD)
-
-
-def _label(profile: Profile, place: tuple[str, int]) -> str:
-    """Of a component."""
-    channel, number = place
-    part: Component = getattr(profile.channels, channel).components[number]
-    return part.label
 
 
 def _of_servo(servo: Servo, trust: Trust) -> Unknowns:

@@ -112,8 +112,7 @@ class Nuisances:
 
     @property
     def unknowns(self) -> Unknowns:
-        """The strengths and these numbers. Without gravity all forces are told by the recorded one:
-        where its scale may be off, so may all strengths by one factor."""
+        """The strengths and these numbers."""
         prior_std = np.array(self.prior_stds)
         most, step = [], []
         for name, width in zip(self.names, self.prior_stds, strict=True):
@@ -122,9 +121,7 @@ class Nuisances:
             step.append(STEPS.get(kind, STEPS["other"] * width))
         high = np.array(most)
         none = np.zeros(len(prior_std))
-        relative = "force_scale" in self.names and "mass" not in self.names
-        own = self.base.unbounded if relative else self.base.unknowns
-        return own.and_(Unknowns(-high, high, np.array(step), none, prior_std))
+        return self.base.unknowns.and_(Unknowns(-high, high, np.array(step), none, prior_std))
 
     @property
     def make(self) -> Make:
@@ -181,8 +178,8 @@ class Nuisances:
             own["force_scale"] -= less
             own["force_offset"] *= float(np.exp(-less))
             strengths *= np.exp(-less)
-        unknowns = self.only(names).unknowns
-        strengths = np.clip(strengths, unknowns.low[:n], unknowns.high[:n])
+        unknowns = self.base.unknowns
+        strengths = np.clip(strengths, unknowns.low, unknowns.high)
         return np.append(strengths, [own[name] for name in names])
 
     def only(self, names: Sequence[NuisanceName]) -> "Nuisances":
