@@ -185,11 +185,9 @@ def diagnosed(
             looks = looked(found.of(measured), exclude, progress)
             if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
                 mended = found, looks
-    said = (mended[1] if mended else plain).selection
-    if calibrate and said.verdict == "unexplained":
-        mended = _together(measured, baseline.base, exclude, progress) or mended
-    elif calibrate and mended is None and said.likely and said.excess[1][0] > MUCH:
-        mended = _beside(measured, plain.ranking, exclude, progress)
+    puzzled = calibrate and (mended[1] if mended else plain).selection.verdict == "unexplained"
+    if puzzled and (both := _together(measured, baseline.base, exclude, progress)):
+        mended = both
     if mended:
         return _set_right(measured, *mended, exclude, progress)
     return replace(_concluded(measured, plain), looks=plain.evidence)
@@ -210,14 +208,8 @@ def _together(
         return None
     free = replace(measured, doubtful=widths)
     ranking = ranked(Needs(measured), fit_baseline(free), exclude, progress, hopeful)
-    return _beside(measured, ranking, exclude, progress) if weigh(ranking).likely else None
-
-
-def _beside(
-    measured: Measured, ranking: Ranking, exclude: Collection[str], progress: Progress
-) -> tuple[Calibration, HorizonSearch] | None:
-    """Numbers that are off beside the likeliest effect, and what is said with these set right; None
-    if there are none, or no effect is then likelier than not."""
+    if not weigh(ranking).likely:
+        return None
     other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
     if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
         return None
