@@ -44,17 +44,24 @@ UNITS = Units(
 
 
 @pytest.fixture(scope="module")
-def measured():
-    """A model that lacks an effect, two runs of the joint, which show it."""
-    while fit_baseline(two := read(clear_case(EFFECT))[0].changed(runs=[0, 4])).only_noise:
-        pass
-    return two
+def shown():
+    """Two runs of a joint, which show what its model lacks, and the model fitted to them."""
+    while True:
+        measured = read(clear_case(EFFECT))[0].changed(runs=[0, 4])
+        if not (baseline := fit_baseline(measured)).only_noise:
+            return measured, baseline
 
 
 @pytest.fixture(scope="module")
-def baseline(measured):
+def measured(shown):
+    """A model that lacks an effect, two runs of the joint."""
+    return shown[0]
+
+
+@pytest.fixture(scope="module")
+def baseline(shown):
     """The model fitted to them."""
-    return fit_baseline(measured)
+    return shown[1]
 
 
 @pytest.fixture(scope="module")

@@ -42,12 +42,12 @@ CLEARLY = 3.0
 SURPRISE = 4.0
 """How many of its widths a number may be off where something is left: a zero that is far off looks
 like a force beside a spring."""
-LEAST_FACTOR = 1e-3
-"""Below which a factor of the model's own strengths counts as that."""
 UNUSUAL = 2.0
 """The same where an effect explains as much in its place."""
 ALSO_AN_EFFECT: NuisanceName = "force_offset"
-"""A number that an effect always explains as much in place of: a constant force."""
+"""A number in whose place an effect always explains as much: a constant force."""
+LEAST_FACTOR = 1e-3
+"""Below which a factor of the model's own strengths counts as that."""
 LONGEST = 1.5
 """Length of the segments in which numbers are fitted at last, s."""
 BETWEEN = 0.04
