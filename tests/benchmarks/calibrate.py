@@ -56,7 +56,7 @@ def decided(row: dict, settings: Settings) -> Selection:
     for closer in more:
         anew = decide(closer, settings=settings)
         if not closer_counts(said, anew):
-            said = doubted(said, anew)
+            said = doubted(said, anew, settings)
             break
         said = anew
     return said

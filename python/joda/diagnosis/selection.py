@@ -44,6 +44,8 @@ class Settings:
         hope: probability of the best few effects together from which on all are fitted to the end:
             in longer segments where usual ones are unexplained, and where numbers may be off beside
             an effect.
+        closer: how many times as much as the look before a closer one is believed that contradicts
+            it: errors add up in longer segments.
         many: segments; of so many, all of which leave no more than noise, the gain of the one that
             gains most does not count.
     """
@@ -62,6 +64,7 @@ class Settings:
     strictly: float = 0.7
     noticed: float = 0.1
     hope: float = 0.1
+    closer: float = 2.0
     many: float = 8
 
 
@@ -259,14 +262,14 @@ def closer_counts(before: Selection, closer: Selection) -> bool:
     return closer.verdict == "missing_effect" and (surer or closer.share <= before.share)
 
 
-def doubted(before: Selection, closer: Selection) -> Selection:
-    """A look after a closer one that does not count: where that one, in which errors add up, finds
-    that none of the effects explains the runs, it is believed twice as much (a linear opinion
-    pool), and an effect is named only if it is more likely than not all the same."""
+def doubted(before: Selection, closer: Selection, settings: Settings = SETTINGS) -> Selection:
+    """A look after a closer one that does not count: where that one finds that none of the effects
+    explains the runs, it is believed more (a linear opinion pool), and an effect is named only if
+    it is more likely than not all the same."""
     if closer.verdict != "unexplained":
         return before
-    other = dict(closer.named)
-    likely = tuple((p + 2 * other.get(name, 0.0)) / 3 for name, p in before.named)
+    other, more = dict(closer.named), settings.closer
+    likely = tuple((p + more * other.get(name, 0.0)) / (1 + more) for name, p in before.named)
     verdict: Verdict = "missing_effect" if likely[0] > EVEN else "unexplained"
     return replace(before, verdict=verdict, probabilities=likely)
 
