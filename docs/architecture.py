@@ -16,10 +16,8 @@ Graph = Mapping[str, frozenset[str]]
 def page() -> str:
     """The page, as text."""
     packages = _graph({path: _package(path) for path in PACKAGE.rglob("*.py")})
-    modules = {path: path.stem for name in WAY for path in (PACKAGE / name).rglob("*.py")}
-    inside = {path: name for path, name in modules.items() if name != "__init__"}
-    rooms = _graph({path: f"{path.parent.name}.{name}" for path, name in inside.items()})
-    way = _longest(_reached(rooms, "diagnosis.verdict"), "diagnosis.verdict")
+    rooms = _rooms()
+    way = longest("diagnosis.verdict", "measured.runs")
     return "\n\n".join(
         [
             "# The house",
@@ -27,10 +25,26 @@ def page() -> str:
             "(`tests/test_layers.py`); an arrow that others already imply is left out.",
             _drawing(packages),
             "## From runs to a verdict\n\nThe modules that `diagnosis.verdict` is made of; the "
-            f"longest way down has {len(way)}: " + " → ".join(f"`{name}`" for name in way) + ".",
+            f"longest way down to what was measured has {len(way)}: "
+            + " → ".join(f"`{name}`" for name in way)
+            + ".",
             _drawing(_reached(rooms, "diagnosis.verdict")),
         ]
     )
+
+
+def longest(top: str, down_to: str) -> tuple[str, ...]:
+    """The longest way of imports from a room of `WAY` down to another, both included."""
+    rooms = _rooms()
+    above = {name for name in rooms if down_to in _reached(rooms, name)}
+    return _longest({name: rooms[name] & above for name in above}, top)
+
+
+def _rooms() -> Graph:
+    """The modules of `WAY` by their package and name."""
+    modules = {path: path.stem for name in WAY for path in (PACKAGE / name).rglob("*.py")}
+    inside = {path: name for path, name in modules.items() if name != "__init__"}
+    return _graph({path: f"{path.parent.name}.{name}" for path, name in inside.items()})
 
 
 def _package(path: Path) -> str:

@@ -15,7 +15,8 @@ from joda.measured.adequacy import WINDOWS, residual_pattern
 from joda.measured.comparison import sentences
 from joda.measured.errors import EXPLAINED, MULTIPLE
 from joda.measured.failing import COLUMNS, FORCE
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 ALL_CLEAR = "no fault of the model"
 

@@ -13,7 +13,8 @@ from joda.diagnosis.verdict import diagnosed
 from joda.estimation.nuisance import nuisances_of
 from joda.hidden import draw
 from joda.measured.reading import read_measured
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 from joda.measured.trust import read_trust, trusting
 
 ARM = """<mujoco>

@@ -16,7 +16,7 @@ from joda.component import Component
 from joda.effects import AsymmetricFriction, GravityOffset, LoadDependentFriction, StribeckFriction
 from joda.measured.comparison import sentences
 from joda.measured.quasi_static import directions, force_noise, position_noise, static_force
-from joda.measured.runs import write_run
+from joda.measured.run_files import write_run
 from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scenes.motion import release
 

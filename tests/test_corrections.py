@@ -10,7 +10,8 @@ from hidden_cases import read
 from joda import diagnose
 from joda.diagnosis.verdict import diagnosed
 from joda.hidden import draw
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 KEYS = {"parameter", "joint", "factor", "value", "error", "unit", "explanation"}
 DOOR = """<mujoco>

@@ -18,7 +18,8 @@ from joda.component import Component
 from joda.interaction.hand import pull
 from joda.joints.rig import rig
 from joda.measured.data_checks import data_checks
-from joda.measured.runs import QuasiStatic, Run, read_run
+from joda.measured.run_files import read_run
+from joda.measured.runs import QuasiStatic, Run
 from joda.measured.smoothing import resolution
 from joda.profile import Channel, Channels, Joint, Profile, Resistance
 from joda.scenes.context import Context

@@ -20,7 +20,7 @@ from joda.diagnosis import improvement
 from joda.diagnosis.outcome import read_runs
 from joda.diagnosis.phrases import effect_names, named
 from joda.hidden import draw
-from joda.measured.runs import write_run
+from joda.measured.run_files import write_run
 
 SEED = 9
 """Of the demo."""

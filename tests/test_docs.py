@@ -19,7 +19,7 @@ from test_prompts import answers
 from test_readme import COMMANDS, shell
 
 from joda.diagnosis.selection import SETTINGS
-from joda.measured.runs import read_run
+from joda.measured.run_files import read_run
 from joda.profile import ATTRIBUTES
 from joda.propose.expected import Expectations
 

@@ -10,7 +10,8 @@ from scenes import write
 
 from joda import JodaError, add, attach, compare, context, diagnose, improve, refine
 from joda.measured.reading import read_measured
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 from joda.profile import Profile
 from joda.scenes.actuators import actuators_on
 

@@ -8,7 +8,7 @@ import joda
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.corrections import numbers
 from joda.diagnosis.outcome import read_runs
-from joda.measured.runs import read_run
+from joda.measured.run_files import read_run
 
 LOG = SHARED / "data" / "emps" / "emps_estimation.csv"
 GAIN = 35.15065188

@@ -11,7 +11,7 @@ from joda import attach, compare, context
 from joda.measured.comparison import _places
 from joda.measured.failing import COLUMNS, KNOCK, Failing, failing
 from joda.measured.reading import read_measured
-from joda.measured.runs import read_run
+from joda.measured.run_files import read_run
 from joda.profile import Profile
 from joda.scenes.model import load_model
 from joda.scenes.native import whole_profile

@@ -16,7 +16,8 @@ from joda.errors import JodaError
 from joda.hidden import draw
 from joda.measured.comparison import sentences
 from joda.measured.reading import read_measured
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 from joda.measured.whiteness import drift, drifts, free_parts, long_run_variance
 
 SAMPLES = 600

@@ -12,7 +12,7 @@ from joda.hidden.cases import PARTIAL, VISIBLE
 from joda.hidden.joint import base_model, draw_truth
 from joda.hidden.simulator import Tape, simulate
 from joda.hidden.truth import Bounce, Bristle, Delay, Inertia, Joint, Maxwell, Play, Truth
-from joda.measured.runs import read_run
+from joda.measured.run_files import read_run
 
 H = 1e-4
 

@@ -19,7 +19,7 @@ from joda.diagnosis.outcome import read_runs
 from joda.measured.comparison import sentences
 from joda.measured.excerpts import DURATION, SAMPLES
 from joda.measured.reading import read_measured
-from joda.measured.runs import read_measurement
+from joda.measured.run_files import read_measurement
 from joda.profile import Channels, Profile, Resistance
 
 SCENE = """<mujoco{angle}><option timestep="{step}"/><worldbody><body>

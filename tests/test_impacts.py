@@ -7,7 +7,8 @@ from joda.diagnosis.baseline import RESTITUTION, fit_baseline
 from joda.diagnosis.impacts import AROUND, mean_of, speed_ratios
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.reading import read_measured
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 SOLREF = 'damping="0.05" solreflimit="{}"/>'
 SIGMA, HERTZ = 2e-4, 250

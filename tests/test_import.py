@@ -19,7 +19,7 @@ from test_cli import fails, joda
 
 from joda import JodaError, compare, import_log
 from joda.importing.ros_messages import CONTROLLER, FIRST, HUMBLE, JOINTS
-from joda.measured.runs import read_run
+from joda.measured.run_files import read_run
 
 ARM = """<mujoco><compiler angle="radian"/><worldbody><body>
   <joint name="shoulder_pan" axis="0 0 1" range="-1.9 1.9"/><geom size=".1"/><body pos="0 0 .3">

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
-from architecture import imports
+from architecture import imports, longest
 
 PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 
@@ -59,6 +59,12 @@ def test_within_a_package_imports_go_downward_too(package):
         text = path.read_text()
         graph[path.stem] = set(re.findall(rf"from {re.escape(inside)}(\w+)", text)) - {path.stem}
     list(TopologicalSorter(graph).static_order())  # raises CycleError
+
+
+def test_the_way_from_what_was_measured_to_the_verdict_is_short():
+    way = longest("diagnosis.verdict", "measured.runs")
+    assert way[0] == "diagnosis.verdict" and way[-1] == "measured.runs"
+    assert len(way) <= 9, way
 
 
 def test_every_module_has_its_layer():

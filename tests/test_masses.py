@@ -10,7 +10,8 @@ from assets import NAMES, asset
 from scenes import write
 
 from joda import compare, context, generate
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 from joda.scenes.model import joint_type, load_model
 
 PART = """<mujoco>

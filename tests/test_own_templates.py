@@ -11,7 +11,7 @@ from joda import JodaError, add, attach, diagnose
 from joda.component import Component
 from joda.diagnosis.hypotheses import hypotheses
 from joda.diagnosis.units import units_of
-from joda.estimation.base_model import segments_for
+from joda.estimation.problem import segments_for
 from joda.hidden import draw
 from joda.profile import Channel, Channels, Joint, Profile
 from joda.template import read_templates

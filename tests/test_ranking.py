@@ -16,15 +16,9 @@ from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
 from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside, joined, price
-from joda.diagnosis.search import NARROWED, WELLS, WORST, _shown_without_impacts, narrowed, rank
-from joda.diagnosis.selection import (
-    Selection,
-    closer_counts,
-    decide,
-    doubted,
-    evidence,
-    weigh,
-)
+from joda.diagnosis.ranking import WORST, evidence, weigh
+from joda.diagnosis.search import NARROWED, WELLS, _shown_without_impacts, narrowed, rank
+from joda.diagnosis.selection import Selection, closer_counts, decide, doubted
 from joda.diagnosis.verdict import diagnosed
 from joda.effects import EndStopRestitution, QuadraticDamping
 from joda.estimation.estimator import CAUCHY_SCALE

@@ -19,7 +19,8 @@ from joda.commands.refine import Refined
 from joda.component import Component
 from joda.effects import GravityOffset
 from joda.measured.quasi_static import static_force
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 from joda.profile import Channels, Joint, Resistance
 from joda.refining.refinement import extrapolated
 from joda.scenes.scene import read_profiles

@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from joda import JodaError
-from joda.measured.runs import (
-    QuasiStatic,
-    Run,
-    check_known,
-    evened,
-    read_measurement,
-    read_run,
-)
+from joda.measured.run_files import read_measurement, read_run
+from joda.measured.runs import QuasiStatic, Run, check_known, evened
 
 HEAD = "time,position,force\n"
 ROWS = "0,0.1,1\n0.1,0.2,2\n0.3,0.3,\n0.4,0.5,4\n"

@@ -15,7 +15,8 @@ from joda.interaction.behaviour import behaviour
 from joda.interaction.surroundings import surroundings
 from joda.measured.comparison import sentences
 from joda.measured.reading import read_measured
-from joda.measured.runs import QuasiStatic, Run, read_run, write_run
+from joda.measured.run_files import read_run, write_run
+from joda.measured.runs import QuasiStatic, Run
 from joda.profile import Channels, Profile, Resistance
 from joda.scenes.contacts import contacts_along
 from joda.scenes.model import describe_joint, find_joint, load_model

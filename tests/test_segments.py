@@ -7,14 +7,16 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from joda.diagnosis.units import units_of
-from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
+from joda.estimation.base_model import base_of
 from joda.estimation.estimator import Fit, SegmentEstimator
+from joda.estimation.problem import joint_model_for, segments_for
 from joda.estimation.segmentation import STEPS, _responses, _step, segments_of
 from joda.estimation.segments import GRID
 from joda.estimation.unknowns import EMPTY, NOTHING
 from joda.measured import smoothing
 from joda.measured.reading import read_measured
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 SIGMA = 2e-4
 """Noise of the encoder, m; the range is 1 m."""
@@ -84,7 +86,7 @@ def test_a_segment_begins_where_an_end_that_yields_has_let_go_of_the_joint():
     t = STEP * np.arange(400)
     segments = cut(np.where(t < 0.13, -0.003, -0.003 + 0.5 * (t - 0.13) ** 2))
     back = 0.13 + (2 * 0.003) ** 0.5
-    tells = [segments.time[row[row >= 0]] for row in segments.rows[usable(segments)]]
+    tells = [segments.time[row[row >= 0]] for row in segments.rows[segments.usable]]
     assert back - 0.01 < min(own[0] for own in tells) < back + 0.02
 
 
@@ -324,7 +326,7 @@ def test_a_good_fit_stays_as_it_is(tmp_path):
 def test_rest_at_an_end_does_not_count_and_rest_elsewhere_does_by_few_samples():
     t = STEP * np.arange(1000)
     segments = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0), 0.4 + 0 * t)
-    told = usable(segments)
+    told = segments.usable
     assert segments.rests[segments.run == 0].sum() == 5  # that with the knock ends in the first
     assert not told[segments.run == 0][2:].any()
     assert told[segments.run == 1][0] and 4 <= segments.count[segments.run == 1].sum() <= 16
@@ -351,7 +353,7 @@ def test_where_a_joint_stays_at_an_end_a_model_must_not_leave_it(
     (tmp_path / "model.xml").write_text(text)
     found = read_measured(tmp_path / "model.xml", "slide", [tmp_path / "run.csv"])
     segments = segments_for(found, 0.2)
-    estimator = SegmentEstimator(segments, usable(segments))
+    estimator = SegmentEstimator(segments, segments.usable)
     assert segments.rests.all() and estimator.samples == 0  # of noise it tells nothing
     base = base_of(found.profile, joint_model_for(found, segments.h), segments.h)
     fit = estimator.begun(base.simulator, base.unknowns.mean)
@@ -364,7 +366,7 @@ def test_a_long_segment_with_a_knock_ends_where_the_joint_stays():
     t = STEP * np.arange(1500)
     path = np.where(t < 0.15, 0.9 * (1 - (t / 0.15) ** 2), 0.5 * np.maximum(t - 1.15, 0.0) ** 2)
     segments = segments_of([run_of(path)], [SIGMA], 1.0, 0.0, 1.0, STEP, 1.5)
-    (leaves,) = np.flatnonzero(usable(segments) & (segments.count > 100))
+    (leaves,) = np.flatnonzero(segments.usable & (segments.count > 100))
     own = segments.time[segments.rows[leaves]]
     assert 0.15 < own[own > 0].min() < 1.0 and own.max() > 1.4
     assert segments.impacts[:leaves].any() and not segments.impacts[leaves:].any()
@@ -376,7 +378,7 @@ def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
     run = run_of(np.minimum(0.05 + (t / 0.02) ** 2, 1.0))
     segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP)
     assert segments.length < 0.03
-    told = np.flatnonzero(usable(segments))
+    told = np.flatnonzero(segments.usable)
     assert len(told) >= 1
     assert segments.time[segments.rows[told[-1]].max()] > 0.015
 

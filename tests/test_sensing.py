@@ -10,7 +10,8 @@ import joda
 from joda import JodaError
 from joda.hidden.instrument import Instrument
 from joda.measured.corrections_file import corrections_text, read_corrections
-from joda.measured.runs import QuasiStatic, Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import QuasiStatic, Run
 from joda.measured.sensing import RIGHT, Sensing
 from joda.profile import Profile
 from joda.scenes.actuators import Servo

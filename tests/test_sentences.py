@@ -14,7 +14,7 @@ import joda
 from joda import JodaError
 from joda.diagnosis.findings import read_diagnosis
 from joda.files import check_target, make_folder, read_text, write_text
-from joda.measured.runs import read_run
+from joda.measured.run_files import read_run
 from joda.propose.replies import parse
 from joda.template import Template
 

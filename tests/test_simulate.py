@@ -9,7 +9,7 @@ from test_cli import fails, joda
 
 from joda import JodaError, attach, compare, simulate
 from joda.files import read_text
-from joda.measured.runs import read_run
+from joda.measured.run_files import read_run
 from joda.pictures.offscreen import NoRenderer
 
 MODELS = Path(__file__).parents[1] / "models"

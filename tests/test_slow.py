@@ -6,7 +6,8 @@ from gauging import FRICTION, SCENE, SPAN
 
 from joda import simulate
 from joda.measured.reading import read_measured
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 HELD = 1.0
 """Force that the pushing hand has to overcome, N·m; the model has 0.2."""

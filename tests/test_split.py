@@ -10,9 +10,10 @@ from joda.diagnosis.adding import add_effect, error
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.split import held_blocks, held_out, held_segments, in_blocks, parted
-from joda.estimation.base_model import segments_for
+from joda.estimation.problem import segments_for
 from joda.measured.reading import read_measured
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 
 def moving(run):

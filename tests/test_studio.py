@@ -27,7 +27,7 @@ from joda.commands.studio.work import Stopped, Work
 from joda.component import Component
 from joda.effects import AddedInertia
 from joda.field import evaluate
-from joda.measured.runs import write_run
+from joda.measured.run_files import write_run
 from joda.plain import plain
 from joda.profile import Joint
 from joda.scenes.motion import Motion

@@ -22,7 +22,8 @@ from matplotlib.image import imread
 from joda import Profile, add, attach, compare, diagnose, simulate
 from joda.commands.studio.session import StudioSession
 from joda.component import Component
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 pytest.importorskip("selenium", reason='needs selenium: pip install ".[test]"')
 pytest.importorskip("nicegui", reason='needs NiceGUI: pip install ".[studio]"')

@@ -23,7 +23,7 @@ from joda.diagnosis.verdict import diagnosed
 from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
 from joda.measured.reading import read_measured
-from joda.measured.runs import read_run, write_run
+from joda.measured.run_files import read_run, write_run
 from joda.profile import Joint
 
 DETENT = Finding(

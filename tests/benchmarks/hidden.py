@@ -42,7 +42,7 @@ from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
 from joda.hidden import FAMILIES, Case
 from joda.hidden.cases import FAMILY
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
 CASES |= {"field": 100, "two": 10, "cover": 96, "few": 50, "families": 1}

@@ -15,7 +15,7 @@ from joda.hidden.handle import Handle
 from joda.hidden.laws import State
 from joda.hidden.truth import Play, Truth
 from joda.measured import smoothing
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.replay import START, TRIES, WINDOW
 
 H = 2e-4

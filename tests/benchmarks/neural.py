@@ -24,7 +24,7 @@ from joda.diagnosis.learning.choosing import learn
 from joda.diagnosis.paired_test import worse
 from joda.diagnosis.shape_refinement import Likelihood
 from joda.diagnosis.split import parted
-from joda.estimation.base_model import segments_for
+from joda.estimation.problem import segments_for
 from joda.hidden import FAMILIES, draw
 
 DECAYS = (1e-3, 0.3)

@@ -12,7 +12,7 @@ import numpy as np
 from joda.diagnosis.learning.fitting import Learner
 from joda.diagnosis.shape_refinement import Likelihood
 from joda.diagnosis.units import units_of
-from joda.estimation.base_model import BASE_DOUBT, usable
+from joda.estimation.base_model import BASE_DOUBT
 from joda.estimation.estimator import CAUCHY_SCALE
 from joda.measured.replay import Replayer
 
@@ -104,7 +104,7 @@ class Network:
 
     def _descent(self, segments):
         """Iterations of Adam over a network's numbers and the windows' starts in their doubts."""
-        counts = usable(segments)
+        counts = segments.usable
         ends = np.append(segments.at[1:], len(segments.force))
         force = _filled(segments.force, segments.at, ends)
         rows, there = np.maximum(segments.rows, 0), segments.rows >= 0

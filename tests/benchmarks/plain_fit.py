@@ -15,7 +15,8 @@ import numpy as np
 from mujoco import rollout
 
 from joda.measured.driven import joints_in
-from joda.measured.runs import held, read_signals, read_together
+from joda.measured.run_files import read_signals, read_together
+from joda.measured.runs import held
 
 NUMBERS = ("stiffness", "damping", "friction", "armature", "delay")
 STEP = 0.03

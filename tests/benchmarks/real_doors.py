@@ -19,7 +19,7 @@ from assets import SHARED
 from joda import compare, generate, refine
 from joda.measured.quasi_static import static_force
 from joda.measured.reading import read_measured
-from joda.measured.runs import read_run
+from joda.measured.run_files import read_run
 
 DATA = SHARED / "data" / "pr2_cabinet_doors"
 GRID = np.arange(61.0)

@@ -12,10 +12,11 @@ import numpy as np
 from hidden_cases import read
 
 from joda.estimation import segmentation
-from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
+from joda.estimation.base_model import base_of
 from joda.estimation.estimator import SegmentEstimator
+from joda.estimation.problem import joint_model_for, segments_for
 from joda.hidden import FAMILIES, draw
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 MANY = (900, 300, 150, 100, 60)
 """Steps that a segment has at least."""
@@ -25,7 +26,7 @@ def left(measured: Measured, steps: int, accurate: bool) -> tuple[float, float]:
     """Loss per sample of the model, and seconds of a replay."""
     segmentation.STEPS = steps
     segments = segments_for(measured)
-    estimator = SegmentEstimator(segments, usable(segments))
+    estimator = SegmentEstimator(segments, segments.usable)
     alone = joint_model_for(measured, segments.h)
     base = base_of(measured.profile, alone, segments.h, measured.trust, accurate)
     fit = estimator.fit(base.simulator, base.unknowns, base.unknowns.mean)

@@ -45,7 +45,8 @@ from joda.diagnosis.verdict import diagnosed
 from joda.hidden import Case, draw, write
 from joda.hidden.cases import VISIBLE
 from joda.measured import smoothing
-from joda.measured.reading import Measured, read_measured
+from joda.measured.measured_joint import Measured
+from joda.measured.reading import read_measured
 from joda.measured.replay import WINDOW
 
 Array = np.ndarray

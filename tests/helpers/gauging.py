@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from joda.measured.reading import Measured, read_measured
+from joda.measured.measured_joint import Measured
+from joda.measured.reading import read_measured
 
 SPAN, FRICTION = 1.5, 0.2
 SCENE = f"""<mujoco><compiler angle="radian"/><worldbody><body>

@@ -10,7 +10,8 @@ import numpy as np
 from joda.diagnosis.adding import Error, error
 from joda.hidden import EFFECTS, FAMILIES, Case, draw, write
 from joda.hidden.cases import FAMILY, PARTIAL, VISIBLE
-from joda.measured.reading import Measured, read_measured
+from joda.measured.measured_joint import Measured
+from joda.measured.reading import read_measured
 from joda.profile import Profile
 
 HARD = ("stribeck_friction", "presliding_friction", "backlash")

@@ -3,7 +3,8 @@
 import numpy as np
 
 from joda.measured.reading import read_measured
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 INERTIA, FRICTION, SPAN, SIGMA, RATE = 0.03, 0.05, 4.5, 4e-4, 400
 SCENE = f"""<mujoco>

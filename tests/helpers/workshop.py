@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 import joda
-from joda.measured import runs
+from joda.measured import run_files
 from joda.measured.reading import read_measured
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -114,7 +114,7 @@ def check_whole(path: Path) -> None:
     elif path.suffix == ".html":
         assert path.read_text().rstrip().endswith("</html>"), path
     elif path.suffix == ".csv":
-        runs.read_measurement(path)
+        run_files.read_measurement(path)
 
 
 def check(ended, folder: Path, before: dict[str, str], several: bool) -> None:

@@ -17,7 +17,8 @@ from joda.cases.subject import Subject
 from joda.commands.improve import improve
 from joda.component import Component
 from joda.errors import JodaError
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scenes.attaching import attach
 from joda.scenes.context import Context, context

@@ -15,7 +15,8 @@ from joda.measured.curves import curve_error, curves_verdict, failing_force
 from joda.measured.errors import Errors, errors, known
 from joda.measured.failing import LENGTHS, Failing, where, window_rows
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
-from joda.measured.reading import Measured, read_measured
+from joda.measured.measured_joint import Measured
+from joda.measured.reading import read_measured
 from joda.measured.replay import left_out
 from joda.measured.stepping import timestep_note
 from joda.measured.visited import unvisited

@@ -13,7 +13,8 @@ from joda.errors import JodaError
 from joda.files import fresh, make_folder, occupied, write_bytes
 from joda.interaction.hand import pull
 from joda.interaction.pulling import FIRMNESS, SLOW, grip
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 from joda.pictures.offscreen import Image, NoRenderer, render
 from joda.pictures.style import house_style, write_png
 from joda.propose.history import History

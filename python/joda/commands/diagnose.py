@@ -11,7 +11,7 @@ from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
 from joda.files import check_targets, write_together
 from joda.measured.maps import draw_maps, draw_models, draw_runs, replayed
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
 from joda.pictures.style import house_style, png

@@ -23,7 +23,7 @@ from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.files import write_together
 from joda.measured.corrections_file import corrections_beside
 from joda.measured.maps import draw_maps, draw_models, replayed
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.visited import unvisited
 from joda.pictures.changes import changes
 from joda.pictures.page import page, paragraph, table

@@ -19,9 +19,10 @@ from joda.files import check_targets, named_like, write_together
 from joda.measured.corrections_file import corrections_beside, corrections_text, sensing_of
 from joda.measured.driven import read_logs
 from joda.measured.excerpts import excerpts
+from joda.measured.measured_joint import Measured
 from joda.measured.obstructed import clear_of_contacts
 from joda.measured.quasi_static import compared
-from joda.measured.reading import Measured, checked, taken
+from joda.measured.reading import checked, taken
 from joda.measured.runs import QuasiStatic, Run, check_known
 from joda.measured.sensing import RIGHT
 from joda.measured.visited import unvisited

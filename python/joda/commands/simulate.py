@@ -14,7 +14,8 @@ from joda.errors import JodaError
 from joda.files import check_target, named_like, write_together
 from joda.interaction.script import Describe, interaction, perform
 from joda.interaction.traces import FORCE, draw_force, draw_position, shade
-from joda.measured.runs import Run, run_text
+from joda.measured.run_files import run_text
+from joda.measured.runs import Run
 from joda.pictures.film import frames, write_film
 from joda.pictures.style import clean, house_style, png
 from joda.scenes.context import Context, context

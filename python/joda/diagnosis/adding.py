@@ -28,8 +28,8 @@ from joda.diagnosis.shape_refinement import (
     refitted,
 )
 from joda.measured.errors import Errors, errors, known
+from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
-from joda.measured.reading import Measured
 from joda.profile import Profile
 from joda.threads import one_blas_thread
 

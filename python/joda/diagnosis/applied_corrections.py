@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from math import isfinite
 from typing import Any
 
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.sensing import RIGHT, Sensing
 from joda.scenes.weights import Heavier
 

@@ -20,14 +20,15 @@ from joda.diagnosis.hypothesis_fits import (
     simplex_searched,
     uneven,
 )
-from joda.diagnosis.impacts import Impacts, Rebound, ends_of, impacts_at, restitution_fit
+from joda.diagnosis.impacts import Impacts, Rebound, best_ratio, ends_of, impacts_at
 from joda.diagnosis.units import units_of
-from joda.estimation.base_model import BaseModel, base_of, joint_model_for, segments_for, usable
+from joda.estimation.base_model import BaseModel, base_of
 from joda.estimation.estimator import Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import corrected_base
+from joda.estimation.problem import joint_model_for, segments_for
 from joda.estimation.segments import Segments
 from joda.joints.joint_model import JointModel
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.profile import Profile
 from joda.scenes.native import Row
 
@@ -120,8 +121,17 @@ class Baseline:
         there = [self._thrown_back(end) for end in ends if sure.issuperset(ends_of(end))]
         return [candidate for candidate in there if candidate]
 
-    def _thrown_back(self, end: Hypothesis) -> FittedHypothesis | None:
-        return restitution_fit(self.estimator, self.base, self.fit, self.rebounds, end)
+    def _thrown_back(self, hypothesis: Hypothesis) -> FittedHypothesis | None:
+        """How bouncy an end is, or both, by the impacts there; None if there are none."""
+        ends = ends_of(hypothesis)
+        if not (there := [self.rebounds[side] for side in ends if side in self.rebounds]):
+            return None
+        whole, unknowns = Rebound.together(there), hypothesis.unknowns
+        ratio = best_ratio(whole, self.estimator.segments, self.base, ends)[0]
+        x = np.append(self.fit.x, np.clip(ratio, unknowns.low, unknowns.high))
+        return scored(
+            self.estimator, hypothesis, replace(self.fit, x=x, loss=self.fit.loss - whole.gain)
+        )
 
     def coarse(self, hypothesis: Hypothesis) -> "CoarseFit":
         """The hypothesis fitted roughly, in longer steps, to segments without impacts."""
@@ -195,7 +205,7 @@ def _fitted(
     row: Row | None = None,
 ) -> _Fitted:
     """The model in steps that stand for none or in MuJoCo's, with a row of friction that yields."""
-    estimator = SegmentEstimator(segments, usable(segments))
+    estimator = SegmentEstimator(segments, segments.usable)
     joint_model = replace(joint_model_for(measured, segments.h), friction_row=row)
     plain = base_of(measured.profile, joint_model, segments.h, measured.trust, accurate)
     base = corrected_base(plain, measured.doubtful)

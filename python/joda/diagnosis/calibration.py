@@ -18,11 +18,12 @@ from joda.diagnosis.corrections import ANYTHING
 from joda.diagnosis.findings import Correction
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
-from joda.estimation.base_model import base_of, joint_model_for, segments_for, usable
+from joda.estimation.base_model import base_of
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of, with_numbers
+from joda.estimation.problem import joint_model_for, segments_for
 from joda.measured.instability import longest_followed
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 Array = NDArray[np.float64]
 
@@ -208,7 +209,7 @@ def as_recorded(
         joint_model_for(measured, segments.h), friction_row=fitted.joint_model.friction_row
     )
     base = base_of(measured.profile, joint_model, segments.h, measured.trust, fitted.accurate)
-    return SegmentEstimator(segments, usable(segments)), replace(found.numbers, base=base)
+    return SegmentEstimator(segments, segments.usable), replace(found.numbers, base=base)
 
 
 def _calibrated(found: "_Search", beside: bool) -> Calibration | None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from joda.diagnosis.findings import Correction
 from joda.estimation.nuisance import FACTORS, NuisanceName
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 WHAT: dict[NuisanceName, str] = {
     "mass": "the mass is {:.3g}{} times the model's",

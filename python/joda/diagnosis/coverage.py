@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.estimation.base_model import segments_for, usable
+from joda.estimation.problem import segments_for
 from joda.estimation.segments import Segments
 from joda.measured.curves import FEW, TOO_LOUD, too_loud
 from joda.measured.data_checks.timing import repeats
+from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import QuasiStaticComparison
-from joda.measured.reading import Measured
 from joda.measured.slow_runs import one_way, ways
 
 WINDOWS, MOVES = 4, 8.0
@@ -49,7 +49,7 @@ def at_rest(measured: Measured) -> str:
 
 def _moving(measured: Measured, segments: Segments) -> int:
     """In how many segments the joint moves by more than noise."""
-    own = [segments.position[row[row >= 0]] for row in segments.rows[usable(segments)]]
+    own = [segments.position[row[row >= 0]] for row in segments.rows[segments.usable]]
     return sum(bool(np.ptp(position) > MOVES * max(measured.sigma)) for position in own)
 
 

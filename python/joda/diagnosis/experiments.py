@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from joda.estimation.estimator import Make, SegmentEstimator
 from joda.estimation.segments import Segments, evenly
 from joda.estimation.unknowns import Unknowns
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.profile import Joint
 
 Array = NDArray[np.float64]

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.hypotheses import Hypothesis
-from joda.estimation.base_model import BaseModel
 from joda.estimation.segments import Segments
 from joda.field import merge
+from joda.joints.joint_model import JointModel
 from joda.joints.resistance import friction_bounds
 from joda.measured.quasi_static import exerted
+from joda.profile import Profile
 
 Array = NDArray[np.float64]
 
@@ -22,22 +23,24 @@ TAKEN = 2
 """How many trials are begun with."""
 
 
-def balanced(segments: Segments, base: BaseModel, hypothesis: Hypothesis) -> list[Array]:
+def balanced(
+    segments: Segments, profile: Profile, joint_model: JointModel, hypothesis: Hypothesis
+) -> list[Array]:
     """The hypothesis' numbers from which to begin, the best first: trials of another strength.
 
     Args:
         segments: of runs whose force is recorded.
-        base: the model as it is.
+        profile, joint_model: the model as it is.
         hypothesis: none but one that exerts a force over position is balanced.
 
     Returns:
         shape (k,) each; empty if nothing tells.
     """
-    s, missing, q = _missing(segments, base)
+    s, missing, q = _missing(segments, profile, joint_model)
     found = []
     for trial in hypothesis.trials if len(s) else ():
-        force = exerted(hypothesis.write(base.profile, trial), s, q)
-        force = force - exerted(base.profile, s, q)
+        force = exerted(hypothesis.write(profile, trial), s, q)
+        force = force - exerted(profile, s, q)
         square = float(force @ force)
         if not square:
             continue
@@ -52,7 +55,9 @@ def balanced(segments: Segments, base: BaseModel, hypothesis: Hypothesis) -> lis
     return [x for _, x in found[:TAKEN]]
 
 
-def _missing(segments: Segments, base: BaseModel) -> tuple[Array, Array, Array]:
+def _missing(
+    segments: Segments, profile: Profile, joint_model: JointModel
+) -> tuple[Array, Array, Array]:
     """Normalised position, force that the model lacks there, and position, from each segment to the
     next of its run; shape (n,) each."""
     at, (q, v) = segments.at, segments.start.T
@@ -62,9 +67,8 @@ def _missing(segments: Segments, base: BaseModel) -> tuple[Array, Array, Array]:
     pushed = (total[at[pairs + 1]] - total[at[pairs]]) / steps
     acceleration = (v[pairs + 1] - v[pairs]) / (steps * segments.h)
     q, v = (q[pairs] + q[pairs + 1]) / 2, (v[pairs] + v[pairs + 1]) / 2
-    lo, hi = base.profile.joint.range
+    lo, hi = profile.joint.range
     s = np.clip((q - lo) / (hi - lo), 0.0, 1.0)
-    joint_model, profile = base.joint_model, base.profile
     up, down = friction_bounds(profile, s)
     resisted = np.where(v > 0, up, -down) + merge(profile.channels.damping)(s)[0] * v
     if joint_model.servo is not None and segments.command is not None:

@@ -13,8 +13,8 @@ from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.segmentation import segments_of
 from joda.measured.instability import followed
+from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
-from joda.measured.reading import Measured
 from joda.measured.replay import Replayer
 from joda.measured.runs import Run, until_end
 from joda.measured.whiteness import CLEAR, drifts, free_parts

@@ -11,8 +11,8 @@ from joda.diagnosis.split import held_segments
 from joda.estimation.estimator import Fit, Make, SegmentEstimator
 from joda.estimation.segments import Segments
 from joda.estimation.unknowns import Unknowns
+from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
-from joda.measured.reading import Measured
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,8 @@ from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.free_runs import FreeRuns, free_runs
 from joda.diagnosis.plausible import Needs
-from joda.diagnosis.search import WORST, Progress, Ranking, always, narrowed, rank
+from joda.diagnosis.ranking import WORST, Ranking, evidence, shows, weigh
+from joda.diagnosis.search import Progress, always, narrowed, rank
 from joda.diagnosis.selection import (
     SETTINGS,
     SURE,
@@ -20,13 +21,10 @@ from joda.diagnosis.selection import (
     closer_counts,
     decide,
     doubted,
-    evidence,
     second_counts,
-    shows,
-    weigh,
 )
 from joda.measured.instability import longest_followed
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.profile import Profile
 
 LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5

@@ -211,7 +211,8 @@ def coarse(
     segments, first = estimator.segments, points[0]
     if usual(estimator, first.fit) >= LOST and segments.pushed:
         given = replace(first.fit, x=base.unknowns.mean, start=segments.start)
-        found += best(replace(first, fit=given), balanced(segments, base, hypothesis), 1)
+        near = balanced(segments, base.profile, base.joint_model, hypothesis)
+        found += best(replace(first, fit=given), near, 1)
     return tuple(found)
 
 

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.hypotheses import Hypothesis
-from joda.diagnosis.hypothesis_fits import FittedHypothesis, scored
-from joda.estimation.base_model import MIN_SAMPLES, BaseModel
-from joda.estimation.estimator import Fit, SegmentEstimator
+from joda.estimation.base_model import BaseModel
+from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.segments import Segments
 from joda.joints.joint_model import JointModel
 from joda.profile import Channels, Profile
@@ -37,29 +36,6 @@ AROUND = 5
 """Samples before and after a impact that tell its speeds."""
 KNOCK_TIME = 0.6
 """In which a joint goes through its range towards a impact, s."""
-
-
-def restitution_fit(
-    estimator: SegmentEstimator,
-    base: BaseModel,
-    fit: Fit,
-    rebounds: dict[int, "Rebound"],
-    hypothesis: Hypothesis,
-) -> FittedHypothesis | None:
-    """How bouncy an end is, or both, by the segments with impacts there; None if there are none.
-
-    Args:
-        estimator, base, fit: the model and how it was fitted.
-        rebounds: what the impacts at each end tell.
-        hypothesis: bouncy ends.
-    """
-    ends = ends_of(hypothesis)
-    if not (there := [rebounds[side] for side in ends if side in rebounds]):
-        return None
-    whole = Rebound.together(there)
-    ratio = best_ratio(whole, estimator.segments, base, ends)[0]
-    x = np.append(fit.x, np.clip(ratio, hypothesis.unknowns.low, hypothesis.unknowns.high))
-    return scored(estimator, hypothesis, replace(fit, x=x, loss=fit.loss - whole.gain))
 
 
 def best_ratio(
@@ -223,7 +199,7 @@ def ends_of(hypothesis: Hypothesis) -> list[int]:
 def knocked(segments: Segments, base: BaseModel) -> NDArray[np.intp]:
     """At which end each segment has a impact: -1 low, 1 high, 0 none; shape (m,)."""
     middle = float(np.mean(base.profile.joint.range))
-    told = segments.impacts & (segments.count >= MIN_SAMPLES)
+    told = segments.impacts & segments.long_enough
     out = np.zeros(len(told), np.intp)
     for k in np.flatnonzero(told):
         row = segments.rows[k]

@@ -15,8 +15,8 @@ from joda.diagnosis.pair_search import pairs
 from joda.diagnosis.shape_refinement import refitted
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
-from joda.estimation.base_model import segments_for
-from joda.measured.reading import Measured
+from joda.estimation.problem import segments_for
+from joda.measured.measured_joint import Measured
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.threads import one_blas_thread

@@ -12,7 +12,7 @@ from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.calibration import NEXT, Calibration, as_recorded, covariance
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.estimation.nuisance import nuisances_of, with_numbers
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 
 def needed(

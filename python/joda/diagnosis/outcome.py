@@ -15,7 +15,8 @@ from joda.measured.corrections_file import corrections_beside, corrections_text
 from joda.measured.errors import MULTIPLE
 from joda.measured.excerpts import excerpts
 from joda.measured.maps import draw_models, draw_runs, shade
-from joda.measured.reading import Measured, read_measured
+from joda.measured.measured_joint import Measured
+from joda.measured.reading import read_measured
 from joda.measured.runs import check_known
 from joda.measured.sensing import RIGHT
 from joda.measured.trust import trusting

@@ -7,11 +7,11 @@ from joda.diagnosis.baseline import Baseline, CoarseFit, fit_baseline
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.hypothesis_fits import FittedHypothesis
-from joda.diagnosis.search import Ranking, rank
-from joda.diagnosis.selection import weigh
+from joda.diagnosis.ranking import Ranking, weigh
+from joda.diagnosis.search import rank
 from joda.diagnosis.shape_refinement import checked
 from joda.diagnosis.verdict import finding
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 AHEAD = 4
 """Of how many effects it is seen what a second one adds."""

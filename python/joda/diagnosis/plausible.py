@@ -16,11 +16,11 @@ from joda.effects import (
     QuadraticDamping,
 )
 from joda.effects.base import CurveEffect
-from joda.estimation.base_model import segments_for
+from joda.estimation.problem import segments_for
 from joda.field import merge
 from joda.joints.resistance import damping, friction_bounds
 from joda.measured import smoothing
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.visited import unvisited_part, visited_share
 from joda.profile import CHANNELS, NOUNS, Profile

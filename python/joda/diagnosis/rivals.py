@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from joda.diagnosis.search import Ranking
+from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.selection import LEFT, LITTLE, Selection
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
 from joda.template import read_templates

@@ -10,8 +10,9 @@ import numpy as np
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, CoarseFit
 from joda.diagnosis.hypotheses import Hypothesis
-from joda.diagnosis.hypothesis_fits import FittedHypothesis, beside, joined, price
-from joda.estimation.estimator import Fit, SegmentEstimator
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, beside, joined
+from joda.diagnosis.ranking import Ranking, best_of_each, scored
+from joda.estimation.estimator import SegmentEstimator
 from joda.profile import Profile
 
 PERTURBED, NEAR = 4, 3.0
@@ -32,29 +33,6 @@ WELLS = {"detent_internal", "bistable_mechanism_internal"}
 """Effects of which one may stand in for the other where no run went all the way."""
 TELLS, TELLS_EACH = 60.0, 0.1
 """Gain in loss from which segments without impacts tell of an effect; the same, per sample."""
-QUIET = 0.3
-"""Part of the segments, the better ones, that tell the noise."""
-WORST = 1.5
-"""Mean square residual that noise may make."""
-
-
-@dataclass(frozen=True)
-class Ranking:
-    """What may be missing from a model.
-
-    Attributes:
-        baseline: the model and its runs.
-        candidates: the best one of each effect, the most likely first.
-        level: mean square residual that counts as noise, 1 at least.
-        n_effective: how many samples count.
-        restitution: whether impacts tell of bouncier ends than the model's, and that is not tried.
-    """
-
-    baseline: Baseline
-    candidates: tuple[FittedHypothesis, ...]
-    level: float
-    n_effective: float
-    restitution: bool
 
 
 Progress = Callable[[int, int, str], None]
@@ -90,7 +68,7 @@ def rank(
     with ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, progress, 2 * len(tried) + PERTURBED)
         candidates, rest = _roughly_fitted(baseline, tried, work)
-        few = Ranking(baseline, *_scored(baseline.estimator, candidates), restitution=False)
+        few = Ranking(baseline, *scored(baseline.estimator, candidates), restitution=False)
         if not promising(few):
             candidates += work.all(baseline.coarse_scored, rest)
         else:
@@ -99,7 +77,7 @@ def rank(
             candidates += _perturbed(baseline, candidates, work)
             candidates += _simplex_searched(baseline, candidates, work)
         baseline = _restarted(baseline, candidates)
-        others = [one.written(baseline.base) for one in _best(candidates)[:1]]
+        others = [one.written(baseline.base) for one in best_of_each(candidates)[:1]]
         ends = baseline.restitution(restitution, others)
         if not silent and not _shown_without_impacts(baseline, candidates):
             candidates += ends
@@ -108,7 +86,7 @@ def rank(
         for one in candidates
         if not one.vanished and possible(one.written(baseline.base), one.hypothesis.effect)
     ]
-    return Ranking(baseline, *_scored(baseline.estimator, there), restitution=silent and bool(ends))
+    return Ranking(baseline, *scored(baseline.estimator, there), restitution=silent and bool(ends))
 
 
 def narrowed(
@@ -144,7 +122,7 @@ def narrowed(
         candidates = _Work(pool, progress, len(tried)).all(again, tried)
         baseline = _restarted(baseline, candidates)
     there = [one for one in candidates if not one.vanished]
-    return Ranking(baseline, *_scored(estimator, there), restitution=before.restitution)
+    return Ranking(baseline, *scored(estimator, there), restitution=before.restitution)
 
 
 @dataclass
@@ -203,7 +181,7 @@ def _beside(
     """Those that may be where the best one was found."""
     alike = [
         beside(h, best)
-        for best in _best(candidates)[:1]
+        for best in best_of_each(candidates)[:1]
         for h in tried
         if {h.effect, best.hypothesis.effect} == WELLS
     ]
@@ -214,7 +192,7 @@ def _perturbed(
     baseline: Baseline, candidates: Sequence[FittedHypothesis], work: _Work
 ) -> list[FittedHypothesis]:
     """The best effects, in every variant that is near, with their numbers tried elsewhere."""
-    best = _best(candidates)[:PERTURBED]
+    best = best_of_each(candidates)[:PERTURBED]
     if baseline.only_noise and all(baseline.fit.loss - one.fit.loss < HARDLY for one in best):
         return []
     names = {one.hypothesis.effect for one in best}
@@ -232,7 +210,7 @@ def _simplex_searched(
     baseline: Baseline, candidates: Sequence[FittedHypothesis], work: _Work
 ) -> list[FittedHypothesis]:
     """The best effects where they leave more than noise, searched without derivatives."""
-    best = _best(candidates)[:SEARCHED]
+    best = best_of_each(candidates)[:SEARCHED]
     least = min((one.fit.loss for one in best), default=0.0)
     if least < ENOUGH * baseline.estimator.samples:
         return []
@@ -265,46 +243,3 @@ def _restarted(baseline: Baseline, candidates: Sequence[FittedHypothesis]) -> Ba
     fit = estimator.fit(base.simulator, base.unknowns, best.x[: base.count], best.start)
     fit = estimator.refit(base.simulator, base.unknowns, fit)
     return replace(baseline, fit=min(baseline.fit, fit, key=lambda one: one.loss))
-
-
-def _best(candidates: Iterable[FittedHypothesis]) -> list[FittedHypothesis]:
-    """The best candidate of each effect, the lowest score first."""
-    best: dict[str, FittedHypothesis] = {}
-    for one in sorted(candidates, key=lambda g: g.score):
-        best.setdefault(one.hypothesis.effect, one)
-    return list(best.values())
-
-
-def rescaled(estimator: SegmentEstimator, fit: Fit, level: float) -> float:
-    """A fit's loss, with what its numbers lose by being off (and impacts), where noise is more."""
-    beside = fit.loss - estimator.loss(fit.squares)
-    return estimator.loss(fit.squares, level=level) + beside / level
-
-
-def _scored(
-    estimator: SegmentEstimator, candidates: Sequence[FittedHypothesis]
-) -> tuple[tuple[FittedHypothesis, ...], float, float]:
-    """The best candidates, scored by what the best of them leaves in its better segments.
-
-    Recorded noise is often less than all that a simulation cannot follow: clocks, forces, whatever
-    else is a little wrong. Such a misfit is all of one piece within a segment, which then counts as
-    one sample.
-
-    Returns:
-        the best one of each effect, the most likely first; the mean square residual that is
-        noise; how many samples count.
-    """
-    samples = estimator.samples
-    if not candidates or not samples:
-        return (), 1.0, samples
-    best = min(candidates, key=lambda g: g.fit.loss + g.cost).fit.squares
-    each = (best / np.maximum(estimator.segments.count, 1))[estimator.counts]
-    level = max(float(np.quantile(each, QUIET)), 1.0)
-    n_effective = float(estimator.counts.sum()) if level > WORST else samples
-
-    def scored(one: FittedHypothesis) -> FittedHypothesis:
-        count = n_effective / samples
-        cost = price(one.hypothesis, one.fit, n_effective, count / level)
-        return replace(one, score=rescaled(estimator, one.fit, level) * count + cost)
-
-    return tuple(_best(map(scored, candidates))), level, n_effective

@@ -8,11 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.findings import Verdict
 from joda.diagnosis.hypotheses.base import KNOWN_LAW
-from joda.diagnosis.search import WORST, Ranking, rescaled
-from joda.estimation.estimator import SegmentEstimator, excess
 
 
 @dataclass(frozen=True)
@@ -147,51 +144,6 @@ class Selection:
         return left[0] / own if left and own > LITTLE else 1.0
 
 
-def evidence(ranking: Ranking) -> Evidence:
-    """What the fits of a ranking leave."""
-    estimator, fit, candidates = (
-        ranking.baseline.estimator,
-        ranking.baseline.fit,
-        ranking.candidates,
-    )
-    samples = max(estimator.samples, 1.0)
-    first = candidates[0] if candidates else None
-    tolerant = estimator.loss(fit.squares, level=min(ranking.level, WORST))
-    return Evidence(
-        samples=estimator.samples,
-        n_effective=ranking.n_effective,
-        noisy=ranking.level > WORST,
-        restitution=ranking.restitution,
-        model=ranking.baseline.excess,
-        tolerant=excess(tolerant, samples),
-        own=excess(rescaled(estimator, fit, ranking.level), samples),
-        gain=_gain(ranking),
-        misfit_tolerance=first.hypothesis.misfit_tolerance if first else KNOWN_LAW,
-        effects=tuple(candidate.hypothesis.effect for candidate in candidates),
-        left=tuple(
-            excess(candidate.score, max(ranking.n_effective, 1.0)) for candidate in candidates
-        ),
-    )
-
-
-def _gain(ranking: Ranking) -> float:
-    """See `Evidence`: one segment may have been disturbed, by a hand that comes or goes."""
-    estimator, fit = ranking.baseline.estimator, ranking.baseline.fit
-    if not ranking.candidates:
-        return 0.0
-    first = ranking.candidates[0]
-    gain = fit.loss - first.fit.loss - first.cost
-    if ranking.baseline.excess > 0 or np.count_nonzero(estimator.counts) < SETTINGS.many:
-        return gain
-    each = estimator.losses(fit.squares) - estimator.losses(first.fit.squares)
-    return gain - max(float(each[estimator.counts].max()), 0.0)
-
-
-def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Selection:
-    """`decide` on a ranking's evidence."""
-    return decide(evidence(ranking), strictness, wholly)
-
-
 def decide(
     found: Evidence,
     strictness: float = 1.0,
@@ -236,23 +188,6 @@ def decide(
         verdict = "missing_effect"
     excess = own, tuple(map(float, left))
     return Selection(verdict, tuple(map(float, likely)), excess, found.effects)
-
-
-def shows(first: Ranking, longer: Baseline, settings: Settings = SETTINGS) -> bool:
-    """Whether more than noise is left of longer segments, be noise what was taken for it or what
-    the best candidate left of a first ranking's segments, for each degree of freedom."""
-    if longer.excess > settings.noticed:
-        return True
-    best = min(
-        (candidate.fit.loss for candidate in first.candidates), default=first.baseline.fit.loss
-    )
-    own, its = _freedom(longer.estimator), _freedom(first.baseline.estimator)
-    return longer.fit.loss - best * own / its > settings.least_gain
-
-
-def _freedom(estimator: SegmentEstimator) -> float:
-    """Samples that count, less the two numbers of each segment's start."""
-    return max(estimator.samples - 2 * float(estimator.counts.sum()), 1.0)
 
 
 def closer_counts(before: Selection, closer: Selection) -> bool:

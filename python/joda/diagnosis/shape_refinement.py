@@ -16,14 +16,14 @@ from joda.component import Component
 from joda.diagnosis.departures import DOUBT, EFFECTS, Moved
 from joda.diagnosis.hypothesis_fits import usual
 from joda.effects import EndStopRestitution
-from joda.estimation.base_model import MIN_SAMPLES, as_it_is, segments_for, usable
 from joda.estimation.estimator import CAUCHY_SCALE, SegmentEstimator
+from joda.estimation.problem import as_it_is, segments_for
 from joda.estimation.profile_parameters import DOUBT as USUAL
 from joda.estimation.profile_parameters import NARROWEST, Kind, Parameters
 from joda.estimation.segments import Segments
 from joda.estimation.unknowns import Unknowns
 from joda.field import evaluate
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.visited import unvisited
 from joda.profile import CHANNELS, Channel, Channels, Profile
 
@@ -64,7 +64,7 @@ class Likelihood:
             segments_for(measured, LONGEST, fine=False),
         )
         self.estimator = SegmentEstimator(
-            self.segments, _counted(self.segments, bounces or not usable(self.segments).any())
+            self.segments, _counted(self.segments, bounces or not self.segments.usable.any())
         )
         self.given = measured.profile
         self.own = replace(self.joint_model, friction_row=measured.joint_model.friction_row)
@@ -279,7 +279,7 @@ def bouncy(profile: Profile) -> bool:
 
 def _counted(segments: Segments, bounces: bool) -> NDArray[np.bool_]:
     """Which segments count: without knocks and rests at the ends, unless `bounces`."""
-    return segments.count >= MIN_SAMPLES if bounces else usable(segments)
+    return segments.long_enough if bounces else segments.usable
 
 
 def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:

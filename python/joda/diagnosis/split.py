@@ -14,11 +14,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.estimation.base_model import segments_for
+from joda.estimation.problem import segments_for
 from joda.estimation.segments import Segments
 from joda.measured import smoothing
+from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import QuasiStaticComparison
-from joda.measured.reading import Measured
 from joda.measured.runs import Run
 
 Flags = NDArray[np.bool_]

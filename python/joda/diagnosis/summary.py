@@ -3,8 +3,8 @@
 from joda.diagnosis import phrases
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.selection import EVEN, MUCH, Selection
+from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import compared
-from joda.measured.reading import Measured
 
 MOST = 50.0
 """What of the misfit, %, an effect may leave that is said to be missing with something else."""

@@ -3,9 +3,8 @@
 import numpy as np
 
 from joda.diagnosis.hypotheses import Units
-from joda.estimation.base_model import usable
 from joda.estimation.segments import Segments
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 SLOWEST = 0.02
 """Least speed that counts as a usual one, in ranges in the time of the longest run."""
@@ -44,7 +43,7 @@ def _visited(segments: Segments, measured: Measured) -> tuple[float, float]:
     """Part of the range that was measured in segments that count: where a impact is, none does."""
     lo, hi = measured.profile.joint.range
     if measured.runs:
-        rows = segments.rows[usable(segments)]
+        rows = segments.rows[segments.usable]
         positions = segments.position[rows[rows >= 0]]
     else:
         positions = np.concatenate([gauged.curve.position for gauged in measured.curves])

@@ -30,24 +30,19 @@ from joda.diagnosis.hypothesis_fits import joined
 from joda.diagnosis.joint_calibration import jointly, needed
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.plausible import Needs, unseen_place
+from joda.diagnosis.ranking import Ranking, weigh
 from joda.diagnosis.rivals import indistinguishable
-from joda.diagnosis.search import Progress, Ranking
-from joda.diagnosis.selection import (
-    LITTLE,
-    MUCH,
-    SURE,
-    Evidence,
-    Selection,
-    weigh,
-)
+from joda.diagnosis.search import Progress
+from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection
 from joda.diagnosis.summary import BOUNCY, FALLEN, SAME, far_off, helps, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
-from joda.estimation.base_model import BaseModel, segments_for, usable
+from joda.estimation.base_model import BaseModel
 from joda.estimation.nuisance import nuisances_of
+from joda.estimation.problem import segments_for
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
+from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
-from joda.measured.reading import Measured
 from joda.measured.visited import unvisited, unvisited_part, visited_share
 from joda.measured.whiteness import strays
 from joda.profile import Profile
@@ -161,7 +156,7 @@ def diagnosed(
         progress: told how much is done, of how much, and what.
         calibrate: whether numbers of the joint's body and of the measurement may be off.
     """
-    if not usable(segments_for(measured)).any():
+    if not segments_for(measured).usable.any():
         return Diagnosed(_report(measured, "insufficient_data", TOO_SHORT, (), None))
     if why := at_rest(measured):
         why = f"{why[0].upper()}{why[1:]}."

@@ -1,24 +1,18 @@
 """The model as it is, with the strengths of its components as numbers to be fitted again."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from joda._core import JointSimulator
-from joda.estimation.quasi_static import QuasiStaticJoint, curve_segments
-from joda.estimation.segmentation import BEYOND, segments_of
-from joda.estimation.segments import GRID, Segments
+from joda.estimation.segments import GRID
 from joda.estimation.unknowns import Unknowns
 from joda.joints.joint_model import JointModel
-from joda.measured.instability import divergence_rate
-from joda.measured.reading import Measured
 from joda.measured.trust import USUAL, Trust
 from joda.profile import CHANNELS, Profile
 from joda.scenes.actuators import Servo
-from joda.scenes.limits import stiffness_of
 from joda.scenes.native import DAMPING, FRICTION, SPRING
 
 Array = NDArray[np.float64]
@@ -35,12 +29,6 @@ DELAY_AT_MOST, DELAY_DOUBT = 0.1, 0.02
 """Longest delay of commands, and its doubt, s."""
 FAR_AWAY = ((-4.0, -2.0, 10.0), (-2.0, -1.0, 3.0), (2.0, 1.0, 1.0))
 """Logarithms of gain and damping, and factors of friction, from which fits begin besides."""
-SOFT = (0.02, 1.0)
-"""MuJoCo's own `solreflimit`: time constant (s) and damping ratio of the ends of a range."""
-STRAYS = 3
-"""At most so many samples are beyond the range by chance."""
-MIN_SAMPLES = 4
-"""Fewest samples of a segment that counts."""
 
 
 @dataclass(frozen=True)
@@ -187,48 +175,3 @@ def _of_servo(servo: Servo, trust: Trust) -> Unknowns:
         mean=np.array([0.0, 0.0, servo.delay]),
         prior_std=np.maximum(prior_std, HELD),
     )
-
-
-def segments_for(measured: Measured, length: float | None = None, fine: bool = True) -> Segments:
-    """Runs in segments of some length (s), see `segments_of`; curves where there are no runs."""
-    if not measured.runs:
-        return curve_segments(measured)
-    lo, hi = measured.profile.joint.range
-    fixed = lo, measured.joint_model.inertia, measured.timestep
-    ends = float(np.sqrt(stiffness_of(measured.joint_model.solref, measured.timestep)))
-    diverges = partial(divergence_rate, measured)
-    return segments_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine, diverges, ends)
-
-
-def joint_model_for(measured: Measured, h: float) -> JointModel:
-    """The joint, to be simulated in steps of h (s) where there are runs.
-
-    MuJoCo's own ends of a range yield by more than an encoder's noise to what presses on them. They
-    are hard here, unless somebody chose others or the measured ones yield too.
-    """
-    joint_model = as_it_is(measured)
-    if joint_model.solref != SOFT or not measured.runs or _yields(measured):
-        return joint_model
-    return replace(joint_model, solref=(2 * h, 1.0))
-
-
-def as_it_is(measured: Measured) -> JointModel:
-    """The joint as its scene has it, with the plugin; where there are only curves it is not
-    simulated."""
-    joint_model = measured.joint_model.with_plugin
-    return joint_model if measured.runs else QuasiStaticJoint(**vars(joint_model))
-
-
-def _yields(measured: Measured) -> bool:
-    """Whether the joint was beyond its range by more than noise."""
-    beyond = (
-        np.abs(run.position - np.clip(run.position, *measured.profile.joint.range)) / sigma
-        for run, sigma in zip(measured.runs, measured.sigma, strict=True)
-    )
-    return sum(int(np.sum(noises > BEYOND)) for noises in beyond) > STRAYS
-
-
-def usable(segments: Segments) -> NDArray[np.bool_]:
-    """Which segments tell of the joint: enough samples, and neither a impact at an end of the range
-    nor nothing but rest there."""
-    return np.asarray((segments.count >= MIN_SAMPLES) & ~segments.impacts & ~segments.rests)

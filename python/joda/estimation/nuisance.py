@@ -12,7 +12,7 @@ from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import Make
 from joda.estimation.unknowns import Unknowns
 from joda.joints.joint_model import JointModel
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.sensing import Sensing
 from joda.profile import Profile
 

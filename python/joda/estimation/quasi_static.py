@@ -1,6 +1,6 @@
 """Quasi-static curves as segments: what a model misses is force, and nothing moves."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from joda.errors import JodaError
 from joda.estimation.segments import Array, Segments, rows_of
 from joda.joints.joint_model import JointModel
-from joda.measured.quasi_static import gravity, held_force
-from joda.measured.reading import Measured
+from joda.measured.quasi_static import QuasiStaticComparison, gravity, held_force
 from joda.profile import Profile
+from joda.scenes.context import Context
 
 SAMPLES = 12
 """Of a segment."""
@@ -46,11 +46,19 @@ class QuasiStaticJoint(JointModel):
         return profile
 
 
-def curve_segments(measured: Measured) -> CurveWindows:
-    """The curves in pieces; samples whose direction of travel is not known are left out."""
+def curve_segments(
+    curves: Sequence[QuasiStaticComparison], found: Context, timestep: float
+) -> CurveWindows:
+    """Curves of a joint in pieces; samples whose direction of travel is not known are left out.
+
+    Args:
+        curves: at least one.
+        found: the joint.
+        timestep: of its scene, s.
+    """
     parts: list[tuple[NDArray[Any], ...]] = []
     count = 0
-    for number, gauged in enumerate(measured.curves):
+    for number, gauged in enumerate(curves):
         known = np.flatnonzero(gauged.direction)
         pieces = max(len(known) // SAMPLES, 1)
         window = np.minimum(np.arange(len(known)) // SAMPLES, pieces - 1) + count
@@ -63,7 +71,7 @@ def curve_segments(measured: Measured) -> CurveWindows:
     )
     rows = rows_of(window, count)
     n = len(force)
-    weight = gravity(measured.context, at)
+    weight = gravity(found, at)
 
     def model(profile: Profile) -> Array:
         """The force that slowly moves the joint; NaN where friction holds against any force."""
@@ -74,8 +82,8 @@ def curve_segments(measured: Measured) -> CurveWindows:
 
     spread = np.where(rows >= 0, prior_std[rows], np.inf)
     return CurveWindows(
-        h=measured.timestep,
-        length=measured.timestep,
+        h=timestep,
+        length=timestep,
         force=force,
         at=np.arange(count),
         fresh=np.ones(count, bool),

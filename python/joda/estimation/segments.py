@@ -21,6 +21,8 @@ GRID = 3
 times longer ones."""
 STAYS = 4.0
 """Noises by which a model must leave an end, at which the joint stays, to miss that."""
+MIN_SAMPLES = 4
+"""Fewest samples of a segment that counts."""
 LOOSE = 10.0
 """How much further than its measurement's error a start may be from the measured one."""
 
@@ -102,6 +104,17 @@ class Segments:
     def count(self) -> Integers:
         """Samples of each segment, shape (m,)."""
         return np.asarray((self.rows >= 0).sum(axis=1))
+
+    @property
+    def long_enough(self) -> NDArray[np.bool_]:
+        """Which segments have enough samples to tell of the joint, shape (m,)."""
+        return np.asarray(self.count >= MIN_SAMPLES)
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which segments tell of the joint, shape (m,): enough samples, and neither an impact at an
+        end of the range nor nothing but rest there."""
+        return np.asarray(self.long_enough & ~self.impacts & ~self.rests)
 
     def coarser(self) -> "Segments":
         """The same in steps that are `GRID` times longer; commands are the mean over each, forces

@@ -19,7 +19,8 @@ from joda.hidden.laws import Array, Law, Tilt
 from joda.hidden.measuring import Encoder, measure, shows
 from joda.hidden.sampler import Hidden, Sampler
 from joda.hidden.truth import Joint, Truth
-from joda.measured.runs import Run, write_run
+from joda.measured.run_files import write_run
+from joda.measured.runs import Run
 
 FAMILY = "laboratory"
 EFFECTS = tuple(FAMILIES[FAMILY].known)

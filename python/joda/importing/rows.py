@@ -9,7 +9,8 @@ from joda.errors import JodaError
 from joda.importing.columns import Pick
 from joda.importing.log import Array, Clock, Log, Recording, Track
 from joda.importing.scaling import Scaled
-from joda.measured.runs import LEAST, Run, run_text
+from joda.measured.run_files import run_text
+from joda.measured.runs import LEAST, Run
 from joda.measured.table import LARGEST
 
 

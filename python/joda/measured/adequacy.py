@@ -16,7 +16,7 @@ from scipy.stats import binomtest, norm
 from joda.measured.data_checks.timing import repeats
 from joda.measured.errors import MULTIPLE, Errors, Missed
 from joda.measured.failing import FORCE, LENGTHS
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.runs import Run
 from joda.measured.whiteness import drifts, free_parts, strays
 

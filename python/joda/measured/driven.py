@@ -10,14 +10,8 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.measured.others import SHORTER, SMOOTHED, doubt_of_others, force_of_others
-from joda.measured.runs import (
-    LEAST,
-    QuasiStatic,
-    Run,
-    evened,
-    read_measurement,
-    read_together,
-)
+from joda.measured.run_files import read_measurement, read_together
+from joda.measured.runs import LEAST, QuasiStatic, Run, evened
 from joda.measured.sensing import RIGHT, Sensing
 from joda.measured.table import header
 from joda.measured.touching import touching
@@ -58,7 +52,7 @@ def read_logs(
     Args:
         model: compiled.
         joint: its id.
-        paths: CSV files, as `joda.measured.runs.read_measurement` reads them.
+        paths: CSV files, as `joda.measured.run_files.read_measurement` reads them.
         passive: whether the actuators on the joint were off while it was measured.
         sensing: what is wrong with them.
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.measured.measured_joint import Measured
 from joda.measured.misfit import joined, rms
-from joda.measured.reading import Measured
 from joda.measured.replay import Window
 from joda.measured.runs import Run
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from joda.measured import smoothing
 from joda.measured.failing_intervals import BINS, failing_intervals
+from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
-from joda.measured.reading import Measured
 from joda.measured.replay import Window
 from joda.measured.runs import STOP, Run
 

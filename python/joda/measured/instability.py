@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from joda.field.reference import evaluate
-from joda.measured.reading import Measured
+from joda.joints.divergence import divergence_rate
+from joda.measured.measured_joint import Measured
 from joda.measured.runs import Run
 
 Array = NDArray[np.float64]
@@ -18,8 +18,6 @@ GROWN = 0.03
 slopes hold by which a fit goes."""
 NEARLY_ALL = 0.9
 """Part of all segments in which they grow by no more."""
-AT_END = 0.01
-"""How near an end of the range, in ranges, the stop holds a joint."""
 SHORTER = 0.8
 """Factor by which segments become shorter until that holds."""
 
@@ -41,24 +39,6 @@ def followed(measured: Measured, run: Run, sigma: float) -> Run:
     return run.part(slice(0, int(end)))
 
 
-def divergence_rate(measured: Measured, position: Array) -> Array:
-    """How fast two motions of the model diverge at positions, 1/s, shape (n,); 0 where they do not.
-
-    The larger root of I r² + c r = k, with the inertia I, the damping c, and k by which the
-    force towards larger positions grows with the position (Lyapunov's indirect method).
-    """
-    profile, joint_model = measured.profile, measured.joint_model
-    lo, hi = profile.joint.range
-    s = (position - lo) / (hi - lo)
-    k = evaluate(profile.channels.conservative, s)[1] / (hi - lo)
-    k = k + joint_model.weight_slope(position)
-    if joint_model.servo is not None:
-        k = k - joint_model.servo.stiffness
-    k = np.where(np.abs(s - 0.5) < 0.5 - AT_END, np.maximum(k, 0.0), 0.0)
-    c, inertia = evaluate(profile.channels.damping, s)[0], joint_model.inertia
-    return np.asarray((np.sqrt(c**2 + 4 * inertia * k) - c) / (2 * inertia))
-
-
 def _bearable(measured: Measured, sigma: float) -> float:
     """Logarithm of the factor by which an error of the noise may grow."""
     span = float(np.ptp(measured.profile.joint.range))
@@ -67,7 +47,7 @@ def _bearable(measured: Measured, sigma: float) -> float:
 
 def _growth(measured: Measured, run: Run) -> Array:
     """Logarithm of the factor by which errors have grown since the run began, shape (n,)."""
-    rates = divergence_rate(measured, run.position)
+    rates = divergence_rate(measured.profile, measured.joint_model, run.position)
     return np.asarray(cumulative_trapezoid(rates, run.time, initial=0.0))
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.measured.failing import FORCE, window_rows
+from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import QuasiStaticComparison, static_force
-from joda.measured.reading import Measured
 from joda.measured.runs import Run
 from joda.measured.visited import Interval
 from joda.pictures.style import COLOURS, clean

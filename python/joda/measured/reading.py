@@ -1,7 +1,7 @@
-"""A joint of a model with what was measured of it, read from files and checked."""
+"""What was measured of a joint, read from files and checked against its model."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -9,29 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
-from joda.joints.joint_model import JointModel, joint_model, weighing
+from joda.joints.joint_model import joint_model
 from joda.measured import smoothing
 from joda.measured.corrections_file import sensing_of
 from joda.measured.data_checks import data_checks
 from joda.measured.driven import read_logs
+from joda.measured.measured_joint import Measured
 from joda.measured.misfit import missed
 from joda.measured.obstructed import Clear, clear_of_contacts
-from joda.measured.quasi_static import QuasiStaticComparison, gauged
+from joda.measured.quasi_static import gauged
 from joda.measured.replay import WINDOW, Replayer
 from joda.measured.runs import QuasiStatic, Run
-from joda.measured.sensing import Sensing
 from joda.measured.slow_runs import as_curve
-from joda.measured.trust import USUAL, Trust
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.angles import range_doubt
 from joda.scenes.besides import acting_besides
-from joda.scenes.contacts import Contact
 from joda.scenes.context import Context, context
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
-from joda.scenes.native import Row, own_friction_row, whole_profile
+from joda.scenes.native import own_friction_row, whole_profile
 from joda.scenes.scene import profiles_of
-from joda.template import Template, read_templates
 
 Array = NDArray[np.float64]
 
@@ -52,133 +49,6 @@ STEPS = 5_000_000
 """Most timesteps of a run that are simulated."""
 LEAST = 0.7
 """The same of a run, in units of the noise of all runs together: one encoder measured them all."""
-
-
-@dataclass(frozen=True)
-class Measured:
-    """A joint of a model with measured runs and quasi-static curves.
-
-    Attributes:
-        context: of the joint.
-        profile: all that acts on it (`joda.scenes.native`).
-        joint_model: all of the joint but its profile, as it is replayed.
-        own_row: of friction that is MuJoCo's own in the scene, whichever is replayed; None if none
-            is.
-        timestep: of the model, s.
-        replayer: of that profile.
-        runs: measured.
-        sigma: noise of each run's position, rad or m.
-        curves: measured, each beside the model's.
-        notes: what is suspicious about them.
-        contacts: of the scene that resist the joint where it was measured.
-        whole: whether all that acts on the joint there is replayed, and all of the runs.
-        barred: the note on where the scene would not have let the joint; empty if there is none.
-        trust: how far off its numbers, and those of the measurement, may be.
-        templates: of effects that may be missing, by name.
-        doubtful: numbers that have been set right, and the errors that are left of them.
-    """
-
-    context: Context
-    profile: Profile
-    joint_model: JointModel
-    own_row: Row | None
-    timestep: float
-    replayer: Replayer
-    runs: tuple[Run, ...]
-    sigma: tuple[float, ...]
-    curves: tuple[QuasiStaticComparison, ...]
-    notes: tuple[str, ...]
-    contacts: tuple[Contact, ...]
-    whole: bool
-    barred: str
-    trust: Trust = USUAL
-    templates: Mapping[str, Template] = field(default_factory=read_templates)
-    doubtful: Mapping[str, float] = field(default_factory=dict)
-
-    def trusting(self, trust: Trust) -> "Measured":
-        """The same joint and runs, whose numbers may be so far off."""
-        return replace(self, trust=trust)
-
-    def sensed(self, sensing: Sensing) -> "Measured":
-        """The same joint with runs as they would be if what is wrong with them were right."""
-        return replace(self, runs=tuple(map(sensing.of, self.runs)))
-
-    def changed(
-        self,
-        profile: Profile | None = None,
-        runs: Sequence[int] | None = None,
-        joint_model: JointModel | None = None,
-    ) -> "Measured":
-        """The same joint with another profile, another body, or with some of its runs only."""
-        numbers = range(len(self.runs)) if runs is None else runs
-        new = self.profile if profile is None else profile
-        own = joint_model or (self.joint_model if profile is None else self.joint_model.with_plugin)
-        found = self.context if joint_model is None else weighing(self.context, joint_model)
-        return replace(
-            self,
-            context=found,
-            profile=new,
-            joint_model=own,
-            replayer=self.replayer
-            if profile is None and joint_model is None
-            else Replayer(found, new, own, self.timestep),
-            runs=tuple(self.runs[k] for k in numbers),
-            sigma=tuple(self.sigma[k] for k in numbers),
-            curves=self.curves
-            if profile is None
-            else tuple(curve.against(new, found) for curve in self.curves),
-        )
-
-    @property
-    def floor(self) -> float:
-        """Noise of the runs' positions, rad or m; of the curves' forces where there are no runs."""
-        noises = self.sigma or tuple(curve.sigma for curve in self.curves)
-        return float(np.sqrt(np.mean(np.square(noises))))
-
-    @property
-    def unit(self) -> str:
-        """Of what a model misses: position, or force where there are only curves."""
-        joint = self.profile.joint
-        return joint.unit if self.runs else joint.force_unit
-
-    @property
-    def doubtful_unit(self) -> float:
-        """How many times the model's largest force that of a curve is, where that is so much or so
-        little that its unit is in doubt; else 0, and where there are runs, beside which curves are
-        not used."""
-        return next((c.doubtful for c in self.curves if c.doubtful and not self.runs), 0.0)
-
-    def load(self, run: Run) -> Array:
-        """What loads the joint at a run's samples, N·m or N, shape (n,): gravity and what is
-        applied, and with an actuator how far its force is beyond these: what its gear transmits."""
-        gravity = np.interp(run.position, self.context.positions, self.context.gravity_force)
-        return self.exerted(run) - run.force - gravity if self._driven(run) else run.force + gravity
-
-    def exerted(self, run: Run) -> Array:
-        """By the actuators on the joint, N·m or N, shape (n,)."""
-        servo = self.joint_model.servo
-        if servo is None or run.command is None:
-            return np.zeros(len(run.time))
-        at = run.time - servo.delay
-        command = run.command[np.maximum(np.searchsorted(run.time, at, side="right") - 1, 0)]
-        velocity = np.gradient(run.position, run.time)
-        return servo.force(command, run.position, velocity)
-
-    def _driven(self, run: Run) -> bool:
-        return self.joint_model.servo is not None and run.command is not None
-
-    def paths(self) -> list[Array]:
-        """Predicted positions of all runs, rad or m; NaN from where the force is not known."""
-        replayer, pairs = self.replayer, zip(self.runs, self.sigma, strict=True)
-        return [replayer.whole(run, replayer.start(run, sigma)) for run, sigma in pairs]
-
-    def with_runs(self, parts: Sequence[Run], of: Sequence[int]) -> "Measured":
-        """The same joint with parts of its runs, and of each the number of its run."""
-        return replace(self, runs=tuple(parts), sigma=tuple(self.sigma[k] for k in of))
-
-    def with_curves(self, curves: Sequence[QuasiStaticComparison]) -> "Measured":
-        """The same joint with some of its curves, or with parts of them."""
-        return replace(self, curves=tuple(curves))
 
 
 def checked(read: Sequence[Run | QuasiStatic], found: Context, timestep: float) -> list[str]:

@@ -11,15 +11,8 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.measured.driven import joints_in
-from joda.measured.runs import (
-    QuasiStatic,
-    Run,
-    evened,
-    held,
-    read_measurement,
-    read_signals,
-    read_together,
-)
+from joda.measured.run_files import read_measurement, read_signals, read_together
+from joda.measured.runs import QuasiStatic, Run, evened, held
 from joda.measured.table import header, read_table
 from joda.scenes.actuators import acting_on, actuators_on
 from joda.scenes.model import joint_name

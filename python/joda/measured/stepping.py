@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from joda.measured.measured_joint import Measured
 from joda.measured.misfit import missed, missed_whole, rms
-from joda.measured.reading import Measured
 from joda.measured.replay import Replayer
 
 FINER = 4

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.runs import known
 
 Interval = tuple[float, float]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.replay import Start
 from joda.measured.runs import Run, until_end
 from joda.measured.smoothing import resolution

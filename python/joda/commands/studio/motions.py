@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from joda.interaction.script import interaction, perform
 from joda.measured.errors import RunError, errors
-from joda.measured.reading import Measured, read_measured
+from joda.measured.measured_joint import Measured
+from joda.measured.reading import read_measured
 from joda.scenes.context import context
 from joda.scenes.model import find_joint, load_model
 from joda.scenes.motion import Motion

@@ -20,7 +20,7 @@ from joda.diagnosis.learning.law import Memory
 from joda.diagnosis.learning.nearest import Nearest, nearest
 from joda.diagnosis.outcome import draw_mended
 from joda.diagnosis.phrases import named
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.pictures.style import COLOURS, EFFECTS, house_style, note
 from joda.profile import Profile
 

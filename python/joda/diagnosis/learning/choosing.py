@@ -26,7 +26,7 @@ from joda.diagnosis.paired_test import worse
 from joda.diagnosis.plausible import Needs, implausible
 from joda.diagnosis.shape_refinement import Likelihood
 from joda.estimation.estimator import excess
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.threads import one_blas_thread
 
 LENGTHS = (0.12, 0.05, 0.025)

@@ -16,11 +16,12 @@ from joda.diagnosis.hypothesis_fits import usual
 from joda.diagnosis.learning.law import Law, Terms
 from joda.diagnosis.shape_refinement import LONGER, checked
 from joda.diagnosis.units import units_of
-from joda.estimation.base_model import BaseModel, as_it_is, base_of, segments_for, usable
+from joda.estimation.base_model import BaseModel, base_of
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator
 from joda.estimation.least_squares import Inequalities
+from joda.estimation.problem import as_it_is, segments_for
 from joda.estimation.unknowns import Unknowns
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 from joda.measured.runs import QuasiStatic, Run
 from joda.profile import Profile
 
@@ -122,7 +123,7 @@ class Learner:
         unknowns = self.unknowns(law)
         x = unknowns.mean if near is None else near
         for segments in self.segments:
-            estimator = SegmentEstimator(segments, usable(segments))
+            estimator = SegmentEstimator(segments, segments.usable)
             if estimator.counts.any():
                 fit = self._fit(estimator, law, unknowns, x)
                 x = fit.x

@@ -18,7 +18,7 @@ from joda.diagnosis.learning.ensemble import drawn, one_digit
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import Law
 from joda.diagnosis.learning.library import DRY, Term, of_position, of_speed
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 Array = NDArray[np.float64]
 Terms = tuple[Term, ...]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from joda.diagnosis.adding import error, starts
 from joda.diagnosis.baseline import fit_baseline
-from joda.measured.reading import Measured
+from joda.measured.measured_joint import Measured
 
 
 @dataclass(frozen=True)
