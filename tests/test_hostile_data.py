@@ -566,7 +566,7 @@ def test_a_million_samples_stay_within_the_memory_for_them(door, tmp_path):
     code = (
         "import re, sys, joda\n"
         "from joda.diagnosis.outcome import read_runs\n"
-        "from joda.estimation.base_model import segments_for\n"
+        "from joda.estimation.problem import segments_for\n"
         "scene, run = sys.argv[1:]\n"
         "if run[0] == '-': segments_for(read_runs(scene, 'door', [run[1:]]))\n"
         "else: joda.compare(scene, 'door', [run])\n"

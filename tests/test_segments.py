@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from joda.diagnosis.units import units_of
 from joda.estimation.base_model import base_of
 from joda.estimation.estimator import Fit, SegmentEstimator
-from joda.estimation.problem import joint_model_for, segments_for
+from joda.estimation.problem import joint_model_for, posed, segments_for
 from joda.estimation.segmentation import STEPS, _responses, _step, segments_of
 from joda.estimation.segments import GRID
 from joda.estimation.unknowns import EMPTY, NOTHING
@@ -353,9 +353,8 @@ def test_where_a_joint_stays_at_an_end_a_model_must_not_leave_it(
     (tmp_path / "model.xml").write_text(text)
     found = read_measured(tmp_path / "model.xml", "slide", [tmp_path / "run.csv"])
     segments = segments_for(found, 0.2)
-    estimator = SegmentEstimator(segments, segments.usable)
+    estimator, base = posed(found, segments)
     assert segments.rests.all() and estimator.samples == 0  # of noise it tells nothing
-    base = base_of(found.profile, joint_model_for(found, segments.h), segments.h)
     fit = estimator.begun(base.simulator, base.unknowns.mean)
     assert fit.loss == pytest.approx(0.0, abs=1e-9) or missed
     assert (fit.loss > 100) == missed

@@ -12,9 +12,7 @@ import numpy as np
 from hidden_cases import read
 
 from joda.estimation import segmentation
-from joda.estimation.base_model import base_of
-from joda.estimation.estimator import SegmentEstimator
-from joda.estimation.problem import joint_model_for, segments_for
+from joda.estimation.problem import posed, segments_for
 from joda.hidden import FAMILIES, draw
 from joda.measured.measured_joint import Measured
 
@@ -26,9 +24,7 @@ def left(measured: Measured, steps: int, accurate: bool) -> tuple[float, float]:
     """Loss per sample of the model, and seconds of a replay."""
     segmentation.STEPS = steps
     segments = segments_for(measured)
-    estimator = SegmentEstimator(segments, segments.usable)
-    alone = joint_model_for(measured, segments.h)
-    base = base_of(measured.profile, alone, segments.h, measured.trust, accurate)
+    estimator, base = posed(measured, segments, accurate)
     fit = estimator.fit(base.simulator, base.unknowns, base.unknowns.mean)
     fit = estimator.refit(base.simulator, base.unknowns, fit)
     simulator, begun = base.simulator(fit.x), time.process_time()

@@ -22,10 +22,10 @@ from joda.diagnosis.hypothesis_fits import (
 )
 from joda.diagnosis.impacts import Impacts, Rebound, best_ratio, ends_of, impacts_at
 from joda.diagnosis.units import units_of
-from joda.estimation.base_model import BaseModel, base_of
+from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import corrected_base
-from joda.estimation.problem import joint_model_for, segments_for
+from joda.estimation.problem import posed, segments_for
 from joda.estimation.segments import Segments
 from joda.joints.joint_model import JointModel
 from joda.measured.measured_joint import Measured
@@ -205,9 +205,7 @@ def _fitted(
     row: Row | None = None,
 ) -> _Fitted:
     """The model in steps that stand for none or in MuJoCo's, with a row of friction that yields."""
-    estimator = SegmentEstimator(segments, segments.usable)
-    joint_model = replace(joint_model_for(measured, segments.h), friction_row=row)
-    plain = base_of(measured.profile, joint_model, segments.h, measured.trust, accurate)
+    estimator, plain = posed(measured, segments, accurate, row)
     base = corrected_base(plain, measured.doubtful)
     as_it_is = base.unknowns.mean
     given = estimator.begun(base.simulator, as_it_is)

@@ -18,10 +18,9 @@ from joda.diagnosis.corrections import ANYTHING
 from joda.diagnosis.findings import Correction
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
-from joda.estimation.base_model import base_of
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of, with_numbers
-from joda.estimation.problem import joint_model_for, segments_for
+from joda.estimation.problem import posed, segments_for
 from joda.measured.instability import longest_followed
 from joda.measured.measured_joint import Measured
 
@@ -205,11 +204,8 @@ def as_recorded(
     """Runs as they were recorded in segments of a length (s), and a calibration's numbers there."""
     fitted = found.numbers.base
     segments = segments_for(measured, length, fine=fitted.accurate)
-    joint_model = replace(
-        joint_model_for(measured, segments.h), friction_row=fitted.joint_model.friction_row
-    )
-    base = base_of(measured.profile, joint_model, segments.h, measured.trust, fitted.accurate)
-    return SegmentEstimator(segments, segments.usable), replace(found.numbers, base=base)
+    estimator, base = posed(measured, segments, fitted.accurate, fitted.joint_model.friction_row)
+    return estimator, replace(found.numbers, base=base)
 
 
 def _calibrated(found: "_Search", beside: bool) -> Calibration | None:

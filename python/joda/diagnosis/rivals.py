@@ -3,7 +3,7 @@
 from functools import cache
 
 from joda.diagnosis.ranking import Ranking
-from joda.diagnosis.selection import LEFT, LITTLE, Selection
+from joda.diagnosis.selection import LEFT, LITTLE, SETTINGS, Selection
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
 from joda.template import read_templates
 
@@ -18,11 +18,12 @@ def indistinguishable(
 ) -> tuple[str, ...]:
     """Effects that the data cannot tell from a candidate."""
     own, left = selection.excess
+    untold = SETTINGS.telling / max(ranking.n_effective, 1.0)
     names = [candidate.hypothesis.effect for candidate in ranking.candidates]
     alike = {
         name
         for k, name in enumerate(names)
-        if abs(left[k] - left[number]) < ALIKE * (left[number] + LITTLE)
+        if abs(left[k] - left[number]) < max(ALIKE * (left[number] + LITTLE), untold)
         and left[k] < max(RIVAL * own, LEFT)
     }
     if one_way and (mine := _kind(names[number])):

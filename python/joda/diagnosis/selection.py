@@ -31,6 +31,8 @@ class Settings:
             where two are nearly as good, and neither leaves only noise, both only resemble what is
             missing.
         little: excess that is never worth a word.
+        telling: difference in loss below which two effects are as good as one another: of few
+            samples that is more than `little`.
         chance: so many standard deviations the noise may be more than it was taken for, or any
             amount less.
         hardly: probability of the first effect below which a small excess is nothing that an effect
@@ -55,6 +57,7 @@ class Settings:
     left: float = 0.12
     apart: float = 0.5
     little: float = 0.05
+    telling: float = 6.0
     chance: float = 2.0
     hardly: float = 0.1
     much: float = 0.5
@@ -175,8 +178,9 @@ def decide(
     unknown = strictness * max(min(part * own, beside), least)
     if wholly and found.noisy:  # then an unknown one is as likely as the first
         unknown = min(unknown, float(left[0]))
-    weights = (left + settings.little) ** -settings.sharpness
-    novelty_weight = (unknown + settings.little) ** -settings.sharpness
+    little = max(settings.little, settings.telling / found.n_effective)
+    weights = (left + little) ** -settings.sharpness
+    novelty_weight = (unknown + little) ** -settings.sharpness
     likely = weights / (weights.sum() + novelty_weight)
     doubtful = likely[0] < settings.hardly or found.restitution
     chance = max(settings.least_gain, settings.noticeable * found.samples)

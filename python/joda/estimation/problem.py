@@ -5,6 +5,8 @@ from functools import partial
 
 import numpy as np
 
+from joda.estimation.base_model import BaseModel, base_of
+from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.quasi_static import QuasiStaticJoint, curve_segments
 from joda.estimation.segmentation import BEYOND, segments_of
 from joda.estimation.segments import Segments
@@ -12,6 +14,7 @@ from joda.joints.divergence import divergence_rate
 from joda.joints.joint_model import JointModel
 from joda.measured.measured_joint import Measured
 from joda.scenes.limits import stiffness_of
+from joda.scenes.native import Row
 
 SOFT = (0.02, 1.0)
 """MuJoCo's own `solreflimit`: time constant (s) and damping ratio of the ends of a range."""
@@ -28,6 +31,23 @@ def segments_for(measured: Measured, length: float | None = None, fine: bool = T
     ends = float(np.sqrt(stiffness_of(measured.joint_model.solref, measured.timestep)))
     diverges = partial(divergence_rate, measured.profile, measured.joint_model)
     return segments_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine, diverges, ends)
+
+
+def posed(
+    measured: Measured, segments: Segments, accurate: bool = True, row: Row | None = None
+) -> tuple[SegmentEstimator, BaseModel]:
+    """What estimates by segments of a measured joint, and the model as it is, whose strengths are
+    the numbers.
+
+    Args:
+        measured: the joint.
+        segments: of its runs, see `segments_for`.
+        accurate: whether steps stand for none; else they are MuJoCo's.
+        row: of friction that yields as MuJoCo's own does; None: it holds.
+    """
+    joint_model = replace(joint_model_for(measured, segments.h), friction_row=row)
+    base = base_of(measured.profile, joint_model, segments.h, measured.trust, accurate)
+    return SegmentEstimator(segments, segments.usable), base
 
 
 def joint_model_for(measured: Measured, h: float) -> JointModel:
