@@ -40,6 +40,11 @@ SOON = 0.8
 SHOWN, GROWS = 6.0, 1.7
 """Displacement, in noises, that is one; and in the same time again a joint that began at rest goes
 more than so many times as far: at constant acceleration three times, at constant velocity once."""
+CUBIC, LONGER, SUITS = 8, 1.25, 3.0
+"""Fewest samples of the stretches through which a cubic is laid, by how much each is longer than
+the one before, and how much more than noise it may leave, in standard deviations of that."""
+MOVES = 4.0
+"""Standard errors of such a stretch's velocity that are one."""
 KEPT = 0.8
 """Part of the departures, the smaller ones, that tell the noise."""
 JUMP = 2.0
@@ -263,7 +268,24 @@ def begins_at_rest(time: Array, position: Array, sigma: float) -> bool:
     first, later = np.abs(found.velocity)
     zero = REST * found.velocity_error
     slow = first < zero[0] and (later < zero[1] or first < SOON * later)
-    return bool(slow and not _slows_down(position, sigma))
+    return bool(slow and not _slows_down(position, sigma) and not _moves(time, position, sigma))
+
+
+def _moves(time: Array, position: Array, sigma: float) -> bool:
+    """Whether the longest stretch from the first sample on that a cubic suits begins with a
+    velocity: it tells that much better than what is near the sample."""
+    count, slope, error = CUBIC, 0.0, np.inf
+    while count <= len(time):
+        t = time[:count] - time[0]
+        A = np.vander(t / t[-1], 4, increasing=True)
+        fit, squares = np.linalg.lstsq(A, position[:count], rcond=None)[:2]
+        free = count - 4
+        if float(squares.sum()) > sigma**2 * (free + SUITS * np.sqrt(2 * free)):
+            break
+        slope = float(fit[1])
+        error = sigma * float(np.sqrt(np.linalg.inv(A.T @ A)[1, 1]))
+        count = int(np.ceil(LONGER * count))
+    return abs(slope) > MOVES * error
 
 
 def _slows_down(position: Array, sigma: float) -> bool:
