@@ -15,7 +15,7 @@ from joda.measured.runs import Run, until_end
 def test_a_run_counts_up_to_where_the_joint_comes_to_an_end():
     position = np.array([0.0, 0.001, 0.2, 0.9, 0.999, 0.7, 0.5])
     run = Run("a.csv", np.arange(7.0), position, None, np.zeros(7), False)
-    assert len(until_end(run, (0.0, 1.0), 3e-3).time) == 4
+    assert list(until_end(run, (0.0, 1.0), 3e-3).time) == [1.0, 2.0, 3.0]  # it leaves an end
     assert len(until_end(run, (0.0, 1.0), 3e-5).time) == 7
     assert len(until_end(run, (0.0, 1.0), 3.0).time) == 7
 
@@ -24,7 +24,8 @@ def test_a_run_that_begins_pressed_into_an_end_counts_from_where_that_lets_go():
     position = np.array([-0.05, -0.02, 0.001, 0.2, 0.9, 0.999, 0.7])
     run = Run("a.csv", np.arange(7.0), position, None, np.zeros(7), False)
     assert list(until_end(run, (0.0, 1.0), 3e-3).time) == [2.0, 3.0, 4.0]
-    assert until_end(run, (0.0, 1.0), 0.1).time[0] == 0.0
+    assert list(until_end(run, (0.0, 1.0), 0.1).time) == [2.0, 3.0]
+    assert list(until_end(run, (0.0, 1.0), 0.5).time) == list(run.time)
     pressed = run.part(slice(0, 2))
     assert until_end(pressed, (0.0, 1.0), 3e-3).time.tolist() == [0.0, 1.0]
 

@@ -150,8 +150,8 @@ def held(time: Array, values: Array, edges: Array) -> Array:
 def until_end(run: Run, span: tuple[float, float], clear: float) -> Run:
     """A run up to where the joint comes to an end of its range from elsewhere.
 
-    What a pressed end does to the joint is not known: where it begins beyond its range, from where
-    it comes back.
+    What a pressed end does to the joint is not known: where it begins at one, from where it leaves
+    that.
 
     Args:
         run: which may begin at an end.
@@ -159,8 +159,9 @@ def until_end(run: Run, span: tuple[float, float], clear: float) -> Run:
         clear: how far off an end the joint must be, rad or m, not to be at it.
     """
     inside = np.minimum(run.position - span[0], span[1] - run.position)
-    begin = int(np.argmax(inside >= 0)) if inside[0] < -clear else 0
-    away = inside[begin:] > clear
-    left = int(np.argmax(away)) if away.any() else len(away)
+    away = inside > clear
+    if not away.any():
+        return run
+    left = int(np.argmax(away))
     back = np.flatnonzero(~away[left:])
-    return run.part(slice(begin, begin + left + int(back[0]) if len(back) else None))
+    return run.part(slice(max(left - 1, 0), left + int(back[0]) if len(back) else None))
