@@ -287,7 +287,10 @@ def _concluded(
     if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
         # nor do segments held out know of anything
         return _adequate(measured, first_ranking, looks.free, others)
-    verdict = selection.verdict if helps(first, measured.floor) else "unexplained"
+    helped = helps(first, measured.floor)
+    if not helped and all(look.model < MUCH for look in looks.evidence):
+        return _adequate(measured, ranking, looks.free, others)
+    verdict = selection.verdict if helped else "unexplained"
     base, candidate = ranking.baseline.base, ranking.candidates[sized[0]]
     doubt = one_factor(base, candidate) or other_unit(measured)
     summary = summarised(first, selection, measured.floor, one_way, ranking.restitution, doubt)
