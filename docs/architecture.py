@@ -40,6 +40,7 @@ def longest(top: str, down_to: str) -> tuple[str, ...]:
     return _longest({name: rooms[name] & above for name in above}, top)
 
 
+@cache
 def _rooms() -> Graph:
     """The modules of `WAY` by their package and name."""
     modules = {path: path.stem for name in WAY for path in (PACKAGE / name).rglob("*.py")}

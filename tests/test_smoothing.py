@@ -179,6 +179,18 @@ def test_what_is_let_go_or_flicked_later_begins_at_rest(before):
         assert begins_at_rest(FLICKED, pressed(np.minimum(after / 0.02, 1.0)), 1.3e-3)
 
 
+def test_a_lid_that_falls_begins_at_rest_or_moves_as_its_whole_fall_tells():
+    """Near its first sample alone a velocity of 0.5 rad/s is within four standard errors."""
+    time, rng = np.arange(0, 0.16, 0.005), np.random.default_rng(0)
+
+    def at_rest(speed):
+        path = 1.0 + speed * time - 9.7 * time**2 + 1.7e-3 * rng.standard_normal(len(time))
+        return begins_at_rest(time, path, 1.7e-3)
+
+    assert sum(at_rest(0.0) for _ in range(100)) > 85
+    assert not any(at_rest(-0.5) for _ in range(100))
+
+
 def test_two_outliers_are_no_pace():
     path = pressed(0 * FLICKED)
     path[[60, 130]] += 1.0

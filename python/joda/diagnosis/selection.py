@@ -1,4 +1,4 @@
-"""From a ranking to a verdict: is anything missing, how likely is each effect, is one enough.
+"""From what fits leave to a verdict: is anything missing, how likely is each effect, is one enough.
 
 What the fits leave is the `Evidence`, every number that decides on it is one of the `Settings`, and
 `decide` is a function of these two alone.

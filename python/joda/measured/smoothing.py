@@ -274,18 +274,18 @@ def begins_at_rest(time: Array, position: Array, sigma: float) -> bool:
 def _moves(time: Array, position: Array, sigma: float) -> bool:
     """Whether the longest stretch from the first sample on that a cubic suits begins with a
     velocity: it tells that much better than what is near the sample."""
-    count, slope, error = CUBIC, 0.0, np.inf
-    while count <= len(time):
-        t = time[:count] - time[0]
-        A = np.vander(t / t[-1], 4, increasing=True)
-        fit, squares = np.linalg.lstsq(A, position[:count], rcond=None)[:2]
+    t, longest, count = time - time[0], 0, CUBIC
+    while count <= len(t):
+        A = np.vander(t[:count] / t[count - 1], 4, increasing=True)
+        squares = np.linalg.lstsq(A, position[:count], rcond=None)[1].sum()
         free = count - 4
-        if float(squares.sum()) > sigma**2 * (free + SUITS * np.sqrt(2 * free)):
+        if squares > sigma**2 * (free + SUITS * np.sqrt(2 * free)):
             break
-        slope = float(fit[1])
-        error = sigma * float(np.sqrt(np.linalg.inv(A.T @ A)[1, 1]))
-        count = int(np.ceil(LONGER * count))
-    return abs(slope) > MOVES * error
+        longest, count = count, int(np.ceil(LONGER * count))
+    if not longest:
+        return False
+    _, slope, _, error = _polynomial(t[:longest], position[:longest], sigma, 3)
+    return bool(abs(slope) > MOVES * error)
 
 
 def _slows_down(position: Array, sigma: float) -> bool:
