@@ -65,6 +65,10 @@ JointSimulator::JointSimulator(const Body& body, const Servo& servo,
     throw std::invalid_argument("a servo's limits must be two increasing numbers");
   }
   if (!(servo_.delay >= 0)) throw std::invalid_argument("a servo's delay must not be negative");
+  if (body_.hinge) {
+    heaviest_ = std::hypot(body_.weight[0], body_.weight[1]);
+    heaviest_at_ = std::atan2(body_.weight[1], body_.weight[0]);
+  }
   if (profile_.effects) body_.inertia += profile_.effects->added_inertia;
   if (!(body_.inertia > 0)) throw std::invalid_argument("the inertia must be positive");
   if (!(body_.row_inertia > 0)) body_.row_inertia = body_.inertia;
@@ -237,9 +241,8 @@ void JointSimulator::Replay(double h, const double* force, const double* command
 }
 
 double JointSimulator::Weight(double q) const {
-  const auto [first, second] = body_.weight;
-  if (!body_.hinge || (first == 0 && second == 0)) return first;
-  return first * std::cos(q) + second * std::sin(q);
+  if (!body_.hinge) return body_.weight[0];
+  return heaviest_ == 0 ? 0 : heaviest_ * std::cos(q - heaviest_at_);
 }
 
 double JointSimulator::Actuate(double command, double q, double v) const {

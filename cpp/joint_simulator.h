@@ -94,6 +94,8 @@ class JointSimulator {
   double Impedance(double depth) const;
 
   Body body_;
+  // Of a hinge's weight: its largest torque, and the position of that.
+  double heaviest_ = 0, heaviest_at_ = 0;
   Servo servo_;
   Profile profile_;
   Scheme scheme_;

@@ -217,7 +217,7 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
         return None
     names, best = every.names, whole
     while names:
-        tried = [tuple(one for one in names if one != name) for name in names]
+        tried = [tuple(one for one in names if one != name) for name in _spared(names, best)]
         fits = [found.near(fewer, (names, best)) for fewer in tried]
         fit, fewer = min(zip(fits, tried, strict=True), key=lambda pair: pair[0].loss)
         if fit.loss - best.loss > NEXT:
@@ -238,6 +238,15 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
         rest = tuple(name for name in every.names if name not in far)
         return _calibrated(replace(found, every=every.only(rest)), beside) if rest else None
     return _concluded(found, names, best, whole)
+
+
+def _spared(names: tuple[NuisanceName, ...], fit: Fit) -> list[NuisanceName]:
+    """Of a fit's numbers, those without which it is worse by least, as far as it is linear."""
+    if fit.information is None:
+        return list(names)
+    k = len(names)
+    needed = fit.x[-k:] ** 2 / np.diag(np.linalg.pinv(fit.information, hermitian=True))[-k:]
+    return [name for name, loss in zip(names, needed, strict=True) if loss < 2 * needed.min() + 4 * NEXT]
 
 
 @dataclass(frozen=True)

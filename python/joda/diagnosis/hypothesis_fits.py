@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +39,8 @@ SEARCHED, SETTLING = 15, 4
 """Models that it tries for each number, and iterations that fit the starts of one."""
 FEW = 4
 """Iterations after that."""
-ROUGH = 6
-"""Iterations in which segments that are far off count in full."""
+ROUGH = 3
+"""Iterations in which segments that are far off count in full; as many again of the best trials."""
 BEST = 3
 """How many trials of a hypothesis with many are fitted."""
 APART = 0.06
@@ -62,9 +63,10 @@ MANY = 4000
 def joined(base: BaseModel, hypothesis: Hypothesis) -> tuple[Make, Unknowns]:
     """The model's factors and the hypothesis' numbers as one vector."""
     n = base.count
+    written = lru_cache(maxsize=1)(lambda own: base.written(np.array(own)))
 
     def make(x: Array) -> JointSimulator:
-        return base.with_profile(hypothesis.write(base.written(x), x[n:]), x)
+        return base.with_profile(hypothesis.write(written(tuple(x[:n])), x[n:]), x)
 
     return make, base.unknowns.and_(hypothesis.unknowns)
 
@@ -196,12 +198,13 @@ def coarse(
 
     def best(point: InitialPoint, trials: Sequence[Array], kept: int) -> list[Fit]:
         starts = (np.concatenate([point.fit.x, x]) for x in trials)
-        about = point.fit.start, ROUGH, point.cauchy_scale
-        fits = [estimator.fit(make, unknowns, x, *about) for x in starts]
-        near = [
+        wide = point.cauchy_scale
+        fits = [estimator.fit(make, unknowns, x, point.fit.start, ROUGH, wide) for x in starts]
+        ahead = sorted(fits, key=lambda fit: fit.loss)[:kept]
+        fits = [estimator.fit(make, unknowns, fit.x, fit.start, ROUGH, wide) for fit in ahead]
+        return [
             replace(fit, loss=estimator.loss(fit.squares) + unknowns.penalty(fit.x)) for fit in fits
         ]
-        return sorted(near, key=lambda f: f.loss)[:kept]
 
     found = [
         fit

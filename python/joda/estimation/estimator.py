@@ -32,6 +32,8 @@ BACKTRACKS = 6
 """Step lengths that an iteration tries, each shorter than the last."""
 LOSS_TOLERANCE = 0.5
 """Decrease of the loss below which a fit has converged."""
+STARTED = 0.05
+"""Decrease of the squares that is still to be expected, below which starts are fitted."""
 STATE_STEP = 0.01
 """Finite-difference step, in prior standard deviations of the initial state."""
 ROWS = ((0, 1), (0, 1))
@@ -84,8 +86,14 @@ class Linearization:
     @cached_property
     def inverse(self) -> Array:
         """Of the starts' own normal matrices, shape (m, d, d)."""
-        A = np.einsum("mni,mnj->mij", self.S, self.S) + np.eye(self.S.shape[2])
-        return np.asarray(np.linalg.inv(A))
+        return np.asarray(np.linalg.inv(self.start_normal[0]))
+
+    @property
+    def start_normal(self) -> tuple[Array, Array]:
+        """The normal equations of each segment's start: shapes (m, d, d) and (m, d)."""
+        across = self.S.transpose(0, 2, 1)
+        gradient = (across @ self.r[:, :, None])[:, :, 0] + self.z
+        return across @ self.S + np.eye(self.S.shape[2]), gradient
 
     def products(self, a: Array, b: Array, za: Array | None = None) -> Array:
         """Weighted inner products of what of a and b no start can take up.
@@ -119,8 +127,8 @@ class Linearization:
 
     def follow(self, move: Array) -> Array:
         """How the starts move, in doubts, when the numbers do; shape (m, d)."""
-        g = np.einsum("mni,mn->mi", self.S, self.r + self.J @ move) + self.z
-        return np.asarray(-np.einsum("mij,mj->mi", self.inverse, g))
+        g = self.S.transpose(0, 2, 1) @ (self.r + self.J @ move)[:, :, None] + self.z[:, :, None]
+        return np.asarray(-(self.inverse @ g)[:, :, 0])
 
 
 @dataclass(frozen=True)
@@ -269,10 +277,12 @@ class SegmentEstimator:
         damping, unit = np.full(len(start), 1e-3), np.eye(start.shape[1])
         for _ in range(iterations):
             about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
-            A = np.einsum("mni,mnj->mij", about.S, about.S) + unit
+            A, g = about.start_normal
             A = A * (1 + damping[:, None, None] * unit)
-            g = np.einsum("mni,mn->mi", about.S, about.r) + about.z
-            moved = start - segments.prior_std * np.linalg.solve(A, g[:, :, None])[:, :, 0]
+            step = np.linalg.solve(A, g[:, :, None])[:, :, 0]
+            if (step * g).sum() < STARTED:
+                break
+            moved = start - segments.prior_std * step
             trial = self.squares(simulator, moved)[1]
             better = trial < squares
             start = np.where(better[:, None], moved, start)

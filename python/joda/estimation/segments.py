@@ -100,7 +100,7 @@ class Segments:
         """Whether a hand or an actuator moved the joint."""
         return self.command is not None or bool(self.force.any())
 
-    @property
+    @cached_property
     def count(self) -> Integers:
         """Samples of each segment, shape (m,)."""
         return np.asarray((self.rows >= 0).sum(axis=1))
@@ -198,7 +198,10 @@ class Segments:
         Returns:
             shape (m, most samples) or (m, most samples, k).
         """
-        return np.nan_to_num(np.clip(self.selection(misfit), -HUGE, HUGE), nan=HUGE)
+        found = self.selection(misfit)
+        np.clip(found, -HUGE, HUGE, out=found)
+        np.copyto(found, HUGE, where=np.isnan(found))
+        return found
 
     def selection(self, misfit: Array) -> Array:
         """The same, however large: of misfits, or of their derivatives."""
