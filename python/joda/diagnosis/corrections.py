@@ -1,16 +1,18 @@
 """The model's own numbers that the measurements contradict, apart from missing effects."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from joda._core import JointSimulator
 from joda.component import Component
 from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.findings import Correction, Parameter
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.estimation.base_model import BaseModel, shared_damping
+from joda.estimation.unknowns import Unknowns
 from joda.profile import Joint, Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.native import DAMPING, FRICTION, SPRING
@@ -25,6 +27,8 @@ ANYTHING = 10.0
 """How far off a number may be of which the data tell nothing, in its own unit."""
 GAIN, DRAG, DELAY = "gain of the actuator", "damping of joint and actuator", "delay of commands"
 """What the numbers of an actuator are called."""
+STEP = 1e-3
+"""Finite-difference step of a force, of how large it may be."""
 ALIKE = 0.12
 """By how much factors may differ that are one."""
 
@@ -124,6 +128,44 @@ def numbers(
         for k, (place, part, factor, error) in enumerate(told)
     ]
     return (*out, *(_of_actuator(base, servo, x[n:], errors[n:]) if servo else ()))
+
+
+def sure_beside_a_force(
+    baseline: Baseline,
+    own: Sequence[Number],
+    force: float,
+    least: float,
+    found: tuple[Array, Array] | None,
+) -> tuple[Number, ...] | None:
+    """The numbers with the errors that they have where a force over position may be missing too, a
+    line and a bump; None where one that is off is not so for sure then.
+
+    Args:
+        baseline: the model fitted alone.
+        own: `numbers` of it.
+        force: usual, N·m or N.
+        least: part by which a number must be off.
+        found: as of `numbers`.
+    """
+    base, fit, n = baseline.base, baseline.fit, baseline.base.count
+    most = np.full(3, ANYTHING * force)
+    free = Unknowns(-most, most, STEP * most, np.zeros(3), most)
+
+    def make(x: Array) -> JointSimulator:
+        low, high, between = map(float, x[n:])
+        line = Component(interval=(0.0, 1.0), x=(0.0, 1.0), y=(low, high))
+        bump = Component(interval=(0.0, 1.0), x=(0.0, 0.5, 1.0), y=(0.0, between, 0.0))
+        profile = base.written(x).with_component("conservative", line)
+        return base.with_profile(profile.with_component("conservative", bump), x)
+
+    both = replace(fit, x=np.append(fit.x, np.zeros(3)))
+    prior_std = np.append(np.full(n, ANYTHING), most)
+    spread = baseline.estimator.covariance(make, base.unknowns.and_(free), both, prior_std)
+    unsure = np.sqrt(np.diag(spread))[:n]
+    x, errors = found or (fit.x, unsure)
+    surely = numbers(baseline, found=(x, np.maximum(unsure, errors)))
+    tells = (sure.off(least) for one, sure in zip(own, surely, strict=True) if one.off(least))
+    return surely if all(tells) else None
 
 
 def _of_actuator(base: BaseModel, servo: Servo, x: Array, errors: Array) -> list[Number]:

@@ -1,11 +1,12 @@
 """What of the measurements is fitted, and what is held out of every fit.
 
-Of four or more runs in which the joint moves, every fourth. Of fewer, each is cut into blocks, and
-of those in which the joint moves every fourth is held out: blocked cross-validation (Roberts et
-al., Ecography 40 (2017) 913), with blocks all over the motion, as one that rests says little of a
-law. Each block is replayed from a start of its own, estimated from its own samples, so that
-nothing that was fitted is in it. Of curves, where there are no runs, every fourth, or of few
-curves every fourth stretch of each.
+Of four or more runs in which the joint moves, every fourth, counted from the last: of five or more
+not one alone, which may know nothing of what is missing. Of fewer, each is cut into blocks, and of
+those in which the joint moves every fourth is held out: blocked cross-validation (Roberts et al.,
+Ecography 40 (2017) 913), with blocks all over the motion, as one that rests says little of a law.
+Each block is replayed from a start of its own, estimated from its own samples, so that nothing that
+was fitted is in it. Of curves, where there are no runs, every fourth, or of few curves every fourth
+stretch of each.
 """
 
 from dataclasses import dataclass, replace
@@ -68,7 +69,7 @@ def held_blocks(measured: Measured, length: float | None = None) -> list[Block]:
     runs = [Block(k, slice(0, len(run.time))) for k, run in enumerate(measured.runs)]
     moving = [block for block in runs if _moves(measured, block)]
     if len(moving) >= FEWEST:
-        return moving[3::4]
+        return moving[(len(moving) - 1) % 4 :: 4]
     length = length or segments_for(measured).length
     for factor in LENGTHS:
         blocks = [

@@ -19,6 +19,7 @@ from joda.diagnosis.corrections import (
     off_beside,
     off_without,
     one_factor,
+    sure_beside_a_force,
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
 from joda.diagnosis.experiments import Model, means_of, next_experiment, there_and_back
@@ -36,6 +37,7 @@ from joda.diagnosis.search import Progress
 from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection
 from joda.diagnosis.summary import BOUNCY, FALLEN, SAME, far_off, helps, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
+from joda.diagnosis.units import units_of
 from joda.estimation.base_model import BaseModel
 from joda.estimation.nuisance import nuisances_of
 from joda.estimation.problem import segments_for
@@ -352,10 +354,14 @@ def _adequate(
     if denying and not numbers_off:
         return unexplained(TOGETHER, AGAIN)
     if numbers_off and moved_one_way(measured):
-        experiment = _next(measured, ranking, weigh(ranking), one_way=True)
-        summary = EITHER.format(numbers_off) + SAME + "."
-        summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
-        return unexplained(summary, experiment)
+        usual = units_of(ranking.baseline.estimator.segments, measured).force
+        sure = sure_beside_a_force(ranking.baseline, own, usual, least, told_by)
+        if sure is None:
+            experiment = _next(measured, ranking, weigh(ranking), one_way=True)
+            summary = EITHER.format(numbers_off) + SAME + "."
+            summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
+            return unexplained(summary, experiment)
+        own, numbers_off = sure, off(sure, least)
     if numbers_off:
         numbers_off = f" Its own numbers are off: {numbers_off}.{by_one_factor(own)}"
     missed = worst_run.multiple if worst_run else 0.0
