@@ -14,7 +14,8 @@ from joda import JodaError, add, compare, diagnose
 from joda.commands.hidden_effect import _judged
 from joda.diagnosis import verdict
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.corrections import numbers, off
+from joda.diagnosis.corrections import OFF, numbers, off, sure_beside_a_force
+from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.selection import Selection
@@ -24,6 +25,7 @@ from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
 from joda.measured.reading import read_measured
 from joda.measured.run_files import read_run, write_run
+from joda.measured.runs import Run
 from joda.profile import Joint
 
 DETENT = Finding(
@@ -232,6 +234,40 @@ def test_one_way_friction_and_a_force_are_both_named_if_neither_is_sure(extra, t
     assert told.summary.startswith("Either the model's own numbers are off (native friction")
     assert "or a force is missing: the joint was moved in one direction only" in told.summary
     assert told.next_experiment == "Measure the way back too, as slowly."
+
+
+SLIDING = """<mujoco>
+  <option timestep="0.002" gravity="0 0 -10"/>
+  <worldbody>
+    <body>
+      <joint name="lift" type="slide" axis="0 0 1" range="-1 1" limited="true" frictionloss="2"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+    </body>
+  </worldbody>
+</mujoco>"""
+
+
+@pytest.mark.parametrize(("speed", "tells"), [(0.0, False), (0.7, True)])
+def test_a_little_of_the_way_back_tells_friction_from_a_force(speed, tells, tmp_path, rng):
+    """A mass falls 1.7 m, let go or thrown up by 2 cm before: its friction is 3 N, not 2 N."""
+    files = [tmp_path / f"run{k}.csv" for k in range(3)]
+    for file in files:
+        up, turns = 10 + 3, speed / (10 + 3)
+        time = np.arange(0, 0.66, 0.002)
+        after = np.maximum(time - turns, 0)
+        before = np.minimum(time, turns)
+        path = 0.9 + speed * before - up * before**2 / 2 - (10 - 3) * after**2 / 2
+        noisy = path + 1e-4 * rng.standard_normal(len(time))
+        write_run(file, Run(file.name, time, noisy, None, 0 * time, False))
+    measured = read_measured(write_scene(tmp_path, SLIDING, "m.xml"), "lift", files)
+    assert moved_one_way(measured)
+    baseline = fit_baseline(measured)
+    own = numbers(baseline)
+    assert off(own).startswith("native friction × 1.5")
+    sure = sure_beside_a_force(baseline, own, 10.0, OFF, None)
+    assert (sure is not None) == tells
+    if sure:
+        assert own[0].error < sure[0].error < 0.3
 
 
 @pytest.mark.slow
