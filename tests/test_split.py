@@ -35,7 +35,9 @@ def test_of_few_runs_some_of_the_motion_is_held_out(tmp_path, rng, count):
     assert held_out(measured, held).endswith("s in which the joint moves")
 
 
-@pytest.mark.parametrize(("count", "judges"), [(4, "3"), (5, "04"), (6, "15"), (7, "26"), (8, "37")])
+@pytest.mark.parametrize(
+    ("count", "judges"), [(4, "3"), (5, "04"), (6, "15"), (7, "26"), (8, "37")]
+)
 def test_every_fourth_run_in_which_the_joint_moves_is_held_out(tmp_path, rng, count, judges):
     """Counted from the last: of five or more never one alone."""
     measured = thrown(tmp_path, rng, count, drag=0.02)

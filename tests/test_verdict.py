@@ -14,7 +14,7 @@ from joda import JodaError, add, compare, diagnose
 from joda.commands.hidden_effect import _judged
 from joda.diagnosis import verdict
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.corrections import OFF, numbers, off, sure_beside_a_force
+from joda.diagnosis.corrections import errors_beside_a_force, numbers, off
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import explained
@@ -262,12 +262,13 @@ def test_a_little_of_the_way_back_tells_friction_from_a_force(speed, tells, tmp_
     measured = read_measured(write_scene(tmp_path, SLIDING, "m.xml"), "lift", files)
     assert moved_one_way(measured)
     baseline = fit_baseline(measured)
-    own = numbers(baseline)
-    assert off(own).startswith("native friction × 1.5")
-    sure = sure_beside_a_force(baseline, own, 10.0, OFF, None)
-    assert (sure is not None) == tells
-    if sure:
-        assert own[0].error < sure[0].error < 0.3
+    estimator, base, fit = baseline.estimator, baseline.base, baseline.fit
+    assert off(numbers(baseline)).startswith("native friction \N{MULTIPLICATION SIGN} 1.5")
+    error = errors_beside_a_force(estimator, base, fit, 10.0)
+    assert (error[0] < 0.15) == tells and error[0] > np.sqrt(baseline.covariance[0, 0])
+    told = diagnosed(measured).diagnosis
+    assert (told.verdict == "adequate") == tells, told
+    assert ("in one direction only" in told.summary) != tells
 
 
 @pytest.mark.slow

@@ -246,7 +246,9 @@ def _spared(names: tuple[NuisanceName, ...], fit: Fit) -> list[NuisanceName]:
         return list(names)
     k = len(names)
     needed = fit.x[-k:] ** 2 / np.diag(np.linalg.pinv(fit.information, hermitian=True))[-k:]
-    return [name for name, loss in zip(names, needed, strict=True) if loss < 2 * needed.min() + 4 * NEXT]
+    return [
+        name for name, loss in zip(names, needed, strict=True) if loss < 2 * needed.min() + 4 * NEXT
+    ]
 
 
 @dataclass(frozen=True)

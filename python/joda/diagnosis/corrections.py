@@ -12,6 +12,7 @@ from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.findings import Correction, Parameter
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.estimation.base_model import BaseModel, shared_damping
+from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Joint, Profile
 from joda.scenes.actuators import Servo
@@ -130,25 +131,17 @@ def numbers(
     return (*out, *(_of_actuator(base, servo, x[n:], errors[n:]) if servo else ()))
 
 
-def sure_beside_a_force(
-    baseline: Baseline,
-    own: Sequence[Number],
-    force: float,
-    least: float,
-    found: tuple[Array, Array] | None,
-) -> tuple[Number, ...] | None:
-    """The numbers with the errors that they have where a force over position may be missing too, a
-    line and a bump; None where one that is off is not so for sure then.
+def errors_beside_a_force(
+    estimator: SegmentEstimator, base: BaseModel, fit: Fit, force: float
+) -> Array:
+    """Standard errors of a model's numbers by the data alone where a force over position may be
+    missing too, a line and a bump; shape (k,).
 
     Args:
-        baseline: the model fitted alone.
-        own: `numbers` of it.
+        estimator, base, fit: the model, and how it was fitted.
         force: usual, N·m or N.
-        least: part by which a number must be off.
-        found: as of `numbers`.
     """
-    base, fit, n = baseline.base, baseline.fit, baseline.base.count
-    most = np.full(3, ANYTHING * force)
+    n, most = base.count, np.full(3, ANYTHING * force)
     free = Unknowns(-most, most, STEP * most, np.zeros(3), most)
 
     def make(x: Array) -> JointSimulator:
@@ -160,12 +153,8 @@ def sure_beside_a_force(
 
     both = replace(fit, x=np.append(fit.x, np.zeros(3)))
     prior_std = np.append(np.full(n, ANYTHING), most)
-    spread = baseline.estimator.covariance(make, base.unknowns.and_(free), both, prior_std)
-    unsure = np.sqrt(np.diag(spread))[:n]
-    x, errors = found or (fit.x, unsure)
-    surely = numbers(baseline, found=(x, np.maximum(unsure, errors)))
-    tells = (sure.off(least) for one, sure in zip(own, surely, strict=True) if one.off(least))
-    return surely if all(tells) else None
+    found = estimator.covariance(make, base.unknowns.and_(free), both, prior_std)
+    return np.asarray(np.sqrt(np.diag(found))[:n])
 
 
 def _of_actuator(base: BaseModel, servo: Servo, x: Array, errors: Array) -> list[Number]:

@@ -15,8 +15,8 @@ FAR, PART = 10.0, 0.1
 they are missed by without it."""
 STILL = " With it windows held out of the fit are still missed by {:.0f} times the noise."
 SAME = (
-    ": the joint was moved in one direction only, or nearly so, where a resistance and a force over "
-    "position are the same"
+    ": the joint was moved in one direction only, or nearly so, where a resistance and a force "
+    "over position are the same"
 )
 BOUNCY = "The ends of the range throw the joint back more than the model's: not explained."
 BLIND = (

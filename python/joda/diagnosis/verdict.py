@@ -4,6 +4,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.calibration import Calibration, Calibrator
@@ -14,12 +15,12 @@ from joda.diagnosis.corrections import (
     by_one_factor,
     corrected,
     corrections,
+    errors_beside_a_force,
     numbers,
     off,
     off_beside,
     off_without,
     one_factor,
-    sure_beside_a_force,
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
 from joda.diagnosis.experiments import Model, means_of, next_experiment, there_and_back
@@ -340,28 +341,31 @@ def _adequate(
     def unexplained(summary: str, experiment: str | None) -> Diagnosed:
         return Diagnosed(_report(measured, "unexplained", summary, (), experiment))
 
-    if not measured.runs and _uneven(measured, ranking.baseline):
+    baseline = ranking.baseline
+    if not measured.runs and _uneven(measured, baseline):
         return unexplained(_report_uneven(measured), GAUGE_AGAIN)
-    left = worst(measured, ranking.baseline, others)
+    left = worst(measured, baseline, others)
     if left.free > BEYOND:
         return unexplained(DRIFTING.format(left.free), AGAIN)
     if free and free.drifting:
         return unexplained(SLOWLY, AGAIN)
     denying = free if free and free.denied else None
     told_by, least = ((denying.numbers, denying.errors), 0.0) if denying else (None, OFF)
-    own, worst_run = numbers(ranking.baseline, found=told_by), worst_missed(measured)
+    own, worst_run = numbers(baseline, found=told_by), worst_missed(measured)
     numbers_off = off(own, least)
     if denying and not numbers_off:
         return unexplained(TOGETHER, AGAIN)
     if numbers_off and moved_one_way(measured):
-        usual = units_of(ranking.baseline.estimator.segments, measured).force
-        sure = sure_beside_a_force(ranking.baseline, own, usual, least, told_by)
-        if sure is None:
+        x, errors = told_by or (baseline.fit.x, np.zeros(len(baseline.fit.x)))
+        unsure = denying.beside_a_force if denying else _beside_a_force(measured, baseline)
+        surely = numbers(baseline, found=(x, np.maximum(unsure, errors)))
+        pairs = zip(own, surely, strict=True)
+        if not all(sure.off(least) for one, sure in pairs if one.off(least)):
             experiment = _next(measured, ranking, weigh(ranking), one_way=True)
             summary = EITHER.format(numbers_off) + SAME + "."
             summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
             return unexplained(summary, experiment)
-        own, numbers_off = sure, off(sure, least)
+        own, numbers_off = surely, off(surely, least)
     if numbers_off:
         numbers_off = f" Its own numbers are off: {numbers_off}.{by_one_factor(own)}"
     missed = worst_run.multiple if worst_run else 0.0
@@ -381,11 +385,18 @@ def _adequate(
         summary += f" But {doubt}."
     report = _report(measured, "adequate", summary, (), None)
     report = replace(report, corrections=corrections(own, measured.profile.joint, least))
-    driven = ranking.baseline.base.joint_model.servo is not None
+    driven = baseline.base.joint_model.servo is not None
     if doubt or (by_one_factor(own) and not driven):
         return Diagnosed(report)
-    x = denying.numbers if denying else ranking.baseline.fit.x
-    return Diagnosed(report, corrected=corrected(ranking.baseline, own, least, x))
+    x = denying.numbers if denying else baseline.fit.x
+    return Diagnosed(report, corrected=corrected(baseline, own, least, x))
+
+
+def _beside_a_force(measured: Measured, baseline: Baseline) -> NDArray[np.float64]:
+    """Errors of the model's numbers where a force may be missing too, by its segments."""
+    estimator = baseline.estimator
+    usual = units_of(estimator.segments, measured).force
+    return errors_beside_a_force(estimator, baseline.base, baseline.fit, usual)
 
 
 def _report_uneven(measured: Measured) -> str:
