@@ -30,6 +30,9 @@ WORTH = 40.0
 """Gain in loss, less the price of its numbers, from which numbers are worth a word."""
 NEXT = 25.0
 """Loss that a number must spare to be free beside the others."""
+SPARED = 3.0
+"""A number is tried without that seems to spare at most so many times that and what the least
+needed one seems to spare."""
 ALIKE = 9.0
 """Gain in loss up to which data cannot tell one number from another, nor from an effect."""
 MOST = 0.5
@@ -246,9 +249,8 @@ def _spared(names: tuple[NuisanceName, ...], fit: Fit) -> list[NuisanceName]:
         return list(names)
     k = len(names)
     needed = fit.x[-k:] ** 2 / np.diag(np.linalg.pinv(fit.information, hermitian=True))[-k:]
-    return [
-        name for name, loss in zip(names, needed, strict=True) if loss < 2 * needed.min() + 4 * NEXT
-    ]
+    most = SPARED * (needed.min() + NEXT)
+    return [name for name, loss in zip(names, needed, strict=True) if loss <= most]
 
 
 @dataclass(frozen=True)
