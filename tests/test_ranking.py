@@ -12,7 +12,8 @@ from joda.diagnosis import search
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.horizons import hopeful
 from joda.diagnosis.hypotheses import Units, hypotheses
-from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
+from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, Units, unknowns_of
+from joda.diagnosis.hypotheses.effects import from_effects
 from joda.diagnosis.hypotheses.effects import KNOTS
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside, joined, price
@@ -437,3 +438,32 @@ def test_few_samples_tell_less_of_two_effects_that_leave_as_much_of_each(samples
     first, second = decide(evidence).probabilities
     assert (first > 0.9) == sure
     assert (second > 0.2) != sure
+
+
+@pytest.mark.parametrize(
+    ("model", "left", "verdict"),
+    [(12.2, (1.8, 9.6), "missing_effect"), (43.8, (2.15, 2.37), "unexplained")],
+)
+def test_play_leaves_more_than_a_law_that_is_known_and_much_less_than_all_others(
+    model, left, verdict
+):
+    """How its contact yields is not known: of two joints one has play and one a trembling hand."""
+    usual = dict.fromkeys(("force", "speed", "inertia", "span", "friction", "weight"), 1.0)
+    units = Units(**usual, visited=(0.0, 1.0), forced=True, hinge=True)
+    found = [one for one in from_effects(units) if one.effect == "backlash"]
+    assert len(found) == 2
+    for one in found:
+        evidence = Evidence(
+            samples=5000.0,
+            n_effective=5000.0,
+            noisy=False,
+            restitution=False,
+            model=model,
+            tolerant=model,
+            own=model,
+            gain=(model - left[0]) * 5000,
+            misfit_tolerance=one.misfit_tolerance,
+            effects=("backlash", "presliding_friction"),
+            left=left,
+        )
+        assert decide(evidence).verdict == verdict

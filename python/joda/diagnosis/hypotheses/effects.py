@@ -335,7 +335,7 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
 
 
 def _backlash(units: Units) -> Iterator[Hypothesis]:
-    """Play before the joint, and behind it."""
+    """Play before the joint, and behind it; how its contact yields and knocks is not known."""
     M, span = units.inertia, units.span
     play = (3e-3, 0.2, 0.002, np.nan, 0.5)
 
@@ -357,6 +357,7 @@ def _backlash(units: Units) -> Iterator[Hypothesis]:
         before,
         size,
         unit,
+        misfit_tolerance=KNOWN_SHAPE,
     )
     load = _effect(
         "backlash",
@@ -369,6 +370,7 @@ def _backlash(units: Units) -> Iterator[Hypothesis]:
         behind,
         size,
         unit,
+        misfit_tolerance=KNOWN_SHAPE,
     )
     yield replace(load, kept=KEPT)
 
