@@ -12,9 +12,8 @@ from joda.diagnosis import search
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.horizons import hopeful
 from joda.diagnosis.hypotheses import Units, hypotheses
-from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, Units, unknowns_of
-from joda.diagnosis.hypotheses.effects import from_effects
-from joda.diagnosis.hypotheses.effects import KNOTS
+from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
+from joda.diagnosis.hypotheses.effects import KNOTS, from_effects
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside, joined, price
 from joda.diagnosis.ranking import WORST, evidence, weigh
@@ -448,9 +447,7 @@ def test_play_leaves_more_than_a_law_that_is_known_and_much_less_than_all_others
     model, left, verdict
 ):
     """How its contact yields is not known: of two joints one has play and one a trembling hand."""
-    usual = dict.fromkeys(("force", "speed", "inertia", "span", "friction", "weight"), 1.0)
-    units = Units(**usual, visited=(0.0, 1.0), forced=True, hinge=True)
-    found = [one for one in from_effects(units) if one.effect == "backlash"]
+    found = [one for one in from_effects(UNITS) if one.effect == "backlash"]
     assert len(found) == 2
     for one in found:
         evidence = Evidence(
