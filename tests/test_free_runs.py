@@ -189,7 +189,7 @@ def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
     measured = louder(quiet, tmp_path, rng, 25)
     found = free_runs(measured, fit_baseline(measured))
     assert found.denied and found.suffice
-    assert found.numbers[0] == pytest.approx(times, abs=max(4 * found.errors[0], 0.01))
+    assert found.fit.x[0] == pytest.approx(times, abs=max(4 * found.errors[0], 0.01))
     said = diagnosed(measured).diagnosis
     assert compared(tmp_path, 3).adequacy.verdict != "within_noise"
     assert "The model is adequate" not in said.summary

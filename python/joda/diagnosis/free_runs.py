@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from joda.diagnosis.baseline import Baseline
-from joda.diagnosis.corrections import errors_beside_a_force
-from joda.diagnosis.units import units_of
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.segmentation import segments_of
@@ -130,16 +128,17 @@ class FreeRuns:
         denied: by them, as it is.
         drifting: by them, whatever its strengths.
         covered: part of all runs' samples that they hold, before they come to an end.
-        numbers, errors: of the model by the whole runs, and their standard errors; shape (k,).
-        beside_a_force: the latter where a force over position may be missing too, shape (k,).
+        estimator, base, fit: the model by the whole runs.
+        errors: standard errors of its numbers, shape (k,).
     """
 
     denied: bool
     drifting: bool
     covered: float
-    numbers: Array
+    estimator: SegmentEstimator
+    base: BaseModel
+    fit: Fit
     errors: Array
-    beside_a_force: Array
 
     @property
     def suffice(self) -> bool:
@@ -169,14 +168,14 @@ def free_runs(measured: Measured, baseline: Baseline) -> FreeRuns | None:
     errors = ways[best].errors(fits[best])
     if fits[best] is not smooth[best]:  # of a jagged loss its curvature tells nothing
         errors = np.hypot(errors, np.sqrt(np.diag(baseline.covariance)))
-    usual = units_of(baseline.estimator.segments, measured).force
     return FreeRuns(
         denied=all(way.denied_as_it_is(fit) for way, fit in zip(ways, fits, strict=True)),
         drifting=all(way.denied(fit) for way, fit in zip(ways, fits, strict=True)),
         covered=sum(len(run.time) for run, _ in parts) / samples,
-        numbers=fits[best].x,
+        estimator=ways[best].estimator,
+        base=ways[best].base,
+        fit=fits[best],
         errors=errors,
-        beside_a_force=ways[best].errors_beside_a_force(fits[best], usual),
     )
 
 
@@ -259,10 +258,6 @@ class _Whole:
         unknowns = self.base.unknowns
         found = self.estimator.covariance(self.base.simulator, unknowns, fit, unknowns.prior_std)
         return np.asarray(np.hypot(np.sqrt(np.diag(found)), APART * np.abs(fit.x)))
-
-    def errors_beside_a_force(self, fit: Fit, force: float) -> Array:
-        """The same where a force over position may be missing too; `force`: usual, N·m or N."""
-        return errors_beside_a_force(self.estimator, self.base, fit, force)
 
 
 def _replayer(measured: Measured, baseline: Baseline, x: Array, finer: int) -> Replayer:

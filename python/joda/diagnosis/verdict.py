@@ -4,7 +4,6 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.calibration import Calibration, Calibrator
@@ -350,15 +349,18 @@ def _adequate(
     if free and free.drifting:
         return unexplained(SLOWLY, AGAIN)
     denying = free if free and free.denied else None
-    told_by, least = ((denying.numbers, denying.errors), 0.0) if denying else (None, OFF)
-    own, worst_run = numbers(baseline, found=told_by), worst_missed(measured)
+    told, least = (denying, 0.0) if denying else (baseline, OFF)
+    by_runs = (denying.fit.x, denying.errors) if denying else None
+    own, worst_run = numbers(baseline, found=by_runs), worst_missed(measured)
     numbers_off = off(own, least)
     if denying and not numbers_off:
         return unexplained(TOGETHER, AGAIN)
     if numbers_off and moved_one_way(measured):
-        x, errors = told_by or (baseline.fit.x, np.zeros(len(baseline.fit.x)))
-        unsure = denying.beside_a_force if denying else _beside_a_force(measured, baseline)
-        surely = numbers(baseline, found=(x, np.maximum(unsure, errors)))
+        usual = units_of(baseline.estimator.segments, measured).force
+        errors = errors_beside_a_force(told.estimator, told.base, told.fit, usual)
+        if denying:
+            errors = np.maximum(errors, denying.errors)
+        surely = numbers(baseline, found=(told.fit.x, errors))
         pairs = zip(own, surely, strict=True)
         if not all(sure.off(least) for one, sure in pairs if one.off(least)):
             experiment = _next(measured, ranking, weigh(ranking), one_way=True)
@@ -388,15 +390,7 @@ def _adequate(
     driven = baseline.base.joint_model.servo is not None
     if doubt or (by_one_factor(own) and not driven):
         return Diagnosed(report)
-    x = denying.numbers if denying else baseline.fit.x
-    return Diagnosed(report, corrected=corrected(baseline, own, least, x))
-
-
-def _beside_a_force(measured: Measured, baseline: Baseline) -> NDArray[np.float64]:
-    """Errors of the model's numbers where a force may be missing too, by its segments."""
-    estimator = baseline.estimator
-    usual = units_of(estimator.segments, measured).force
-    return errors_beside_a_force(estimator, baseline.base, baseline.fit, usual)
+    return Diagnosed(report, corrected=corrected(baseline, own, least, told.fit.x))
 
 
 def _report_uneven(measured: Measured) -> str:

@@ -86,14 +86,16 @@ class Linearization:
     @cached_property
     def inverse(self) -> Array:
         """Of the starts' own normal matrices, shape (m, d, d)."""
-        return np.asarray(np.linalg.inv(self.start_normal[0]))
+        return np.asarray(np.linalg.inv(self.start_matrix))
 
     @property
-    def start_normal(self) -> tuple[Array, Array]:
-        """The normal equations of each segment's start: shapes (m, d, d) and (m, d)."""
-        across = self.S.transpose(0, 2, 1)
-        gradient = (across @ self.r[:, :, None])[:, :, 0] + self.z
-        return across @ self.S + np.eye(self.S.shape[2]), gradient
+    def start_matrix(self) -> Array:
+        """Normal matrix of each segment's start, shape (m, d, d)."""
+        return np.asarray(self.S.transpose(0, 2, 1) @ self.S + np.eye(self.S.shape[2]))
+
+    def start_gradient(self, r: Array) -> Array:
+        """The gradient that goes with it, where residuals are r; shape (m, d, 1)."""
+        return np.asarray(self.S.transpose(0, 2, 1) @ r[:, :, None] + self.z[:, :, None])
 
     def products(self, a: Array, b: Array, za: Array | None = None) -> Array:
         """Weighted inner products of what of a and b no start can take up.
@@ -118,17 +120,15 @@ class Linearization:
     def normals(self) -> tuple[Array, Array]:
         """Each segment's part of the normal equations: shapes (m, k, k) and (m, k)."""
         w = self.weight[:, None, None]
-        across = self.S.transpose(0, 2, 1)
-        SJ, Jt = across @ self.J, self.J.transpose(0, 2, 1)
-        Sr = across @ self.r[:, :, None] + self.z[:, :, None]
+        SJ, Jt = self.S.transpose(0, 2, 1) @ self.J, self.J.transpose(0, 2, 1)
+        Sr = self.start_gradient(self.r)
         H = Jt @ self.J - SJ.transpose(0, 2, 1) @ self.inverse @ SJ
         g = Jt @ self.r[:, :, None] - SJ.transpose(0, 2, 1) @ self.inverse @ Sr
         return np.asarray(w * H), np.asarray((w * g)[:, :, 0])
 
     def follow(self, move: Array) -> Array:
         """How the starts move, in doubts, when the numbers do; shape (m, d)."""
-        g = self.S.transpose(0, 2, 1) @ (self.r + self.J @ move)[:, :, None] + self.z[:, :, None]
-        return np.asarray(-(self.inverse @ g)[:, :, 0])
+        return np.asarray(-(self.inverse @ self.start_gradient(self.r + self.J @ move))[:, :, 0])
 
 
 @dataclass(frozen=True)
@@ -277,12 +277,12 @@ class SegmentEstimator:
         damping, unit = np.full(len(start), 1e-3), np.eye(start.shape[1])
         for _ in range(iterations):
             about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
-            A, g = about.start_normal
-            A = A * (1 + damping[:, None, None] * unit)
-            step = np.linalg.solve(A, g[:, :, None])[:, :, 0]
+            A = about.start_matrix * (1 + damping[:, None, None] * unit)
+            g = about.start_gradient(about.r)
+            step = np.linalg.solve(A, g)
             if (step * g).sum() < STARTED:
                 break
-            moved = start - segments.prior_std * step
+            moved = start - segments.prior_std * step[:, :, 0]
             trial = self.squares(simulator, moved)[1]
             better = trial < squares
             start = np.where(better[:, None], moved, start)
