@@ -7,24 +7,24 @@ what is right in short ones is a good start for longer ones.
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from joda._core import JointSimulator
-from joda.component import Component
+from joda.component import Component, Curve
 from joda.diagnosis.departures import DOUBT, EFFECTS, Moved
 from joda.diagnosis.hypothesis_fits import usual
 from joda.effects import EndStopRestitution
 from joda.estimation.estimator import CAUCHY_SCALE, SegmentEstimator
 from joda.estimation.problem import as_it_is, segments_for
 from joda.estimation.profile_parameters import DOUBT as USUAL
-from joda.estimation.profile_parameters import NARROWEST, Kind, Parameters
+from joda.estimation.profile_parameters import NARROWEST, Kind, Parameters, Slot
 from joda.estimation.segments import Segments
 from joda.estimation.unknowns import Unknowns
 from joda.field import evaluate
 from joda.measured.measured_joint import Measured
-from joda.measured.visited import unvisited
 from joda.profile import CHANNELS, Channel, Channels, Profile
 
 Array = NDArray[np.float64]
@@ -44,6 +44,10 @@ NUDGE = 0.004
 """Step of a number for differences, in its own unit."""
 HELD = 1e-3
 """Part of a number's usual doubt that is left to one that is held."""
+EFFECT, NATIVE, LITTLE = 1.0, 0.2, 0.1
+"""By what part of it an effect's curve may be more or less off its law at one end than at the
+other, one standard deviation; the model's own off what they were given as; and what part of its
+largest value counts as so much at the least."""
 PRICE = 2.0
 """What a control point must gain, of twice the log-likelihood (Akaike 1974)."""
 
@@ -122,18 +126,18 @@ class Trials:
             progress: what is being done.
         """
         found = self._leaps(self.tried(profile), progress)
-        profile = found[-1].profile
+        profile = law = found[-1].profile
         for finer in range(FINER + 1):
             profile = resolved(profile, effect) if finer else profile
             points = sum(len(part.x) for part in _parts(profile) if part.label == effect)
             if finer and not points:
                 break
             what = f"all numbers, {points} control points of the effect"
-            found += self._fits(profile, self.lengths, progress, what)
+            found += self._fits(profile, self.lengths, progress, what, law=law)
             profile = found[-1].profile
         found += self._leaps(likeliest(found), progress)
         what = "all numbers once more"
-        return found + self._fits(likeliest(found).profile, self.last, progress, what)
+        return found + self._fits(likeliest(found).profile, self.last, progress, what, law=law)
 
     def holding(
         self, profile: Profile, parts: Collection[Moved], progress: Callable[[str], None]
@@ -156,12 +160,13 @@ class Trials:
         progress: Callable[[str], None],
         what: str,
         parts: Collection[Moved] = (),
+        law: Profile | None = None,
     ) -> list[Tried]:
         """Fits in longer and longer segments, each from what the one before found."""
         found = []
         for length in lengths:
             progress(what + (f", windows of {length:.2g} s" if self.train.runs else ""))
-            profile = refitted(self.train, profile, length, parts)
+            profile = refitted(self.train, profile, length, parts, law)
             found.append(self.tried(profile))
         return found
 
@@ -178,11 +183,13 @@ class Trials:
         return found
 
     def _resized(self, profile: Profile) -> Iterator[Profile]:
-        """The profile with one size much more or less."""
+        """The profile with one size much more or less, of a curve all of it."""
         kinds: tuple[Kind, ...] = ("sizes", "effects")
         parameters = Parameters(checked(profile), kinds, inertia=self.train.joint_model.inertia)
         must = parameters.constraints
-        for k, slot in enumerate(parameters.slots):
+        alike = groupby(range(len(parameters.slots)), lambda k: replace(parameters.slots[k], index=0))
+        for slot, numbers in alike:
+            k = list(numbers)
             for factor in FACTORS:
                 theta = parameters.start.copy()
                 theta[k] = np.log(factor) if slot.kind == "sizes" else factor * theta[k]
@@ -234,6 +241,7 @@ def refitted(
     profile: Profile,
     length: float,
     parts: Collection[Moved] = (),
+    law: Profile | None = None,
 ) -> Profile:
     """All numbers of a profile fitted, near where they were.
 
@@ -242,6 +250,8 @@ def refitted(
         profile: its shapes are kept.
         length: of segments, s.
         parts: whose numbers stay as they are.
+        law: the same curves, of fewer numbers: where no run was they are off it as much as beside.
+            None: the profile's.
     """
     segments = segments_for(train, length, fine=False)  # at the scene's own step
     estimator = SegmentEstimator(segments, _counted(segments, bouncy(profile)))
@@ -249,17 +259,22 @@ def refitted(
         return profile
     kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
     inertia = train.joint_model.inertia
-    away = unvisited(train)
-    parameters = Parameters(checked(profile), kinds, inertia=inertia, away=away)
+    parameters = Parameters(checked(profile), kinds, inertia=inertia)
     n = len(parameters.start)
     if not n:
         return profile
     unbounded = np.full(n, np.inf)
-    mean, prior_std = _known(parameters, train.profile)
+    mean, prior_std = _known(parameters, train.profile, law or profile)
     held = _held(parameters, parts)
     mean, prior_std = np.where(held, parameters.start, mean), np.where(held, HELD, 1.0) * prior_std
     unknowns = Unknowns(
-        -unbounded, unbounded, np.full(n, NUDGE), mean, prior_std, parameters.constraints
+        -unbounded,
+        unbounded,
+        np.full(n, NUDGE),
+        mean,
+        prior_std,
+        parameters.constraints,
+        rough=_walks(parameters, train.profile, mean),
     )
     joint_model, h = as_it_is(train), segments.h
 
@@ -282,27 +297,59 @@ def _counted(segments: Segments, bounces: bool) -> NDArray[np.bool_]:
     return segments.long_enough if bounces else segments.usable
 
 
-def _known(parameters: Parameters, given: Profile) -> tuple[Array, Array]:
+def _known(parameters: Parameters, given: Profile, law: Profile) -> tuple[Array, Array]:
     """What is known of the numbers before the data, and how well.
 
     Control points of the model as it was given are near what they are there, however often all is
-    fitted: else its friction and damping stand in for what is still missing.
+    fitted: else its friction and damping stand in for what is still missing. Those of an effect are
+    near its law.
     """
     mean, prior_std = parameters.start.copy(), parameters.prior_std.copy()
     for k, (slot, scale) in enumerate(zip(parameters.slots, parameters.scales, strict=True)):
-        if slot.kind != "values":
+        if (own := _curve(parameters.profile, slot)) is None:
             continue
-        own, there = (
-            getattr(profile.channels, slot.channel).components
-            for profile in (parameters.profile, given)
-        )
-        if slot.component >= len(there):
-            continue
-        y = np.array(there[slot.component].y)
-        if y.any() and len(y) == len(own[slot.component].y):
-            mean[k] = y[slot.index] / scale
-            prior_std[k] *= DOUBT * np.abs(y).max() / scale / USUAL["values"]
+        there = _curve(given, slot)
+        if there is None:
+            mean[k] = _value(_curve(law, slot) or own, own.x[slot.index]) / scale
+            prior_std[k] *= np.sqrt(len(own.x))  # all together as well known as one number
+        elif any(there.y) and len(there.y) == len(own.y):
+            mean[k] = there.y[slot.index] / scale
+            prior_std[k] *= DOUBT * np.abs(there.y).max() / scale / USUAL["values"]
     return mean, prior_std
+
+
+def _walks(parameters: Parameters, given: Profile, law: Array) -> Array:
+    """How alike neighbouring control points of a curve are off what is known of them, shape (r, n):
+    differences in standard deviations of a random walk along it (Brownian motion, whose most likely
+    path is a spline: Wahba 1978). So where no run was a curve is as much off its law as beside."""
+    rows = []
+    usual = np.maximum(np.abs(law), LITTLE)
+    for k, (slot, after) in enumerate(pairwise(parameters.slots)):
+        own = _curve(parameters.profile, slot)
+        if own is None or replace(slot, index=after.index) != after:
+            continue
+        far = abs(own.x[after.index] - own.x[slot.index])
+        std = (EFFECT if _curve(given, slot) is None else NATIVE) * np.sqrt(far)
+        row = np.zeros(len(parameters.slots))
+        row[[k, k + 1]] = np.array((-1, 1)) / (std * usual[[k, k + 1]])
+        rows.append(row)
+    return np.array(rows).reshape(-1, len(parameters.slots))
+
+
+def _curve(profile: Profile, slot: Slot) -> Curve | None:
+    """The curve that a number is a control point of; None if it is of none, or there is no such."""
+    if slot.kind == "values":
+        curves: Sequence[object] = getattr(profile.channels, slot.channel).components
+    else:
+        curves = profile.effects if slot.key == "y" else ()
+    own = curves[slot.component] if slot.component < len(curves) else None
+    return own if isinstance(own, Curve) else None
+
+
+def _value(curve: Curve, x: float) -> float:
+    """Of a curve in its own coordinate."""
+    part = Component(interval=(0.0, 1.0), x=curve.x, y=curve.y)
+    return float(evaluate(Channel(components=(part,)), np.array([x]))[0][0])
 
 
 def _held(parameters: Parameters, parts: Collection[Moved]) -> NDArray[np.bool_]:

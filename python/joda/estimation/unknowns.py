@@ -21,8 +21,8 @@ class Unknowns:
         constraints: what else must hold.
         widest: to which bounds those may be widened that are only usual, shape (2, k), lows first;
             NaN for what cannot be beyond its bound. None for nothing to widen.
-        rough: combinations of the numbers of which standard normal values are known before the
-            data, shape (r, k); None for none.
+        rough: combinations of what the numbers are off their means, of which standard normal values
+            are known before the data, shape (r, k); None for none.
     """
 
     low: Array
@@ -81,8 +81,9 @@ class Unknowns:
 
     def penalty(self, x: Array) -> float:
         """What the numbers lose by being off what was known."""
-        off = float(np.sum(((x - self.mean) / self.prior_std) ** 2))
-        return off if self.rough is None else off + float(np.sum((self.rough @ x) ** 2))
+        off = x - self.mean
+        own = float(np.sum((off / self.prior_std) ** 2))
+        return own if self.rough is None else own + float(np.sum((self.rough @ off) ** 2))
 
     @property
     def known(self) -> Array:
@@ -92,8 +93,9 @@ class Unknowns:
 
     def pull(self, x: Array) -> Array:
         """Half the penalty's gradient."""
-        off = (x - self.mean) / self.prior_std**2
-        return off if self.rough is None else off + self.rough.T @ (self.rough @ x)
+        off = x - self.mean
+        own = off / self.prior_std**2
+        return own if self.rough is None else own + self.rough.T @ (self.rough @ off)
 
 
 EMPTY = np.zeros(0)

@@ -1,6 +1,6 @@
 """The templates as hypotheses: laws of their kind with few numbers, written as PCHIP components."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import product
 
 import numpy as np
@@ -42,13 +42,16 @@ RATIO = (0.0, 3.0, 0.02)
 """Of a template's curves: strength of each in units of the first one's."""
 WIDER = (0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.9, 1.0)
 """Widths at which such a one is tried besides: where its force changes sign, fits find no other."""
-CENTRES = ((0.5,), (0.27, 0.73))
-"""Of one well, and of two, in their interval; their outer flanks run out more slowly."""
 LOCAL = {
     "constant_friction_hinge": "position_dependent_friction",
     "constant_damping_hinge": "position_dependent_damping",
 }
 """What a constant resistance is called that acts on less than `WHOLE` of the range."""
+WELL_WIDTH = (0.3, 0.7, 0.01)
+"""Of each of two wells, in units of their interval: they overlap, or are apart."""
+USUAL_END = (0.8, 0.5)
+"""What is left of an over-centre mechanism's largest force at an end of the range, and its doubt,
+before the data."""
 TAIL = 0.5
 """Force halfway between a well's largest and its end, in units of that."""
 RARE = 3.0
@@ -84,9 +87,9 @@ def from_templates(units: Units, templates: Mapping[str, Template]) -> Iterator[
         elif name == "bistable_mechanism":
             yield _bistable(units, name)
         elif name == "bistable_mechanism_internal":
-            yield _wells(units, name, (1.0, -1.0, 1.0, -1.0))
+            yield _wells(units, name, 2)
         elif name == "detent_internal":
-            yield _wells(units, name, (1.0, -1.0))
+            yield _wells(units, name, 1)
         else:
             yield _drawn(units, name, template)
 
@@ -101,46 +104,53 @@ def _caught(profile: Profile, name: str, interval: tuple[float, float], most: fl
     return profile.with_component("friction", part)
 
 
-def _wells(units: Units, name: str, lobes: Sequence[float]) -> Hypothesis:
+def _wells(units: Units, name: str, wells: int) -> Hypothesis:
     """Potential wells: strength, where within its part each pulls most, friction, how much one
-    flank pulls more than the other (of two wells the outer ones than the inner), the interval.
+    flank pulls more than the other (of two wells the outer ones than the inner); of two, how much
+    one pulls more than the other and how wide each is; the interval.
 
     Args:
         units: of the joint.
         name: of the template.
-        lobes: signs of the force from one end of the interval to the other, two or four.
+        wells: how many, one or two.
     """
-    parts = len(lobes)
-    zeros = np.arange(parts // 2 + 1) * 2 / parts
-    centres = np.array(CENTRES[parts // 2 - 1])
-    outer = np.array(((0.5, -0.5), (0.5, -0.5, -0.5, 0.5))[parts // 2 - 1])
+    two = wells == 2
+    flanks = np.array(((0.5, -0.5), (-0.5, 0.5))[:wells])
+    each = np.linspace(-0.5, 0.5, wells) if two else np.zeros(1)
 
-    def part(x: Array) -> Component:
-        half = float(x[1]) / parts
-        tops = np.stack([centres - half, centres + half], axis=1).ravel()
-        tails = np.array([tops[0] / 2, (1 + tops[-1]) / 2])
-        at = np.concatenate([zeros, centres, tops, tails])
-        order = np.argsort(at)
-        still = np.zeros(len(zeros) + len(centres))
-        pulls = np.exp(outer * x[3]) * lobes
-        y = np.concatenate([still, pulls, TAIL * pulls[[0, -1]]])[order]
-        own = tuple(units.force * x[0] * y)
-        return Component(label=name, interval=ends("anywhere", x), x=tuple(at[order]), y=own)
+    def parts(x: Array) -> Iterator[Component]:
+        a, b = ends("anywhere", x)
+        ratio, width = x[4:6] if two else (0.0, 1.0)
+        top, wide = 0.5 * (1 - x[1]), width * (b - a)
+        at = (0.0, 0.5 * top, top, 0.5, 1 - top, 1 - 0.5 * top, 1.0)
+        pulls = units.force * x[0] * np.exp(flanks * x[3] + each[:, None] * ratio)
+        for (up, down), place in zip(pulls, ((a, a + wide), (b - wide, b)), strict=False):
+            y = (0.0, TAIL * up, up, 0.0, -down, -TAIL * down, 0.0)
+            yield Component(label=name, interval=place if two else (a, b), x=at, y=y)
 
     def write(profile: Profile, x: Array) -> Profile:
         most = units.force * x[0] * x[2]
-        drawn = profile.with_component("conservative", part(x))
-        return _caught(drawn, name, ends("anywhere", x), most)
+        for part in parts(x):
+            profile = profile.with_component("conservative", part)
+        return _caught(profile, name, ends("anywhere", x), most)
+
+    def reach(x: Array) -> tuple[float, float]:
+        within = [felt(part) for part in parts(np.array([TRIAL, *x[1:]]))]
+        return within[0][0], within[-1][1]
 
     bounds, tries = places("anywhere")
+    own: Bounds = [STRENGTH, (0.2, 0.7, 0.02), CATCH, LEAN]
+    own += [LEAN, WELL_WIDTH] if two else []
+    first = (TRIAL, 0.45, 0.0, *((0.0, 0.0, 0.5) if two else (0.0,)))
+    unknowns = known(unknowns_of(*own, *bounds), 3, 0.0, USUAL_LEAN)
     return Hypothesis(
         name,
         "both",
-        known(unknowns_of(STRENGTH, (0.2, 0.7, 0.02), CATCH, LEAN, *bounds), 3, 0.0, USUAL_LEAN),
-        np.array([(TRIAL, 0.45, 0.0, 0.0, *t) for t in tries]),
+        known(unknowns, 4, 0.0, USUAL_LEAN) if two else unknowns,
+        np.array([(*first, *place) for place in tries]),
         write,
-        lambda x: felt(part(np.array([TRIAL, *x[1:]]))),
-        lambda x: units.force * float(x[0] * np.exp(0.5 * abs(x[3]))),
+        reach,
+        lambda x: units.force * float(x[0] * np.exp(0.5 * np.abs(x[3 : 3 + wells]).sum())),
         unit_of(units),
         len(bounds),
         neg_log_prior=RARE,
@@ -271,23 +281,29 @@ def _snap(units: Units, name: str) -> Hypothesis:
 
 
 def _bistable(units: Units, name: str) -> Hypothesis:
-    """Strength, where it tips over, how far from there the force turns, its part at the ends."""
+    """Strength, where it tips over, and of either side: how far from there the force turns and its
+    part at the end; how much one side pushes more than the other."""
 
     def write(profile: Profile, x: Array) -> Profile:
-        tip, far = float(x[1]), float(x[2])
-        at = (0.0, tip * (1 - far), tip, tip + (1 - tip) * far, 1.0)
-        y = tuple(units.force * x[0] * np.array((-x[3], -1.0, 0.0, 1.0, x[3])))
-        part = Component(label=name, interval=(0, 1), x=at, y=y)
+        tip, lean = float(x[1]), np.exp(np.array((-0.5, 0.5)) * x[6])
+        at = (0.0, tip * (1 - x[2]), tip, tip + (1 - tip) * x[3], 1.0)
+        y = units.force * x[0] * np.array((-x[4], -1.0, 0.0, 1.0, x[5])) * lean[[0, 0, 0, 1, 1]]
+        part = Component(label=name, interval=(0, 1), x=tuple(map(float, at)), y=tuple(y))
         return profile.with_component("conservative", part)
 
+    far, end = (0.15, 0.85, 0.01), (0.0, 1.8, 0.02)
+    own = known(unknowns_of(STRENGTH, (0.2, 0.8, 0.01), far, far, end, end, LEAN), 6, 0, USUAL_LEAN)
+    for side in (4, 5):
+        own = known(own, side, *USUAL_END)
+    tries = product((0.35, 0.5, 0.65), (0.3, 0.6))
     return Hypothesis(
         name,
         "both",
-        unknowns_of(STRENGTH, (0.2, 0.8, 0.01), (0.15, 0.85, 0.01), (0.0, 1.8, 0.02)),
-        np.array(list(product((TRIAL,), (0.35, 0.5, 0.65), (0.3, 0.6), (0.8,)))),
+        own,
+        np.array([(TRIAL, tip, far, far, *2 * USUAL_END[:1], 0.0) for tip, far in tries]),
         write,
         everywhere,
-        lambda x: units.force * float(x[0]) * max(1.0, float(x[3])),
+        lambda x: units.force * float(x[0] * np.exp(0.5 * abs(x[6])) * max(1.0, *x[4:6])),
         unit_of(units),
         misfit_tolerance=KNOWN_SHAPE,
     )
