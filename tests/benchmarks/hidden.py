@@ -127,7 +127,9 @@ def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
         )
         known = added_effect.profile, added_effect.effect, added_effect.departs
         if added_effect.effect:
-            after = missed(held_out, by_all(train, *known, first["interval"])).whole
+            mended = held_out.changed(by_all(train, *known, first["interval"]))
+            stop = added_effect.stop
+            after = missed(mended.stopped(stop) if stop else mended).whole
     least = case.achievable.together
     return {"unseen_before": before / least, "unseen": after / least}
 
@@ -137,6 +139,7 @@ def mended(case: Case, train: Measured, held_out: Measured) -> dict:
     steps, why = improved(train)
     last, least = steps[-1], case.achievable.together
     right = last.right.of(held_out) if last.right else held_out
+    right = right.stopped(last.stop) if last.stop else right
     return {
         "steps": [step.effect for step in steps[1:]],
         "why": why,

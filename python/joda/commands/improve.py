@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from joda.diagnosis.end_stops import attributes, told_stop
 from joda.diagnosis.improvement import Step, improved
 from joda.diagnosis.outcome import (
     NO_TRUST,
@@ -116,8 +117,14 @@ def improve(
     there = len(steps) > 1
     files: dict[Path, bytes | str] = {}
     notes: list[str] = []
+    moved, ends = changes(measured.profile, last), dict[str, str]()
     if there:
-        files, notes = scene_files(Path(model), last, target, composed, steps[-1].servo, right)
+        if stop := steps[-1].stop:
+            ends = attributes(measured.joint_model, stop)
+            moved.append(told_stop(measured.joint_model.solref, stop))
+        files, notes = scene_files(
+            Path(model), last, target, composed, steps[-1].servo, right, ends
+        )
     own = corrections_beside(target)
     result = Improved(
         scene=target if there else None,
@@ -132,7 +139,7 @@ def improve(
         held_out=held_out(measured, held),
         blocks=in_blocks(measured, held),
         departures=_departures(steps),
-        changes=tuple(changes(measured.profile, last)),
+        changes=tuple(moved),
         notes=(*measured.notes, *notes),
     )
     if there or report:
@@ -205,7 +212,9 @@ def _errors(result: Improved) -> dict[str, list[float]]:
 
 
 def _step(step: Step) -> str:
-    return f"+ {step.effect}" if step.effect else "corrected" if step.corrections else "as it was"
+    if step.effect:
+        return f"+ {step.effect}"
+    return "corrected" if step.corrections or step.stop else "as it was"
 
 
 def _explanations(result: Improved) -> list[str]:

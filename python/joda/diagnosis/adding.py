@@ -13,17 +13,21 @@ import numpy as np
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.coverage import at_rest
 from joda.diagnosis.departures import FAITHFUL, SHARED, Departures, departures, restored
+from joda.diagnosis.end_stops import Solref, fitted_stop
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.overlap import overlap
 from joda.diagnosis.paired_test import FALLEN, worse
 from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
 from joda.diagnosis.shape_refinement import (
+    LIKELIER,
     LONGEST,
+    NEARLY,
     Likelihood,
     Trials,
     Tried,
     bouncy,
     checked,
+    clearly,
     likeliest,
     refitted,
 )
@@ -33,11 +37,6 @@ from joda.measured.misfit import rms
 from joda.profile import Profile
 from joda.threads import one_blas_thread
 
-NEARLY = 0.95
-"""Part of the error before, and of the loss, to which an effect must bring runs held out."""
-LIKELIER = 2 * float(np.log(20))
-"""How much less that loss, twice a negative log-likelihood, must be at least: a model that was not
-fitted to data makes them 20 times likelier than the true one does in one of 20 cases at most."""
 NO_LESS = "it does not lower the error on what was held out of the fit"
 OWN = (
     "the model's own numbers, fitted without it, do as well on what was held out; joda refine fits "
@@ -77,6 +76,7 @@ class AddedEffect:
         before, after: errors on runs held out of the fit.
         reason: why nothing was added, a clause; None if something was.
         departs: by what the profile is not what was given and diagnosed.
+        stop: solref of the ends of the range that suits the runs there; None: the model's.
     """
 
     profile: Profile
@@ -85,6 +85,7 @@ class AddedEffect:
     after: Error
     reason: str | None = None
     departs: Departures = FAITHFUL
+    stop: Solref | None = None
 
 
 def error(measured: Measured, profile: Profile | None = None, *, within: bool = True) -> Error:
@@ -182,7 +183,11 @@ def add_effect(
         without = likeliest(trials.reshaped(own, effect, progress))
         if _as_good(without, first):
             return AddedEffect(train.profile, None, before, before, OWN)
-    return AddedEffect(first.profile, effect, before, after, departs=departs)
+    progress("the ends of the range")
+    there = train.changed(first.profile), held.changed(first.profile)
+    if stop := fitted_stop(*there):
+        after = error(there[1].stopped(stop), within=True)
+    return AddedEffect(first.profile, effect, before, after, departs=departs, stop=stop)
 
 
 @one_blas_thread
@@ -218,11 +223,6 @@ def fallen(before: Error, after: Error) -> bool:
     if before.whole is None or after.whole is None:
         return windows
     return windows or (after.whole < FALLEN * before.whole and after.window < before.window)
-
-
-def clearly(loss: float, than: float) -> bool:
-    """Whether a loss is less by enough not to be by chance."""
-    return loss < min(NEARLY * than, than - LIKELIER)
 
 
 def _as_good(other: Tried, first: Tried) -> bool:

@@ -9,6 +9,7 @@ from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibration
 from joda.diagnosis.corrections import OFF, Corrected, corrected, corrections, numbers
 from joda.diagnosis.departures import FAITHFUL, Departures
+from joda.diagnosis.end_stops import Solref, fitted_stop
 from joda.diagnosis.findings import Correction, Diagnosis, Finding
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.pair_search import pairs
@@ -50,6 +51,7 @@ class Step:
         corrections: of the model's own numbers, that were made instead.
         servo: of the joint's actuators, with all corrections so far; None where none was made.
         right: what was set right of what the joint moves and of the measurement, so far.
+        stop: solref of the ends of the range that suits the runs there; None: the model's.
         error: on runs held out of every fit.
         diagnosis: of the model with this profile; None if it was not made.
         departs: by what the profile is not what was given and diagnosed.
@@ -63,6 +65,7 @@ class Step:
     corrections: tuple[Correction, ...] = ()
     servo: Servo | None = None
     right: AppliedCorrections | None = None
+    stop: Solref | None = None
 
     @property
     def effect(self) -> str | None:
@@ -122,6 +125,8 @@ def improved(
         if effect := steps[-1].effect:
             progress("all numbers once more, to all runs")
             steps[-1] = _by_all(measured, steps[-1], effect)
+        progress("the ends of the range")
+        steps = _stopped(parts, steps)
     except KeyboardInterrupt:
         why = INTERRUPTED
     return tuple(steps), why
@@ -132,6 +137,16 @@ def _by_all(measured: Measured, last: Step, effect: str) -> Step:
     whole = last.right.of(measured) if last.right else measured
     whole, _ = _driven((whole, whole), last.servo)
     return replace(last, profile=by_all(whole, last.profile, effect, last.departs))
+
+
+def _stopped(parts: Parts, steps: list[Step]) -> list[Step]:
+    """The stairs, the last one with ends of the range that suit the runs there; one more where
+    nothing else was missing."""
+    train, held = _with(parts, steps[-1].profile)
+    if not (stop := fitted_stop(train, held)):
+        return steps
+    last = replace(steps[-1], stop=stop, error=error(held.stopped(stop)))
+    return [*steps[: max(len(steps) - 1, 1)], last]
 
 
 def _numbers_first(parts: Parts, before: Error, progress: Progress) -> Step | None:

@@ -52,6 +52,13 @@ PRICE = 2.0
 """What a control point must gain, of twice the log-likelihood (Akaike 1974)."""
 
 
+NEARLY = 0.95
+"""Part of the error before, and of the loss, to which an effect must bring runs held out."""
+LIKELIER = 2 * float(np.log(20))
+"""How much less that loss, twice a negative log-likelihood, must be at least: a model that was not
+fitted to data makes them 20 times likelier than the true one does in one of 20 cases at most."""
+
+
 class Likelihood:
     """Of measured runs, as MuJoCo would move the joint at the scene's own step, or of curves."""
 
@@ -187,7 +194,9 @@ class Trials:
         kinds: tuple[Kind, ...] = ("sizes", "effects")
         parameters = Parameters(checked(profile), kinds, inertia=self.train.joint_model.inertia)
         must = parameters.constraints
-        alike = groupby(range(len(parameters.slots)), lambda k: replace(parameters.slots[k], index=0))
+        alike = groupby(
+            range(len(parameters.slots)), lambda k: replace(parameters.slots[k], index=0)
+        )
         for slot, numbers in alike:
             k = list(numbers)
             for factor in FACTORS:
@@ -195,6 +204,11 @@ class Trials:
                 theta[k] = np.log(factor) if slot.kind == "sizes" else factor * theta[k]
                 if np.all(must.G @ theta >= must.h):
                     yield parameters.written(theta)
+
+
+def clearly(loss: float, than: float) -> bool:
+    """Whether a loss is less by enough not to be by chance."""
+    return loss < min(NEARLY * than, than - LIKELIER)
 
 
 def likeliest(found: Sequence[Tried]) -> Tried:

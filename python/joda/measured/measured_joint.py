@@ -70,6 +70,12 @@ class Measured:
         """The same joint with runs as they would be if what is wrong with them were right."""
         return replace(self, runs=tuple(map(sensing.of, self.runs)))
 
+    def stopped(self, solref: tuple[float, ...]) -> "Measured":
+        """The same joint with another solref of the ends of its range."""
+        own = self.joint_model.stopped(solref)
+        replayer = Replayer(self.context, self.profile, own, self.timestep)
+        return replace(self, joint_model=own, replayer=replayer)
+
     def changed(
         self,
         profile: Profile | None = None,

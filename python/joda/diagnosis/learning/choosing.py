@@ -14,7 +14,6 @@ from joda.diagnosis.adding import (
     NO_MORE,
     NOTHING_LEFT,
     AddedEffect,
-    clearly,
     fallen,
     replayed,
 )
@@ -24,7 +23,7 @@ from joda.diagnosis.learning.law import LABEL, Terms
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.paired_test import worse
 from joda.diagnosis.plausible import Needs, implausible
-from joda.diagnosis.shape_refinement import Likelihood
+from joda.diagnosis.shape_refinement import Likelihood, clearly
 from joda.estimation.estimator import excess
 from joda.measured.measured_joint import Measured
 from joda.threads import one_blas_thread
