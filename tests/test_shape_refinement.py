@@ -29,7 +29,7 @@ def test_where_no_run_was_a_curve_is_as_much_off_its_law_as_beside(lid):
     assert seen == pytest.approx(DRAG, rel=0.2)
     beyond = np.array(drag.y)[np.array(drag.x) > last]
     assert len(beyond) > 1
-    assert np.all(beyond > 0.75 * DRAG) and np.all(beyond < 1.15 * DRAG)  # back to it slowly
+    assert np.all(beyond > 0.7 * DRAG) and np.all(beyond < 1.2 * DRAG)  # back to it slowly
 
 
 def test_one_size_of_an_effect_is_all_of_its_curve(lid):
