@@ -18,7 +18,7 @@ import traceback
 from pathlib import Path
 
 from assets import SHARED
-from hidden_cases import missed
+from hidden_cases import mended, missed
 
 FOLDER = SHARED / "data" / "foreign_cases"
 
@@ -34,9 +34,7 @@ def examined(job: tuple[Path, bool]) -> dict:
 
 
 def _examined(folder: Path, adds: bool) -> dict:
-    from joda.diagnosis.adding import add_effect, by_all
     from joda.diagnosis.outcome import read_runs
-    from joda.diagnosis.split import parted
     from joda.diagnosis.verdict import diagnosed
     from joda.measured.reading import read_measured
 
@@ -59,12 +57,10 @@ def _examined(folder: Path, adds: bool) -> dict:
     before = after = missed(held_out)
     if adds and said.verdict == "missing_effect":
         first = said.effects[0]
-        train, held = parted(measured)
-        added_effect = add_effect(train, held, first.effect, first.direction, first.interval)
+        what = first.effect, first.direction, first.interval
+        added_effect, better = mended(measured, held_out, *what)
         row["added"] = added_effect.effect or added_effect.reason
-        if added_effect.effect:
-            known = added_effect.profile, added_effect.effect, added_effect.departs
-            after = missed(held_out, by_all(measured, *known, first.interval))
+        after = missed(better)
     achievable = answer["achievable_held_out_rmse"]
     row |= {"before": before.whole / achievable, "after": after.whole / achievable}
     return row

@@ -30,13 +30,13 @@ import traceback
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from hidden_cases import Job, case_of, job_of, missed, read, spread
+from hidden_cases import Job, case_of, job_of, mended, missed, read, spread
 from hidden_families import by_effect
 from hidden_field import by_numbers
 from hidden_figures import fine, table, told
 from hidden_floor import floor_of
 
-from joda.diagnosis.adding import add_effect, by_all
+from joda.diagnosis.adding import add_effect
 from joda.diagnosis.improvement import improved
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
@@ -74,7 +74,7 @@ def examined(job: Job) -> dict:
         if job.group == "families" and job.adds:
             row |= unseen(row, case, train, held_out)
         if job.group == "field" and job.adds:
-            row |= mended(case, train, held_out)
+            row |= after_improve(case, train, held_out)
         if job.group == "none" and job.family == FAMILY:
             row["floor"] = floor_of(case, held_out)
         if job.wrong:
@@ -122,19 +122,13 @@ def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
     before = after = missed(held_out).whole
     if row["verdict"] == "missing_effect":
         first = row["named"][0]
-        added_effect = add_effect(
-            *parted(train), first["effect"], first["direction"], first["interval"]
-        )
-        known = added_effect.profile, added_effect.effect, added_effect.departs
-        if added_effect.effect:
-            mended = held_out.changed(by_all(train, *known, first["interval"]))
-            stop = added_effect.stop
-            after = missed(mended.stopped(stop) if stop else mended).whole
+        what = (first[key] for key in ("effect", "direction", "interval"))
+        after = missed(mended(train, held_out, *what)[1]).whole
     least = case.achievable.together
     return {"unseen_before": before / least, "unseen": after / least}
 
 
-def mended(case: Case, train: Measured, held_out: Measured) -> dict:
+def after_improve(case: Case, train: Measured, held_out: Measured) -> dict:
     """Errors on unseen whole runs, of what the true joint misses; after `improve`."""
     steps, why = improved(train)
     last, least = steps[-1], case.achievable.together

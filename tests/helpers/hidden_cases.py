@@ -7,7 +7,8 @@ from zlib import crc32
 
 import numpy as np
 
-from joda.diagnosis.adding import Error, error
+from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error
+from joda.diagnosis.split import parted
 from joda.hidden import EFFECTS, FAMILIES, Case, draw, write
 from joda.hidden.cases import FAMILY, PARTIAL, VISIBLE
 from joda.measured.measured_joint import Measured
@@ -158,3 +159,18 @@ def read(case: Case) -> tuple[Measured, Measured]:
 def missed(measured: Measured, profile: Profile | None = None) -> Error:
     """How far the model, or another profile, is off, also beyond the ends of the range."""
     return error(measured, profile, within=False)
+
+
+def mended(
+    train: Measured,
+    held_out: Measured,
+    effect: str,
+    direction: str | None,
+    interval: tuple[float, float] | None,
+) -> tuple[AddedEffect, Measured]:
+    """What `joda add` adds, and runs held out with the model that it writes."""
+    added = add_effect(*parted(train), effect, direction, interval)
+    if not added.effect:
+        return added, held_out
+    right = held_out.changed(by_all(train, added.profile, added.effect, added.departs, interval))
+    return added, right.stopped(added.stop) if added.stop else right
