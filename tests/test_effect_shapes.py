@@ -64,3 +64,14 @@ def test_two_wells_differ_and_overlap_or_are_apart(rng, lobe):
     wells = tuple(shapes.Well(lobe, 0.5 + way * 0.15 * apart, 0.15) for way in (-1, 1))
     course = shapes.Sum(wells, (1.0, rng.uniform(0.7, 1.4)))
     assert left(HYPOTHESES["bistable_mechanism_internal"], course) < 0.01
+
+
+def test_a_spring_that_does_not_reach_all_over_pulls_wherever_it_reaches():
+    springs = [h for h in hypotheses(UNITS, templates(), BARE) if h.effect.startswith("spring_ret")]
+    assert sum(bool(one.ends) for one in springs) == 2
+    for one in springs:
+        x = one.trials[0].copy()
+        x[1:3] = one.unknowns.low[1:3]  # no preload, and as much off a straight line as may be
+        (part,) = one.write(BARE, x).channels.conservative.components
+        slack = np.isclose(part.y, 0).sum()
+        assert slack == (1 if one.ends else 3)

@@ -36,7 +36,7 @@ TELLS, TELLS_EACH = 60.0, 0.1
 
 
 Progress = Callable[[int, int, str], None]
-A = TypeVar("A", Hypothesis, CoarseFit, FittedHypothesis)
+A = TypeVar("A")
 T = TypeVar("T", CoarseFit, FittedHypothesis)
 
 
@@ -96,8 +96,9 @@ def narrowed(
 ) -> Ranking:
     """The best effects of a ranking again, fitted to longer segments from where they were found.
 
-    Where one that left only noise of shorter segments leaves more of these, its numbers are tried
-    elsewhere too: what goes over a barrier in one segment and not in another is no way for a fit.
+    Where one that left only noise of shorter segments leaves more of these, or falls behind one
+    that was no better there, its numbers are tried elsewhere too: what goes over a barrier in one
+    segment and not in another is no way for a fit.
 
     Args:
         baseline: the model and its runs in longer segments.
@@ -110,16 +111,20 @@ def narrowed(
     def again(found: FittedHypothesis) -> FittedHypothesis:
         make, _ = joined(baseline.base, found.hypothesis)
         start = estimator.started(make(found.fit.x)).start
-        candidate = baseline.refined(
-            CoarseFit(found.hypothesis, (replace(found.fit, start=start),))
-        )
-        stuck = _only_noise(found, before.baseline.estimator) and not _only_noise(
-            candidate, estimator
-        )
-        return baseline.perturbed(candidate) if stuck else candidate
+        return baseline.refined(CoarseFit(found.hypothesis, (replace(found.fit, start=start),)))
+
+    def unstuck(pair: tuple[FittedHypothesis, FittedHypothesis]) -> FittedHypothesis:
+        found, now = pair
+        calm = _only_noise(found, before.baseline.estimator)
+        fell = now.fit.loss > least.fit.loss + HARDLY and found.fit.loss < was.fit.loss
+        stuck = fell or (calm and not _only_noise(now, estimator))
+        return baseline.perturbed(now) if stuck else now
 
     with ThreadPoolExecutor(cpu_count()) as pool:
-        candidates = _Work(pool, progress, len(tried)).all(again, tried)
+        work = _Work(pool, progress, 2 * len(tried))
+        pairs = list(zip(tried, work.all(again, tried), strict=True))
+        was, least = min(pairs, key=lambda pair: pair[1].fit.loss)
+        candidates = work.all(unstuck, pairs)
         baseline = _restarted(baseline, candidates)
     there = [one for one in candidates if not one.vanished]
     return Ranking(baseline, *scored(estimator, there), restitution=before.restitution)

@@ -68,6 +68,9 @@ SPRUNG = np.linspace(0, 1, 5)
 BEND, USUAL_BEND = (-2.0, 2.0, 0.05), 0.7
 """How much a spring at a lever, or of two rates, is off a straight line, in units of its force at
 the far end: four times that in the middle; and its doubt before the data."""
+PULLING = (-1.0, 2.0, 0.05)
+"""The same of one that does not reach all over the range: it pulls wherever it reaches, else it is
+a force somewhere else."""
 POWER, USUAL_POWER = (1.0, 4.0, 0.05), (2.0, 0.5)
 """Of distance in a magnet's law: bounds and step; what it is before the data, and how surely:
 between plate and pole 2, of two poles up to 4, where a yoke leads the flux less than 2."""
@@ -219,10 +222,11 @@ def _spring(units: Units, name: str) -> Iterator[Hypothesis]:
             return profile.with_component("conservative", part)
 
         bounds, tries = places(reach)
+        bend = BEND if reach == "whole" else PULLING
         return Hypothesis(
             name,
             "both",
-            known(unknowns_of(STRENGTH, (0.0, 0.7, 0.02), BEND, *bounds), 2, 0.0, USUAL_BEND),
+            known(unknowns_of(STRENGTH, (0.0, 0.7, 0.02), bend, *bounds), 2, 0.0, USUAL_BEND),
             np.array([(TRIAL, 0.25, 0.0, *t) for t in tries]),
             write,
             lambda x: ends(reach, x),
