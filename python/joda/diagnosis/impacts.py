@@ -20,7 +20,7 @@ KNOCKS = 2
 """Fewest impacts at an end whose speeds tell of it."""
 CLEARLY = 0.07
 """How much more of its speed an end must throw back than the model's."""
-CHANCE, PART = 60.0, 0.25
+CHANCE, PART = 60.0, 0.35
 """Least gain in loss of a bouncier end that is more than chance, and least part of the loss."""
 MOST = 24
 """Segments with impacts at an end from which on only some are looked at."""

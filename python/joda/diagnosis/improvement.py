@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from joda.diagnosis.adding import Error, add_effect, by_all, error
+from joda.diagnosis.adding import Error, add_effect, by_all, error, fallen
 from joda.diagnosis.applied_corrections import AppliedCorrections
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibration
@@ -188,7 +188,7 @@ def _set_right(
     profile = refitted(train, right.profile, segments_for(train).length)
     after = error(held.changed(profile))
     rises = before.whole is not None and (after.whole or 0.0) > before.whole
-    if after.window > WORTH * before.window or rises:
+    if not fallen(before, after) or rises:
         return None
     return Step(None, profile, after, corrections=found, servo=right.servo)
 
