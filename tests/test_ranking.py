@@ -440,15 +440,21 @@ def test_few_samples_tell_less_of_two_effects_that_leave_as_much_of_each(samples
 
 
 @pytest.mark.parametrize(
-    ("model", "left", "verdict"),
-    [(12.2, (1.8, 9.6), "missing_effect"), (43.8, (2.15, 2.37), "unexplained")],
+    ("effect", "model", "left", "verdict"),
+    [
+        ("backlash", 12.2, (1.8, 9.6), "missing_effect"),
+        ("backlash", 43.8, (2.15, 2.37), "unexplained"),
+        ("load_dependent_friction", 16.8, (1.41, 10.9), "missing_effect"),
+        ("load_dependent_friction", 16.8, (1.41, 1.9), "unexplained"),
+    ],
 )
-def test_play_leaves_more_than_a_law_that_is_known_and_much_less_than_all_others(
-    model, left, verdict
+def test_play_and_load_leave_more_than_a_law_that_is_known_and_much_less_than_all_others(
+    effect, model, left, verdict
 ):
-    """How its contact yields is not known: of two joints one has play and one a trembling hand."""
-    found = [one for one in from_effects(UNITS) if one.effect == "backlash"]
-    assert len(found) == 2
+    """How a contact yields, or its friction grows with the load, is not known: of the joints with
+    these numbers one has play, one a trembling hand, one a round contact under load."""
+    found = [one for one in from_effects(UNITS) if one.effect == effect]
+    assert found
     for one in found:
         evidence = Evidence(
             samples=5000.0,
@@ -460,7 +466,7 @@ def test_play_leaves_more_than_a_law_that_is_known_and_much_less_than_all_others
             own=model,
             gain=(model - left[0]) * 5000,
             misfit_tolerance=one.misfit_tolerance,
-            effects=("backlash", "presliding_friction"),
+            effects=(effect, "presliding_friction"),
             left=left,
         )
         assert decide(evidence).verdict == verdict
