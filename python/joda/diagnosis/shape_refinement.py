@@ -50,8 +50,6 @@ other, one standard deviation; the model's own off what they were given as; and 
 largest value counts as so much at the least."""
 PRICE = 2.0
 """What a control point must gain, of twice the log-likelihood (Akaike 1974)."""
-
-
 NEARLY = 0.95
 """Part of the error before, and of the loss, to which an effect must bring runs held out."""
 LIKELIER = 2 * float(np.log(20))
