@@ -44,3 +44,14 @@ def test_one_size_of_an_effect_is_all_of_its_curve(lid):
     factors = {round(float(drag), 3) for friction, drag in sizes if friction == pytest.approx(1)}
     assert factors == {0.25, 0.35, 0.7, 1.0}
     assert trials.tried(law).score > min(trials.tried(p).score for p in sizes.values())
+
+
+def test_a_curve_of_which_a_fit_made_next_to_nothing_stays_so(lid):
+    measured, law = lid
+    none = QuadraticDamping(x=(0.0, 0.5, 1.0), y=(1e-20,) * 3)
+    profile = measured.profile.with_effect(none)
+    law = measured.profile.with_effect(QuadraticDamping(x=(0.0, 0.5, 1.0), y=(DRAG,) * 3))
+    fitted = refitted(measured, profile, 1.0, law=law)
+    assert 0 < max(fitted.effects[0].y) < 1e-17
+    friction = fitted.channels.friction.components[0].y
+    assert np.all(np.isfinite(friction)) and np.mean(friction) > FRICTION

@@ -44,6 +44,8 @@ NUDGE = 0.004
 """Step of a number for differences, in its own unit."""
 HELD = 1e-3
 """Part of a number's usual doubt that is left to one that is held."""
+VANISHED = 1e3
+"""How many times a curve its law is, from which on a fit has made next to nothing of it."""
 EFFECT, NATIVE, LITTLE = 1.0, 0.2, 0.1
 """By what part of it an effect's curve may be more or less off its law at one end than at the
 other, one standard deviation; the model's own off what they were given as; and what part of its
@@ -314,19 +316,23 @@ def _known(parameters: Parameters, given: Profile, law: Profile) -> tuple[Array,
 
     Control points of the model as it was given are near what they are there, however often all is
     fitted: else its friction and damping stand in for what is still missing. Those of an effect are
-    near its law.
+    near its law. A curve of which a fit has made next to nothing stays so.
     """
     mean, prior_std = parameters.start.copy(), parameters.prior_std.copy()
     for k, (slot, scale) in enumerate(zip(parameters.slots, parameters.scales, strict=True)):
         if (own := _curve(parameters.profile, slot)) is None:
             continue
         there = _curve(given, slot)
+        before = there or _curve(law, slot) or own
+        size = np.abs(before.y).max() / scale
+        if not 0 < size < VANISHED:
+            continue
         if there is None:
-            mean[k] = _value(_curve(law, slot) or own, own.x[slot.index]) / scale
-            prior_std[k] *= np.sqrt(len(own.x))  # all together as well known as one number
-        elif any(there.y) and len(there.y) == len(own.y):
+            mean[k] = _value(before, own.x[slot.index]) / scale
+            prior_std[k] *= size * np.sqrt(len(own.x))  # all together as well known as one number
+        elif len(there.y) == len(own.y):
             mean[k] = there.y[slot.index] / scale
-            prior_std[k] *= DOUBT * np.abs(there.y).max() / scale / USUAL["values"]
+            prior_std[k] *= DOUBT * size / USUAL["values"]
     return mean, prior_std
 
 
