@@ -316,7 +316,7 @@ def _known(parameters: Parameters, given: Profile, law: Profile) -> tuple[Array,
 
     Control points of the model as it was given are near what they are there, however often all is
     fitted: else its friction and damping stand in for what is still missing. Those of an effect are
-    near its law. A curve of which a fit has made next to nothing stays so.
+    near its law. One of which a fit has made next to nothing stays so.
     """
     mean, prior_std = parameters.start.copy(), parameters.prior_std.copy()
     for k, (slot, scale) in enumerate(zip(parameters.slots, parameters.scales, strict=True)):
@@ -325,12 +325,10 @@ def _known(parameters: Parameters, given: Profile, law: Profile) -> tuple[Array,
         there = _curve(given, slot)
         before = there or _curve(law, slot) or own
         size = np.abs(before.y).max() / scale
-        if not 0 < size < VANISHED:
-            continue
-        if there is None:
+        if there is None and 0 < size < VANISHED:
             mean[k] = _value(before, own.x[slot.index]) / scale
             prior_std[k] *= size * np.sqrt(len(own.x))  # all together as well known as one number
-        elif len(there.y) == len(own.y):
+        elif there is not None and any(there.y) and len(there.y) == len(own.y):
             mean[k] = there.y[slot.index] / scale
             prior_std[k] *= DOUBT * size / USUAL["values"]
     return mean, prior_std
