@@ -7,7 +7,7 @@ from zlib import crc32
 
 import numpy as np
 
-from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error
+from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error, with_stop
 from joda.diagnosis.split import parted
 from joda.hidden import EFFECTS, FAMILIES, Case, draw, write
 from joda.hidden.cases import FAMILY, PARTIAL, VISIBLE
@@ -169,8 +169,10 @@ def mended(
     interval: tuple[float, float] | None,
 ) -> tuple[AddedEffect, Measured]:
     """What `joda add` adds, and runs held out with the model that it writes."""
-    added = add_effect(*parted(train), effect, direction, interval)
+    parts = parted(train)
+    added = add_effect(*parts, effect, direction, interval)
     if not added.effect:
         return added, held_out
+    added = with_stop(added, *parts)
     right = held_out.changed(by_all(train, added.profile, added.effect, added.departs, interval))
     return added, right.stopped(added.stop) if added.stop else right

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from joda.commands.diagnose import check_effect
-from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error
+from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error, with_stop
 from joda.diagnosis.applied_corrections import as_told
-from joda.diagnosis.end_stops import attributes, told_stop
+from joda.diagnosis.end_stops import written
 from joda.diagnosis.findings import read_diagnosis
 from joda.diagnosis.learning.account import Account, account, learned_picture
 from joda.diagnosis.learning.account import sentences as law_sentences
@@ -155,22 +155,21 @@ def add(
     else:
         added_effect = add_effect(train, held, name, direction, near, progress)
         if added_effect.effect:
+            progress("the ends of the range")
+            added_effect = with_stop(added_effect, train, held)
             progress("all numbers once more, to all runs")
             known = added_effect.profile, name, added_effect.departs
             added_effect = replace(added_effect, profile=by_all(measured, *known, near))
     nearest = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
     told_law = account(train, held, law, added_effect.after.window, nearest) if law else None
     notes: list[str] = []
-    moved, ends = changes(measured.profile, added_effect.profile), dict[str, str]()
+    ends, moved = written(measured.joint_model, added_effect.stop)
     corrections: Path | None = corrections_beside(target)
     if added_effect.effect:
         if not told_law:  # of a learned law nothing is where no run was
             there = places(added_effect.profile, name, measured.profile)[0]
             notes += filter(None, [extrapolated(unvisited_part(measured, there)).strip()])
         progress("drawing")
-        if stop := added_effect.stop:
-            ends = attributes(measured.joint_model, stop)
-            moved.append(told_stop(measured.joint_model.solref, stop))
         files, more = scene_files(
             Path(model), added_effect.profile, target, composed, right=right, ends=ends
         )
@@ -198,7 +197,7 @@ def add(
         held_out=held_out(measured, held),
         blocks=in_blocks(measured, held),
         departures=added_effect.departs.sentences,
-        changes=tuple(moved),
+        changes=(*changes(measured.profile, added_effect.profile), *moved),
         notes=(*measured.notes, *notes),
         learned=told_law,
     )

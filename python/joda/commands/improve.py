@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from joda.diagnosis.end_stops import attributes, told_stop
+from joda.diagnosis.end_stops import written
 from joda.diagnosis.improvement import Step, improved
 from joda.diagnosis.outcome import (
     NO_TRUST,
@@ -117,11 +117,8 @@ def improve(
     there = len(steps) > 1
     files: dict[Path, bytes | str] = {}
     notes: list[str] = []
-    moved, ends = changes(measured.profile, last), dict[str, str]()
+    ends, moved = written(measured.joint_model, steps[-1].stop)
     if there:
-        if stop := steps[-1].stop:
-            ends = attributes(measured.joint_model, stop)
-            moved.append(told_stop(measured.joint_model.solref, stop))
         files, notes = scene_files(
             Path(model), last, target, composed, steps[-1].servo, right, ends
         )
@@ -139,7 +136,7 @@ def improve(
         held_out=held_out(measured, held),
         blocks=in_blocks(measured, held),
         departures=_departures(steps),
-        changes=tuple(moved),
+        changes=(*changes(measured.profile, last), *moved),
         notes=(*measured.notes, *notes),
     )
     if there or report:

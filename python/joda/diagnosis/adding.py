@@ -6,7 +6,7 @@ likelier.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -183,11 +183,16 @@ def add_effect(
         without = likeliest(trials.reshaped(own, effect, progress))
         if _as_good(without, first):
             return AddedEffect(train.profile, None, before, before, OWN)
-    progress("the ends of the range")
-    there = train.changed(first.profile), held.changed(first.profile)
-    if stop := fitted_stop(*there):
-        after = error(there[1].stopped(stop), within=True)
-    return AddedEffect(first.profile, effect, before, after, departs=departs, stop=stop)
+    return AddedEffect(first.profile, effect, before, after, departs=departs)
+
+
+@one_blas_thread
+def with_stop(added: AddedEffect, train: Measured, held: Measured) -> AddedEffect:
+    """What was added to these, with ends of the range that suit the runs there."""
+    own, judged = (one.changed(added.profile) for one in (train, held))
+    if not (stop := fitted_stop(own, judged)):
+        return added
+    return replace(added, after=error(judged.stopped(stop)), stop=stop)
 
 
 @one_blas_thread

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from joda.diagnosis.impacts import some_of
 from joda.diagnosis.shape_refinement import bouncy, clearly
-from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.problem import as_it_is, segments_for
 from joda.joints.joint_model import JointModel
 from joda.measured.measured_joint import Measured
@@ -21,8 +21,6 @@ Solref = tuple[float, ...]
 
 LONGER = 2.0
 """Length of segments, in units of the diagnosis' own: what comes back from an end tells of it."""
-MOST = 24
-"""Segments at an end from which on only some are looked at."""
 FIRST = (-2.8, -1.4, 0.0, 1.4, 2.8), (-0.7, 0.0, 0.7)
 """Logarithms of factors of the stiffness and of the damping ratio that are tried first, one at a
 time."""
@@ -59,16 +57,17 @@ def fitted_stop(train: Measured, held: Measured) -> Solref | None:
     return found if clearly(judge(found), judge(own)) else None
 
 
-def attributes(joint_model: JointModel, solref: Solref) -> dict[str, str]:
-    """Of a joint's element in MJCF, for a solref that was fitted beside its own solimp."""
+def written(joint_model: JointModel, solref: Solref | None) -> tuple[dict[str, str], list[str]]:
+    """Attributes of a joint's element in MJCF for a solref that was fitted beside its own solimp,
+    and what is changed, for a person; nothing of either where none was fitted."""
+    if solref is None:
+        return {}, []
     pairs = ("solreflimit", solref), ("solimplimit", joint_model.solimp)
-    return {name: " ".join(f"{value:.6g}" for value in values) for name, values in pairs}
-
-
-def told_stop(before: Solref, after: Solref) -> str:
-    """What was changed, for a person."""
-    was, now = (" ".join(f"{value:.4g}" for value in solref) for solref in (before, after))
-    return f"ends of the range: solreflimit {was} → {now}, as the runs that come to them show"
+    own = {name: " ".join(f"{value:.6g}" for value in values) for name, values in pairs}
+    was, now = (" ".join(f"{x:.4g}" for x in stop) for stop in (joint_model.solref, solref))
+    return own, [
+        f"ends of the range: solreflimit {was} → {now}, as the runs that come to them show"
+    ]
 
 
 def _at_ends(measured: Measured, which: slice = slice(None)) -> Callable[[Solref], float] | None:
@@ -81,8 +80,7 @@ def _at_ends(measured: Measured, which: slice = slice(None)) -> Callable[[Solref
     numbers = np.flatnonzero(segments.long_enough & ~segments.usable)[which]
     if not len(numbers):
         return None
-    kept = np.isin(np.arange(len(segments.at)), numbers[:: len(numbers) // MOST + 1])
-    estimator = SegmentEstimator(segments.only(kept), np.ones(int(kept.sum()), bool))
+    estimator = some_of(segments, numbers)
     joint_model, profile = as_it_is(measured), measured.profile
 
     def loss(solref: Solref) -> float:

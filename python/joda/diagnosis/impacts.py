@@ -169,7 +169,6 @@ def impacts_at(segments: Segments, base: BaseModel, given: JointModel) -> dict[i
         numbers = np.flatnonzero(sides == side)
         if not len(numbers):
             continue
-        kept = np.isin(np.arange(len(sides)), numbers[:: len(numbers) // MOST + 1])
         ratios = RATIOS
         if len(seen := speed_ratios(segments, base, [side])):
             mean, error = mean_of(seen)
@@ -179,9 +178,14 @@ def impacts_at(segments: Segments, base: BaseModel, given: JointModel) -> dict[i
         tried = np.unique(ratios[(ratios > own + CLEARLY) & (ratios <= RATIOS[-1])])
         if len(tried) < FEWEST:
             continue
-        estimator = SegmentEstimator(segments.only(kept), np.ones(int(kept.sum()), bool))
-        out[side] = Impacts(estimator, given, own, times, tried)
+        out[side] = Impacts(some_of(segments, numbers), given, own, times, tried)
     return out
+
+
+def some_of(segments: Segments, numbers: NDArray[np.intp]) -> SegmentEstimator:
+    """Of the segments with these numbers, or of `MOST` of them at most, evenly spread."""
+    kept = np.isin(np.arange(len(segments.at)), numbers[:: len(numbers) // MOST + 1])
+    return SegmentEstimator(segments.only(kept), np.ones(int(kept.sum()), bool))
 
 
 def stopped(joint_model: JointModel, ratio: float, time: float) -> JointModel:
