@@ -55,7 +55,7 @@ def test_the_stop_of_the_runs_is_found(tmp_path, rng, solref):
     found = fitted_stop(train, held)
     assert stiffness_of(found, STEP) == pytest.approx(stiffness_of(solref, STEP), rel=0.15)
     assert found[1] == pytest.approx(solref[1], rel=0.1)
-    assert error(held.stopped(found)).whole < 0.7 * error(held).whole
+    assert error(held.stopped(found)).window < 0.7 * error(held).window
 
 
 def test_a_stop_that_is_right_stays(tmp_path, rng):
