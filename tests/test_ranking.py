@@ -152,7 +152,10 @@ def test_the_best_are_fitted_to_longer_windows_from_where_they_were(measured, ba
     names = [one.hypothesis.effect for one in ranked.candidates]
     assert {one.hypothesis.effect for one in closer.candidates} <= set(names[:NARROWED])
     assert closer.candidates[0].hypothesis.effect == EFFECT
-    first, then = ((one.baseline, one.candidates[0]) for one in (ranked, closer))
+    first, then = (
+        (one.baseline, next(c for c in one.candidates if c.hypothesis.effect == EFFECT))
+        for one in (ranked, closer)
+    )
     (before,), (after,) = first[1].x, then[1].x
     assert abs(after - before) < 3 * np.hypot(error_of(*first), error_of(*then))
     assert after == pytest.approx(before, rel=0.3)
