@@ -34,11 +34,14 @@ def flicked(rng, drag, friction):
 
 
 def thrown(folder, rng, count, drag, friction=FRICTION):
-    """The lid without that drag in its model, nor another friction, and so many runs."""
+    """The lid without that drag in its model, nor another friction, and so many runs.
+
+    The drag may differ from run to run, shape (count,).
+    """
     (folder / "model.xml").write_text(SCENE)
     files = [folder / f"run{k}.csv" for k in range(count)]
-    for file in files:
-        time, position = flicked(rng, drag, friction)
+    for file, own in zip(files, np.broadcast_to(drag, count), strict=True):
+        time, position = flicked(rng, own, friction)
         noisy = position + SIGMA * rng.standard_normal(len(time))
         write_run(file, Run(file.name, time, noisy, None, 0 * time, False))
     return read_measured(folder / "model.xml", "lid", files)

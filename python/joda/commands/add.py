@@ -104,10 +104,11 @@ def add(
 ) -> Added:
     """Adds an effect to a joint's profile and fits everything together.
 
-    Of four or more runs every fourth is held out of the fit, of fewer every fourth block in which
-    the joint moves; of fewer quasi-static curves, where there are no runs, every fourth stretch.
-    The effect is added only if it is plausible and clearly lowers the error there; else nothing is
-    written. With the effect learned_force a law that no catalogue has is learned from the runs.
+    Of four or more runs one of every three is held out of the fit, of fewer every fourth block in
+    which the joint moves (`joda.diagnosis.split`); of fewer quasi-static curves, where there are no
+    runs, every fourth stretch. The effect is added only if it is plausible and clearly lowers the
+    error there; else nothing is written. With the effect learned_force a law that no catalogue has
+    is learned from the runs.
 
     Args:
         model: MJCF or URDF, with or without a profile on the joint.

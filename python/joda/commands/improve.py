@@ -90,8 +90,8 @@ def improve(
     Args:
         model: MJCF or URDF, with or without a profile on the joint.
         joint: its name or address, see `joda.scenes.model.find_joint`.
-        runs: CSV files with time, position and perhaps force. Of four or more every fourth is
-            held out of all fits, of fewer every fourth block in which the joint moves. Or
+        runs: CSV files with time, position and perhaps force. Of four or more one of every three
+            is held out of all fits, of fewer every fourth block in which the joint moves. Or
             quasi-static curves: of fewer than four every fourth stretch of each is held out.
         output: scene to write; beside it, with its name, go .composed.json and .png, and
             .corrections.json where something of the measurement was corrected.

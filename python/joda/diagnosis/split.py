@@ -1,11 +1,12 @@
 """What of the measurements is fitted, and what is held out of every fit.
 
-Of four or more runs in which the joint moves, every fourth, counted from the last: of five or more
-not one alone, which may know nothing of what is missing. Of fewer, each is cut into blocks, and of
-those in which the joint moves every fourth is held out: blocked cross-validation (Roberts et al.,
-Ecography 40 (2017) 913), with blocks all over the motion, as one that rests says little of a law.
-Each block is replayed from a start of its own, estimated from its own samples, so that nothing that
-was fitted is in it. Of curves, where there are no runs, every fourth, or of few curves every fourth
+Of four or more runs in which the joint moves, one of every three, in the order of how far the model
+as it is misses them: what is missing shows in some runs only, and both what is fitted and what
+judges must know of it (a stratified split). Of fewer, each is cut into blocks, and of those in
+which the joint moves every fourth is held out: blocked cross-validation (Roberts et al., Ecography
+40 (2017) 913), with blocks all over the motion, as one that rests says little of a law. Each block
+is replayed from a start of its own, estimated from its own samples, so that nothing that was fitted
+is in it. Of curves, where there are no runs, every fourth, or of few curves every fourth
 stretch of each.
 """
 
@@ -15,7 +16,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.estimation.problem import segments_for
+from joda.diagnosis.shape_refinement import LONGEST
+from joda.estimation.estimator import SegmentEstimator
+from joda.estimation.problem import joint_model_for, segments_for
 from joda.estimation.segments import Segments
 from joda.measured import smoothing
 from joda.measured.measured_joint import Measured
@@ -25,7 +28,9 @@ from joda.measured.runs import Run
 Flags = NDArray[np.bool_]
 
 FEWEST = 4
-"""Runs or curves from which every fourth is held out; of fewer, parts of each."""
+"""Runs or curves of which some are held out whole; of fewer, parts of each."""
+SHOWS = 0.05
+"""Part of what the run that is missed most shows; one that is to judge shows more."""
 LENGTHS = (2.0, 1.0, 0.5, 0.25)
 """Of blocks, in segments of the diagnosis: the longest of which there are enough are taken."""
 ENOUGH = 8
@@ -59,18 +64,21 @@ def parted(measured: Measured) -> tuple[Measured, Measured]:
     return _of(measured, _between(measured, held)), _of(measured, held)
 
 
-def held_blocks(measured: Measured, length: float | None = None) -> list[Block]:
+def held_blocks(measured: Measured, judges: Segments | None = None) -> list[Block]:
     """What is held out of timed runs; whole runs are blocks too.
 
     Args:
         measured: the joint and its runs.
-        length: of the segments to be judged, s; None: the diagnosis' own.
+        judges: segments to be judged; None: long ones, as of profiles with an effect more.
     """
     runs = [Block(k, slice(0, len(run.time))) for k, run in enumerate(measured.runs)]
     moving = [block for block in runs if _moves(measured, block)]
     if len(moving) >= FEWEST:
-        return moving[(len(moving) - 1) % 4 :: 4]
-    length = length or segments_for(measured).length
+        missed = _missed(measured, judges or segments_for(measured, LONGEST, fine=False))
+        ranked = sorted(moving, key=lambda block: -missed[block.run])
+        third = 2 if missed[ranked[2].run] > SHOWS * missed.max() else 1
+        return sorted(ranked[third::3], key=moving.index)
+    length = (judges or segments_for(measured)).length
     for factor in LENGTHS:
         blocks = [
             block for k, run in enumerate(measured.runs) for block in _cut(k, run, factor * length)
@@ -88,7 +96,7 @@ def held_segments(measured: Measured, segments: Segments) -> Flags:
         return np.asarray(np.arange(len(segments.at)) % 4 == 2 if few else segments.run % 4 == 3)
     held = np.zeros(len(segments.at), bool)
     middle = segments.time[segments.rows[np.arange(len(held)), segments.count // 2]]
-    for block in held_blocks(measured, segments.length):
+    for block in held_blocks(measured, segments):
         first, last = measured.runs[block.run].time[block.samples][[0, -1]]
         held |= (segments.run == block.run) & (first <= middle) & (middle <= last)
     return held
@@ -122,6 +130,16 @@ def _cut(number: int, run: Run, length: float) -> list[Block]:
     count = int(np.clip(round(float(np.ptp(run.time)) / length), 1, most))
     edges = np.arange(count + 1) * n // count
     return [Block(number, slice(int(a), int(b))) for a, b in pairwise(edges)]
+
+
+def _missed(measured: Measured, segments: Segments) -> NDArray[np.float64]:
+    """By how much more than noise the model as it is misses the segments of each run: twice a
+    negative log-likelihood, robustly; shape (runs,)."""
+    estimator = SegmentEstimator(segments, segments.usable)
+    simulator = joint_model_for(measured, segments.h).simulator(measured.profile, segments.h)
+    of_noise = estimator.losses(segments.count.astype(float))
+    more = estimator.losses(estimator.started(simulator).squares) - of_noise
+    return np.bincount(segments.run, np.where(estimator.counts, more, 0.0), len(measured.runs))
 
 
 def _moves(measured: Measured, block: Block) -> bool:
