@@ -8,7 +8,7 @@ from lids import RATE, SIGMA, thrown
 
 from joda.diagnosis.adding import add_effect, error
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.holdout import Holdout
+from joda.diagnosis.holdout import Holdout, robust_rms
 from joda.diagnosis.split import held_blocks, held_out, held_segments, in_blocks, parted
 from joda.estimation.problem import segments_for
 from joda.measured.reading import read_measured
@@ -127,6 +127,19 @@ def test_where_windows_held_out_tell_nothing_all_are_in_turn(tmp_path, rng):
     assert len(told.folds) == 1 and len(held.folds) == 4
     assert not np.any(np.sum(held.folds, axis=0) > 1)
     assert np.array_equal(np.any(held.folds, axis=0), baseline.estimator.counts)
+
+
+def test_of_windows_held_out_one_that_goes_astray_does_not_decide(rng):
+    """As a window in which the joint goes over a barrier, and did not: all others are nearer."""
+    count, noise = rng.integers(12, 20), 10 ** rng.uniform(-5, -2)
+    sizes = np.sort(rng.integers(30, 60, count))
+    for size in (1.0, 5.0, 200.0):
+        alike = [np.full(n, size * noise) for n in sizes]
+        assert robust_rms(alike, noise) == pytest.approx(size * noise)
+    before = [noise * rng.normal(0, 5, n) for n in sizes]
+    astray = [noise * rng.normal(0, 100 if k == 0 else 1, n) for k, n in enumerate(sizes)]
+    assert np.std(np.concatenate(astray)) > 2 * np.std(np.concatenate(before))
+    assert robust_rms(astray, noise) < robust_rms(before, noise)
 
 
 def test_windows_follow_the_blocks(tmp_path, rng):

@@ -63,7 +63,7 @@ class Finding:
         unit: of the magnitude.
         explanation: for a person.
         held_out_error_before, held_out_error_after: RMS misfit of segments that were held out of
-            the fit, rad or m.
+            the fit, robust, see `joda.diagnosis.holdout`; rad or m.
         indistinguishable_from: effects that these data cannot tell from it.
     """
 

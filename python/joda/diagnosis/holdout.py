@@ -1,5 +1,6 @@
 """Effects fitted on a part of the runs and judged on the rest."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from joda.diagnosis.baseline import RESTITUTION, Baseline
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.diagnosis.split import held_segments
-from joda.estimation.estimator import Fit, Make, SegmentEstimator
+from joda.estimation.estimator import CAUCHY_SCALE, Fit, Make, SegmentEstimator
 from joda.estimation.segments import Segments
 from joda.estimation.unknowns import Unknowns
 from joda.measured.measured_joint import Measured
@@ -31,7 +32,7 @@ class Holdout:
 
     def __init__(self, baseline: Baseline, measured: Measured) -> None:
         """Holds segments out as `joda.diagnosis.split` does; of what these do not show, others."""
-        self.baseline = baseline
+        self.baseline, self.floor = baseline, measured.floor
         counts = baseline.estimator.counts
         held = held_segments(measured, baseline.estimator.segments)
         self.folds = [counts & held]
@@ -39,7 +40,7 @@ class Holdout:
         self.before = self._error(*own) if self.folds[0].any() else 0.0
         every = np.flatnonzero(counts)
         count = max(int(baseline.estimator.segments.count[self.folds[0]].sum()), 1)
-        noise = measured.floor * np.sqrt(1 + SHOWN * np.sqrt(2 / count))
+        noise = self.floor * np.sqrt(1 + SHOWN * np.sqrt(2 / count))
         silent = self.before < noise or np.count_nonzero(self.folds[0]) < FEW
         if silent and len(every) > 1:
             parts = (every[k::FOLDS] for k in range(min(FOLDS, len(every))))
@@ -47,7 +48,8 @@ class Holdout:
             self.before = self._error(*own)
 
     def errors(self, found: FittedHypothesis) -> tuple[float, float]:
-        """RMS misfit of the segments held out, rad or m, without the effect and with it.
+        """RMS misfit of the segments held out, rad or m, without the effect and with it; robust, so
+        that no single one decides, in which the joint goes over a barrier or just not.
 
         Of how bouncy the ends are, all segments with impacts tell; no other is fitted to them.
         """
@@ -56,7 +58,8 @@ class Holdout:
         if found.hypothesis.effect == RESTITUTION:
             impacts = segments.impacts & (segments.count > 0)
             without = _misfit(segments, base.simulator, self.baseline.fit, impacts)
-            return rms(without), rms(_misfit(segments, make, found.fit, impacts))
+            with_it = _misfit(segments, make, found.fit, impacts)
+            return robust_rms(without, self.floor), robust_rms(with_it, self.floor)
         return self.before, self._error(make, unknowns, found.fit)
 
     def _error(self, make: Make, unknowns: Unknowns, fit: Fit) -> float:
@@ -64,15 +67,31 @@ class Holdout:
         for held in self.folds:
             train = replace(estimator, counts=estimator.counts & ~held)
             near = train.fit(make, unknowns, fit.x, fit.start, 6)
-            missed.append(_misfit(estimator.segments, make, near, held))
-        return rms(np.concatenate(missed))
+            missed += _misfit(estimator.segments, make, near, held)
+        return robust_rms(missed, self.floor)
 
 
-def _misfit(segments: Segments, make: Make, fit: Fit, counts: NDArray[np.bool_]) -> Array:
-    """Misfit of some segments from their best starts, rad or m, but for what errors of the recorded
-    force make of it."""
+def robust_rms(missed: Sequence[Array], noise: float) -> float:
+    """RMS of the misfits of segments, each counting as in the loss of the fits; rad or m.
+
+    Their mean squares s², in units of the noise, are averaged as log(1 + s²/c), with c from which
+    the Cauchy loss bends; it is their RMS where all are alike, and less where few are much larger.
+
+    Args:
+        missed: of each segment its samples' misfits, rad or m.
+        noise: standard deviation of a position, rad or m.
+    """
+    bend = np.sqrt(CAUCHY_SCALE) * noise
+    logs = [np.log1p((rms(one) / bend) ** 2) for one in missed]
+    mean = np.average(logs, weights=[len(one) for one in missed])
+    return float(bend * np.sqrt(np.expm1(mean)))
+
+
+def _misfit(segments: Segments, make: Make, fit: Fit, counts: NDArray[np.bool_]) -> list[Array]:
+    """Misfits of some segments from their best starts, rad or m, but for what errors of the
+    recorded force make of them."""
     simulator = make(fit.x)
     best = SegmentEstimator(segments, counts).started(simulator, near=fit.start)
-    left = segments.residuals(segments.misfit(simulator, best.start))[counts]
-    there = segments.rows[counts] >= 0
-    return np.asarray(left[there] / segments.sharpness[counts][there])
+    left = segments.residuals(segments.misfit(simulator, best.start))
+    there = segments.rows >= 0
+    return [left[k, there[k]] / segments.sharpness[k, there[k]] for k in np.flatnonzero(counts)]

@@ -139,7 +139,8 @@ def _missed(measured: Measured, segments: Segments) -> NDArray[np.float64]:
     simulator = joint_model_for(measured, segments.h).simulator(measured.profile, segments.h)
     of_noise = estimator.losses(segments.count.astype(float))
     more = estimator.losses(estimator.started(simulator).squares) - of_noise
-    return np.bincount(segments.run, np.where(estimator.counts, more, 0.0), len(measured.runs))
+    counted = np.where(estimator.counts, more, 0.0)
+    return np.asarray(np.bincount(segments.run, counted, len(measured.runs)), float)
 
 
 def _moves(measured: Measured, block: Block) -> bool:
