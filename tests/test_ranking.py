@@ -83,6 +83,15 @@ def error_of(baseline, found):
     return np.sqrt(baseline.estimator.covariance(make, unknowns, found.fit, wide)[-1, -1])
 
 
+def test_of_free_runs_a_play_has_a_load_behind_it():
+    """Nothing pushes a handle there, but what lies behind the joint knocks all the same."""
+    plain = Profile(joint=Joint(name="j", type="hinge", range=(0, 1), unit="rad"))
+    for forced, sides in ((True, {"load", "motor"}), (False, {"motor"})):
+        every = hypotheses(replace(UNITS, forced=forced), templates(), plain)
+        plays = (h.write(plain, h.trials[0]) for h in every if h.effect == "backlash")
+        assert {profile.effects[-1].side for profile in plays} == sides
+
+
 @pytest.mark.slow
 def test_what_is_left_rough_changes_nothing_of_the_best(baseline, ranked, monkeypatch):
     refined = []

@@ -329,14 +329,14 @@ def _mechanics(units: Units) -> Iterator[Hypothesis]:
             lambda x: F * abs(float(x[0])),
             "N",
         )
-    if units.forced:
-        yield from _backlash(units)
+    yield from _backlash(units)
     for end in ENDS:
         yield _restitution(end)
 
 
 def _backlash(units: Units) -> Iterator[Hypothesis]:
-    """Play before the joint, and behind it; how its contact yields and knocks is not known."""
+    """Play before the joint, where something pushes it through that, and behind it; how its contact
+    yields and knocks is not known."""
     M, span = units.inertia, units.span
     play = (3e-3, 0.2, 0.002, np.nan, 0.5)
 
@@ -351,15 +351,16 @@ def _backlash(units: Units) -> Iterator[Hypothesis]:
         return Backlash(play=size(x), inertia=inertia, side="motor", share=float(x[2]))
 
     unit = "rad" if units.hinge else "m"
-    yield _effect(
-        "backlash",
-        [play, (np.log(3e-3), np.log(HEAVIEST["load"]), 0.05)],
-        list(product((0.01, 0.03), (np.log(0.03), np.log(0.15)))),
-        before,
-        size,
-        unit,
-        misfit_tolerance=KNOWN_SHAPE,
-    )
+    if units.forced:
+        yield _effect(
+            "backlash",
+            [play, (np.log(3e-3), np.log(HEAVIEST["load"]), 0.05)],
+            list(product((0.01, 0.03), (np.log(0.03), np.log(0.15)))),
+            before,
+            size,
+            unit,
+            misfit_tolerance=KNOWN_SHAPE,
+        )
     load = _effect(
         "backlash",
         [
