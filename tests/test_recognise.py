@@ -480,7 +480,8 @@ BOX = """<mujoco model="{called}"><compiler angle="radian"/><worldbody>
 def chest(folder, called):
     drawn = secrets.SystemRandom()
     half = drawn.uniform(0.2, 0.3)
-    numbers = {"half": half, "front": 2 * half - 0.02, "mass": drawn.uniform(1.5, 4)}
+    mass = drawn.uniform(1.5, 3.4)  # what holds a heavier lid, a hand can hardly open
+    numbers = {"half": half, "front": 2 * half - 0.02, "mass": mass}
     path = folder / f"{called}.xml"
     path.write_text(BOX.format(called=called, widest=drawn.uniform(1.4, 1.9), **numbers))
     return path

@@ -31,7 +31,7 @@ WISHED: dict[str, tuple[ArchetypeEffect, ...]] = {
         part("constant_friction_hinge", (0.1, 1), "it is to stay where left", friction="medium"),
     ),
     "holds_between": (
-        part("constant_friction_hinge", (0.1, 1), "it is to hold there", friction="medium"),
+        part("constant_friction_hinge", (0, 1), "it is to hold there", friction="medium"),
     ),
     "stays_half": (
         part("constant_friction_hinge", (0.3, 0.7), "it is to hold half-way", friction="strong"),
