@@ -10,7 +10,7 @@ from joda.diagnosis.units import units_of
 from joda.estimation.base_model import base_of
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.problem import joint_model_for, posed, segments_for
-from joda.estimation.segmentation import STEPS, _responses, _step, segments_of
+from joda.estimation.segmentation import GROWN, STEPS, _responses, _step, segments_of
 from joda.estimation.segments import GRID
 from joda.estimation.unknowns import EMPTY, NOTHING
 from joda.measured import smoothing
@@ -238,6 +238,76 @@ def test_a_segment_begins_after_a_force_that_changed_between_two_samples(each):
         assert any(0.83 < begin < 0.91 for begin in begins)
         assert not any(row[0] < 0.83 and row[1] > 0.86 for row in _spans(segments))
     assert segments.length == pytest.approx(0.6, abs=0.01)
+
+
+def test_a_segment_begins_after_the_one_jump_of_a_force_that_a_joint_which_sticks_remembers():
+    """A kick of 1 N·s between two samples, once in 4 ms: when it came shifts a joint of 1 kg that
+    sticks soon after by up to 4 mm, 20 times the encoder's noise; an error of every sample's force
+    that moves it as far does not begin one."""
+    rng, t = np.random.default_rng(), 4 * STEP * np.arange(300)
+    alike = 0.3 + 0.2 * np.sin(t) + SIGMA * rng.standard_normal(len(t))
+    kicked = np.where(t < 0.5, 0.0, 10.0) + 0.01 * rng.standard_normal(len(t))
+    uneven = 2.0 * rng.standard_normal(len(t))
+
+    def begins(force):
+        run = Run("run.csv", t, alike, None, force, True)
+        segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP, 0.4)
+        return segments.h * segments.at
+
+    assert np.abs(begins(kicked) - 0.5).min() < 0.01
+    assert np.allclose(begins(uneven), [0.0, 0.4, 0.8], atol=0.01)
+
+
+@pytest.mark.parametrize("rate", [5.0, 20.0, 60.0])
+def test_segments_end_where_an_error_at_their_begins_has_grown_to_a_part_of_the_range(rate):
+    """Errors grow as exp(rate t) where the joint runs away, above the middle of its range."""
+    run = run_of(0.5 + 0.3 * np.sin(np.pi * STEP * np.arange(2000)))
+    diverges = lambda q: np.where(q > 0.5, rate, 0.0)  # noqa: E731
+    segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP, 0.5, diverges=diverges)
+    lengths = np.diff(segments.h * segments.at, append=2.0)
+    most = np.log(GROWN / SIGMA) / rate
+    there = segments.at * segments.h < 0.99
+    assert np.all(lengths[there] < min(most, 0.5) + 0.01)
+    assert lengths[~there] == pytest.approx(0.5, abs=0.01)
+
+
+def test_starts_of_a_joint_that_runs_away_are_found_from_what_is_early_in_a_segment():
+    """On a hill, x'' = 8² x, an error of 3 % in its velocity throws the joint to the other side;
+    beyond 0.3 m it no longer goes on, so that slopes tell nothing of the way back. One of three
+    starts is as far off."""
+    rng, t, rate = np.random.default_rng(), STEP * np.arange(900), 8.0
+    start = np.array([-0.2, 1.6015])
+
+    def moved(start, t):
+        return 0.3 * np.tanh(
+            (start[0] * np.cosh(rate * t) + start[1] * np.sinh(rate * t) / rate) / 0.3
+        )
+
+    class Hill:
+        """The joint on it, exactly."""
+
+        def replay(self, force, at, start, fresh, h, command):
+            ends = np.append(at[1:], len(force))
+            paths = [
+                moved(s, h * np.arange(e - a + 1)) for s, a, e in zip(start, at, ends, strict=True)
+            ]
+            return tuple(
+                np.concatenate([p[own] for p in paths]) for own in (slice(-1), slice(1, None))
+            )
+
+    noises = SIGMA * rng.standard_normal((3, len(t)))
+    runs = [Run("run.csv", t, moved(start, t) + one, None, 0 * t, False) for one in noises]
+    segments = segments_of(runs, 3 * [SIGMA], 2.0, -1.0, 1.0, STEP, 0.9)
+    assert len(segments.at) == 3
+    begun = np.stack([start, start, start - [0.0, 0.05]])
+    doubt = np.tile([10 * SIGMA, 0.1], (3, 1))
+    off = replace(segments, start=begun, prior_std=doubt)
+    estimator = SegmentEstimator(off, np.ones(3, bool))
+    alone = estimator._descended(Hill(), begun, estimator.squares(Hill(), begun)[1], 8)
+    assert np.array_equal(alone.squares > 10 * segments.count, [False, False, True])
+    found = estimator.started(Hill())
+    assert np.all(found.squares < 1.5 * segments.count)
+    assert found.start[:, 1] == pytest.approx(3 * [start[1]], abs=0.01)
 
 
 def squares(runs, moved, **more):

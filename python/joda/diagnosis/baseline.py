@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,14 @@ from joda.profile import Profile
 from joda.scenes.native import Row
 
 Array = NDArray[np.float64]
+
+
+class Cut(Protocol):
+    """Cuts runs into segments."""
+
+    def __call__(self, *, fine: bool) -> Segments:
+        """The segments; `fine`: as of `segments_of`."""
+
 
 CLEARLY, CALM = 10.0, 0.1
 """Gain in loss from which runs tell that MuJoCo made them, in its steps or with a friction that
@@ -219,15 +228,13 @@ def _fitted(
     return _Fitted(estimator, base, fit, given)
 
 
-def _as_made(
-    measured: Measured, length: float | None, near: Array | None, usual: _Fitted
-) -> _Fitted:
+def _as_made(measured: Measured, cut: Cut, near: Array | None, usual: _Fitted) -> _Fitted:
     """The model as MuJoCo moves it, in the scene's steps, or with a friction that yields as its own
     does, where hardly more than noise is left then, and clearly less than of accurate steps that
     are as short; else as it was fitted."""
     segments, alike = usual.estimator.segments, usual
     if stepped := FINER * measured.timestep >= segments.h:
-        segments = segments_for(measured, length, fine=False)
+        segments = cut(fine=False)
         alike = _fitted(measured, segments, near)
     own = measured.own_row if measured.profile.channels.friction.components else None
     rows = (*((None,) if stepped else ()), *((own,) if own else ()))
@@ -240,6 +247,17 @@ def _as_made(
 def fit_baseline(
     measured: Measured, length: float | None = None, near: Array | None = None
 ) -> Baseline:
+    """Fits the model's own strengths to all runs, or curves.
+
+    Args:
+        measured: the joint and its runs.
+        length: of the segments, s; None: by the joint's pace.
+        near: see `fit_segments`.
+    """
+    return fit_segments(measured, partial(segments_for, measured, length), near)
+
+
+def fit_segments(measured: Measured, cut: Cut, near: Array | None = None) -> Baseline:
     """Fits the model's own strengths.
 
     Where the runs are clearly such as MuJoCo makes them, it is simulated in the scene's own steps,
@@ -248,13 +266,13 @@ def fit_baseline(
 
     Args:
         measured: the joint and its runs.
-        length: of the segments, s; None: by the joint's pace.
-        near: factors of the strengths with which a fit begins besides, as shorter segments told
+        cut: the segments.
+        near: factors of the strengths with which a fit begins besides, as other segments told
             them: in longer ones a model that is far off is fitted less easily.
     """
-    found = _fitted(measured, segments_for(measured, length), near)
+    found = _fitted(measured, cut(fine=True), near)
     if measured.runs:
-        found = _as_made(measured, length, near, found)
+        found = _as_made(measured, cut, near, found)
     estimator, base = found.estimator, found.base
     every = hypotheses(units_of(estimator.segments, measured), measured.templates, measured.profile)
     points = initial_points(estimator.coarser, base.coarser(), found.given, found.fit)

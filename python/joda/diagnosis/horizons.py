@@ -3,11 +3,13 @@ or name no effect for sure."""
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
+from numpy.typing import NDArray
 
-from joda.diagnosis.baseline import Baseline, fit_baseline
+from joda.diagnosis.baseline import Baseline, fit_baseline, fit_segments
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.free_runs import FreeRuns, free_runs
 from joda.diagnosis.plausible import Needs
@@ -23,12 +25,23 @@ from joda.diagnosis.selection import (
     doubted,
     second_counts,
 )
+from joda.estimation.problem import posed, segments_for
+from joda.estimation.segmentation import shortest
+from joda.estimation.segments import Segments
 from joda.measured.instability import longest_followed
 from joda.measured.measured_joint import Measured
 from joda.profile import Profile
 
+Array = NDArray[np.float64]
+
 LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5
 """How much longer the segments of each further look are, at the least, and at most how long, s."""
+SHORTER, FOLLOWED = 9.0, (2.0, 3.0)
+"""How much shorter those are in which what is unexplained is asked first, and how much longer than
+these those in which what they tell must hold."""
+RUNAWAY, TELLING = 1.0, 50
+"""What the best effect leaves per sample, from which it is; and of how many segments that are
+missed most, and how many others."""
 FURTHER = 2
 """How many looks longer those are that follow where something is unexplained."""
 LOOSELY = 3.0
@@ -96,6 +109,10 @@ def looked(
     selection = decide(found[0], strictness)
     first = ranking, selection
     free = None if selection.likely else free_runs(measured, ranking.baseline)
+    if measured.runs and selection.verdict == "unexplained":
+        shorter = _in_shorter(measured, needs, ranking, exclude, progress)
+        if shorter is not None:
+            return HorizonSearch(*shorter[:2], first, (*found, *shorter[2]), free)
     longer = _longer(measured, ranking.baseline)
     if selection.verdict != "missing_effect":
         drifts = bool(free and free.drifting)
@@ -126,6 +143,58 @@ def _unsure(ranking: Ranking, selection: Selection) -> bool:
     as what is wrong besides adds up in longer segments."""
     calm = ranking.level <= WORST
     return calm and selection.verdict == "missing_effect" and selection.probabilities[0] <= SURE
+
+
+def _in_shorter(
+    measured: Measured,
+    needs: Needs,
+    before: Ranking,
+    exclude: Collection[str],
+    progress: Progress,
+) -> tuple[Ranking, Selection, list[Evidence]] | None:
+    """What much shorter segments tell, where that holds in all of them, too, and as long as a joint
+    that moves so can be followed; None where nothing does.
+
+    What is missing, as a detent of a light knob, may drive the joint away so fast that a fit does
+    not come back from there within usual segments.
+    """
+    usual, own = before.baseline.estimator.segments.length, before.baseline.fit.x
+    length = max(usual / SHORTER, shortest(measured.runs))
+    if evidence(before).left[:1] < (RUNAWAY,) or length * FOLLOWED[-1] > usual:
+        return None
+    telling = fit_segments(measured, partial(_telling, measured, length, own), own)
+    if not telling.estimator.samples:
+        return None
+    ranking = ranked(needs, telling, exclude, progress, hopeful)
+    found = [evidence(ranking)]
+    selection = decide(found[0], SETTINGS.strictly, wholly=True)
+    for longer in FOLLOWED:
+        if selection.verdict != "missing_effect":
+            return None
+        first = ranking.candidates[0]
+        moved = replace(measured, profile=first.written(ranking.baseline.base))
+        cut = partial(segments_for, moved, longer * length)
+        closer = narrowed(fit_segments(measured, cut, ranking.baseline.fit.x), ranking, progress)
+        found.append(evidence(closer))
+        selection, ranking = decide(found[-1]), closer
+        if selection.effects[:1] != (first.hypothesis.effect,):
+            return None
+    return (ranking, selection, found) if selection.verdict == "missing_effect" else None
+
+
+def _telling(measured: Measured, length: float, near: Array, *, fine: bool) -> Segments:
+    """Of all segments of a length (s), those that a model with factors `near` misses most, and as
+    many of the others, evenly."""
+    segments = segments_for(measured, length, fine)
+    estimator, base = posed(measured, segments)
+    squares = estimator.begun(base.simulator, near).squares
+    each = np.where(estimator.counts, squares / np.maximum(segments.count, 1), -np.inf)
+    order = np.argsort(-each)[: np.count_nonzero(estimator.counts)]
+    others = np.sort(order[TELLING:])
+    every = max(len(others) // TELLING, 1)
+    kept = np.full(len(each), not len(order))
+    kept[order[:TELLING]] = kept[others[::every]] = True
+    return segments.only(kept)
 
 
 def _longer(measured: Measured, baseline: Baseline) -> Iterator[Baseline]:

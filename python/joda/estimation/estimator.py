@@ -34,6 +34,10 @@ LOSS_TOLERANCE = 0.5
 """Decrease of the loss below which a fit has converged."""
 STARTED = 0.05
 """Decrease of the squares that is still to be expected, below which starts are fitted."""
+EARLY, MISSED, FEW_MISSED = 0.25, 4.0, 0.5
+"""By that part of a segment its start is sought too, where it leaves so many times the squares that
+noise makes, and no more than a part of all segments does: a joint that runs away soon misses all of
+a long one, wherever it began."""
 STATE_STEP = 0.01
 """Finite-difference step, in prior standard deviations of the initial state."""
 ROWS = ((0, 1), (0, 1))
@@ -274,6 +278,27 @@ class SegmentEstimator:
             from_other = self.squares(simulator, other)[1]
             start = np.where((from_other < squares)[:, None], other, start)
             squares = np.minimum(from_other, squares)
+        found = self._descended(simulator, start, squares, iterations)
+        missed = self.tells & (found.squares > MISSED * segments.count)
+        if 0 < missed.sum() < FEW_MISSED * self.tells.sum():
+            part = segments.only(missed).first(EARLY)
+            early = SegmentEstimator(part, np.ones(len(part.at), bool))
+            own, start = early.segments.start, found.start.copy()
+            begun = early._descended(simulator, own, early.squares(simulator, own)[1], iterations)
+            start[missed] = begun.start
+            squares = self.squares(simulator, start)[1]
+            better = squares < found.squares
+            if better.any():
+                start = np.where(better[:, None], start, found.start)
+                squares = np.minimum(squares, found.squares)
+                found = self._descended(simulator, start, squares, iterations)
+        return found
+
+    def _descended(
+        self, simulator: Simulator, start: Array, squares: Array, iterations: int
+    ) -> Fit:
+        """Starts from which a joint misses less, each segment by itself, and what is left then."""
+        segments = self.segments
         damping, unit = np.full(len(start), 1e-3), np.eye(start.shape[1])
         for _ in range(iterations):
             about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from joda.estimation.segments import GRID, LOOSE, Array, Integers, Segments, rows_of
 from joda.measured import smoothing
@@ -38,6 +39,14 @@ SURE = 0.1
 JOLTED = 0.03
 """Part of the range by which errors of the force, alone, may move the joint within a segment; where
 they would more, as where a hand pulls up between two samples, a segment begins after them."""
+JUMPED = 10.0
+"""Noises by which a single one may, where it is more than all others together: one that sticks soon
+after stays where it was moved to, and a free one goes on.
+"""
+GROWN, LEAST_GROWTH = 0.03, 0.7
+"""Part of the range to which the noise of a segment's begin may grow until its end, in a joint that
+runs away from where it is: so far the slopes hold by which a fit goes. By that factor's logarithm
+at least it may."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a segment's samples share it."""
 BEYOND = 4.0
@@ -97,7 +106,10 @@ def segments_of(
             place = (time - time[0]) / h
             index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
             spread, push = _spread(time, position, sigma), run.part(piece).force_error()
-            begins = _after_jolts(begins, index, time, push / inertia, JOLTED * span)
+            far = JOLTED * span, JUMPED * float(np.median(spread))
+            begins = _after_jolts(begins, index, time, push / inertia, *far)
+            grows = max(float(np.log(GROWN * span / np.median(spread))), LEAST_GROWTH)
+            begins = _while_followed(begins, index, time, diverges(position), grows)
             place_noise = (position - lo) / span, spread / span
             begins, hits = _before_knocks(begins, index, *place_noise)
             begins = _after_pressing(begins, index, *place_noise)
@@ -198,15 +210,19 @@ def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
     """Of the segments, by the joint's usual speed and the sampling, s."""
     pairs = list(zip(runs, sigmas, strict=True))
     speeds = np.concatenate([_speeds(run, sigma, SHORTEST / 2) for run, sigma in pairs])
-    shortest = SHORTEST
+    quickest = SHORTEST
     fastest = min(smoothing.pace(run.time, run.position, sigma) for run, sigma in pairs)
     if fastest < QUICK * SHORTEST:
-        shortest = fastest / QUICK
-        speeds = np.concatenate([_speeds(run, sigma, shortest / 2) for run, sigma in pairs])
+        quickest = fastest / QUICK
+        speeds = np.concatenate([_speeds(run, sigma, quickest / 2) for run, sigma in pairs])
     usual = float(np.median(speeds)) if len(speeds) else 0.0
     length = TRAVEL * span / usual if usual else LONGEST
-    gaps = np.concatenate([np.diff(run.time) for run in runs])
-    return max(min(max(length, shortest), LONGEST), FEWEST * float(np.median(gaps)))
+    return max(min(max(length, quickest), LONGEST), shortest(runs))
+
+
+def shortest(runs: Sequence[Run]) -> float:
+    """How long segments of runs are at least for their samples to tell of the joint, s."""
+    return FEWEST * float(np.median(np.concatenate([np.diff(run.time) for run in runs])))
 
 
 def _speeds(run: Run, sigma: float, apart: float) -> Array:
@@ -308,10 +324,11 @@ def _responses(t: Array, gaps: Array, rate: Array) -> Array:
 
 
 def _after_jolts(
-    begins: Integers, index: Integers, time: Array, push: Array, far: float
+    begins: Integers, index: Integers, time: Array, push: Array, far: float, alone: float
 ) -> Integers:
     """Where segments begin, also after errors `push` (of an acceleration, from each sample to the
-    next) that would move a free joint further than `far` until the segment ends."""
+    next) that would move a free joint further than `far` until the segment ends, or one of them
+    further than all others and than `alone`."""
     jolts = np.diff(time, append=time[-1]) * push
     at = 0
     out = list(begins)
@@ -319,13 +336,32 @@ def _after_jolts(
         first = np.searchsorted(index, out[at])
         end = np.searchsorted(index, out[at + 1]) if at + 1 < len(out) else len(index)
         moved = jolts[first : end - 1] * (time[end - 1] - time[first : end - 1])
-        begin = out[at]
-        if np.sqrt(np.sum(moved**2)) > far:
+        begin, both = out[at], np.sum(moved**2)
+        if np.sqrt(both) > far or (max(moved, default=0.0) > max(alone, np.sqrt(both / 2))):
             begin = index[first + int(np.argmax(moved)) + 1] // GRID * GRID
         if begin > out[at]:
             out.insert(at + 1, begin)
         else:
             at += 1
+    return np.array(out)
+
+
+def _while_followed(
+    begins: Integers, index: Integers, time: Array, rate: Array, most: float
+) -> Integers:
+    """Where segments begin, also where an error at a segment's begin, in a joint that runs away at
+    a `rate`, has grown by more than the exponential of `most`."""
+    grown = cumulative_trapezoid(rate, time, initial=0.0)
+    at, out = 0, list(begins)
+    while at < len(out):
+        first = np.searchsorted(index, out[at])
+        end = np.searchsorted(index, out[at + 1]) if at + 1 < len(out) else len(index)
+        own = grown[first:end] - grown[min(first, len(grown) - 1)]
+        over = first + int(np.searchsorted(own, most, side="right"))
+        begin = index[over] // GRID * GRID if over < end else out[at]
+        if begin > out[at]:
+            out.insert(at + 1, begin)
+        at += 1
     return np.array(out)
 
 

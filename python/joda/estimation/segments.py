@@ -165,6 +165,18 @@ class Segments:
             rests=self.rests[kept],
         )
 
+    def first(self, part: float) -> "Segments":
+        """The same with that part of each segment's samples only, from its begin, and a force as if
+        it had no noise: it has hardly moved the joint yet."""
+        many = np.maximum(part * self.count, MIN_SAMPLES)
+        kept = np.arange(self.rows.shape[1]) < many[:, None]
+        return replace(
+            self,
+            rows=np.where(kept, self.rows, -1),
+            sharpness=np.where(kept, self.sharpness, 0.0),
+            shared=self.shared[:, :, :0],
+        )
+
     def misfit(self, simulator: Simulator, start: Array) -> Array:
         """Predicted minus measured positions, rad or m, shape (n,); where the joint stays at an
         end, only how far it is said to leave that by more than noise."""
