@@ -54,7 +54,7 @@ class HorizonSearch:
 
     Attributes:
         ranking, selection: of the look that counts.
-        first: the first look's ranking, and what it says.
+        first: the first look's ranking, and what it says; of the shorter ones where these count.
         evidence: of each look.
         free: what free runs as a whole say, where segments name nothing for sure; else None.
     """
@@ -112,7 +112,7 @@ def looked(
     if measured.runs and selection.verdict == "unexplained":
         shorter = _in_shorter(measured, needs, ranking, exclude, progress)
         if shorter is not None:
-            return HorizonSearch(*shorter[:2], first, (*found, *shorter[2]), free)
+            return HorizonSearch(*shorter[:2], shorter[:2], (*found, *shorter[2]), free)
     longer = _longer(measured, ranking.baseline)
     if selection.verdict != "missing_effect":
         drifts = bool(free and free.drifting)
@@ -167,9 +167,9 @@ def _in_shorter(
         return None
     ranking = ranked(needs, telling, exclude, progress, hopeful)
     found = [evidence(ranking)]
-    selection = decide(found[0], SETTINGS.strictly, wholly=True)
+    selection = decide(found[0])
     for longer in FOLLOWED:
-        if selection.verdict != "missing_effect":
+        if selection.verdict == "adequate" or not hopeful(ranking):
             return None
         first = ranking.candidates[0]
         moved = replace(measured, profile=first.written(ranking.baseline.base))
