@@ -280,9 +280,9 @@ class SegmentEstimator:
             squares = np.minimum(from_other, squares)
         found = self._descended(simulator, start, squares, iterations)
         missed = self.tells & (found.squares > MISSED * segments.count)
-        if 0 < missed.sum() < FEW_MISSED * self.tells.sum():
+        if segments.separable and 0 < missed.sum() < FEW_MISSED * self.tells.sum():
             part = segments.only(missed).first(EARLY)
-            early = SegmentEstimator(part, np.ones(len(part.at), bool))
+            early = replace(self, segments=part, counts=np.ones(len(part.at), bool))
             own, start = early.segments.start, found.start.copy()
             begun = early._descended(simulator, own, early.squares(simulator, own)[1], iterations)
             start[missed] = begun.start

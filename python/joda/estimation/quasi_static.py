@@ -28,6 +28,11 @@ class CurveWindows(Segments):
 
     model: Callable[[Profile], Array]
 
+    @property
+    def separable(self) -> bool:
+        """Not needed: nothing begins anywhere."""
+        return False
+
     def coarser(self) -> "CurveWindows":
         """Themselves: nothing moves."""
         return self

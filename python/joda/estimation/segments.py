@@ -100,6 +100,11 @@ class Segments:
         """Whether a hand or an actuator moved the joint."""
         return self.command is not None or bool(self.force.any())
 
+    @property
+    def separable(self) -> bool:
+        """Whether some can be simulated without the others: those of one joint, see `only`."""
+        return self.start.shape[1] == 2
+
     @cached_property
     def count(self) -> Integers:
         """Samples of each segment, shape (m,)."""
