@@ -103,7 +103,7 @@ class Segments:
     @property
     def separable(self) -> bool:
         """Whether some can be simulated without the others: those of one joint, see `only`."""
-        return self.start.shape[1] == 2
+        return bool(self.start.shape[1] == 2)
 
     @cached_property
     def count(self) -> Integers:
