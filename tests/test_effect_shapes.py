@@ -50,7 +50,7 @@ def over_centre(rng):
     yield shapes.Strut(middle, rng.uniform(0.2, 0.6), rng.uniform(1.5, 3.0), 0.0)
     yield shapes.Strut(middle, 0.4, rng.uniform(1.5, 3.0), rng.uniform(1.4, 1.9))
     yield shapes.Sine(middle, rng.uniform(1.1, 2.4))
-    yield shapes.Cubic(middle, rng.uniform(0.42, 0.8))
+    yield shapes.Cubic(middle, rng.uniform(0.9 * max(middle, 1 - middle), 0.8))
 
 
 def test_an_over_centre_mechanism_has_two_sides(rng):

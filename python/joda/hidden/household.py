@@ -124,7 +124,9 @@ def _two_wells(sampler: Sampler) -> Shape:
 
 
 def _dead_centre(sampler: Sampler) -> Shape:
-    return shapes.Cubic(sampler.between(0.4, 0.6), sampler.between(0.42, 0.8))
+    middle = sampler.between(0.4, 0.6)
+    longer = max(middle, 1 - middle)  # it rests at the ends or, at most a little, short of them
+    return shapes.Cubic(middle, sampler.between(0.9 * longer, 0.8))
 
 
 def _to_end(pull: forms.ShapeOf, high: bool) -> forms.ShapeOf:

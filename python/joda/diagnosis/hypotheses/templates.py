@@ -295,7 +295,7 @@ def _bistable(units: Units, name: str) -> Hypothesis:
         part = Component(label=name, interval=(0, 1), x=tuple(map(float, at)), y=tuple(y))
         return profile.with_component("conservative", part)
 
-    far, end = (0.15, 0.85, 0.01), (0.0, 1.8, 0.02)
+    far, end = (0.15, 0.85, 0.01), (-1.0, 1.8, 0.02)
     own = known(unknowns_of(STRENGTH, (0.2, 0.8, 0.01), far, far, end, end, LEAN), 6, 0, USUAL_LEAN)
     for side in (4, 5):
         own = known(own, side, *USUAL_END)
