@@ -10,13 +10,12 @@ from joda.commands.templates import templates
 from joda.diagnosis import baseline as fits
 from joda.diagnosis import search
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.horizons import hopeful
 from joda.diagnosis.hypotheses import Units, hypotheses
 from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
 from joda.diagnosis.hypotheses.effects import KNOTS, from_effects
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside, joined, price
-from joda.diagnosis.ranking import WORST, evidence, weigh
+from joda.diagnosis.ranking import WORST, evidence, hopeful, weigh
 from joda.diagnosis.search import NARROWED, WELLS, _shown_without_impacts, narrowed, rank
 from joda.diagnosis.selection import Evidence, Selection, closer_counts, decide, doubted
 from joda.diagnosis.verdict import diagnosed

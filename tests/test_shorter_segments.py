@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from joda.diagnosis.baseline import fit_baseline, fit_segments
-from joda.diagnosis.horizons import TELLING, _telling
+from joda.diagnosis.shorter_segments import TELLING, telling
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
@@ -87,7 +87,7 @@ def test_some_of_the_segments_tell_most(tmp_path):
     measured = knob(tmp_path, rng, 0.02, 0.3, 2.4, count=3)
     usual = fit_baseline(measured)
     length = usual.estimator.segments.length / 9
-    some = fit_segments(measured, partial(_telling, measured, length, usual.fit.x), usual.fit.x)
+    some = fit_segments(measured, partial(telling, measured, length, usual.fit.x), usual.fit.x)
     whole = fit_baseline(measured, length, usual.fit.x)
     every = whole.estimator.begun(whole.base.simulator, usual.fit.x).squares
     own = some.estimator.begun(some.base.simulator, usual.fit.x).squares

@@ -135,9 +135,9 @@ def add_effect(
         return AddedEffect(train.profile, None, before, before, reason)
     progress("the effect's own numbers")
     given = given or train.profile
-    trials = Trials(train, held, bounces=effect == RESTITUTION)
     baseline = fit_baseline(train)
     begin = starts(baseline, effect, direction, near)
+    trials = Trials(train, held, effect == RESTITUTION, begin[0] if begin else None)
     tried = [one for start in begin for one in trials.reshaped(start, effect, progress)]
     loss = trials.unseen.loss(train.profile)
 
@@ -219,7 +219,7 @@ def by_all(
     more = departures(measured.profile, anew, effect, near)
     if len(more.sentences) > len(departs.sentences):
         return profile
-    return min(profile, anew, key=Likelihood(measured, bouncy(profile)).loss)
+    return min(profile, anew, key=Likelihood(measured, bouncy(profile), profile).loss)
 
 
 def fallen(before: Error, after: Error) -> bool:

@@ -1,7 +1,7 @@
 """Looks at the measurements: in the usual segments, and in longer ones where these leave a question
 or name no effect for sure."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -9,11 +9,11 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.baseline import Baseline, fit_baseline, fit_segments
+from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.free_runs import FreeRuns, free_runs
 from joda.diagnosis.plausible import Needs
-from joda.diagnosis.ranking import WORST, Ranking, evidence, shows, weigh
+from joda.diagnosis.ranking import WORST, Ranking, evidence, hopeful, shows
 from joda.diagnosis.search import Progress, always, narrowed, rank
 from joda.diagnosis.selection import (
     SETTINGS,
@@ -25,23 +25,14 @@ from joda.diagnosis.selection import (
     doubted,
     second_counts,
 )
-from joda.estimation.problem import posed, segments_for
-from joda.estimation.segmentation import shortest
-from joda.estimation.segments import Segments
+from joda.diagnosis.shorter_segments import in_shorter, runs_away
 from joda.measured.instability import longest_followed
 from joda.measured.measured_joint import Measured
-from joda.profile import Profile
 
 Array = NDArray[np.float64]
 
 LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5
 """How much longer the segments of each further look are, at the least, and at most how long, s."""
-SHORTER, FOLLOWED = 9.0, (2.0, 3.0)
-"""How much shorter those are in which what is unexplained is asked first, and how much longer than
-these those in which what they tell must hold."""
-RUNAWAY, TELLING = 1.0, 50
-"""What the best effect leaves per sample, from which it is; and of how many segments that are
-missed most, and how many others."""
 FURTHER = 2
 """How many looks longer those are that follow where something is unexplained."""
 LOOSELY = 3.0
@@ -66,27 +57,6 @@ class HorizonSearch:
     free: FreeRuns | None = None
 
 
-def ranked(
-    needs: Needs,
-    model: Baseline,
-    exclude: Collection[str],
-    progress: Progress,
-    promising: Callable[[Ranking], bool] = always,
-) -> Ranking:
-    """What a model may lack that needs no more force than the measurements can; `promising`: as of
-    `rank`."""
-
-    def possible(profile: Profile, effect: str) -> bool:
-        return not needs.exceeded(needs.exerted(profile, effect))
-
-    return rank(model, exclude, progress, promising, possible)
-
-
-def hopeful(few: Ranking) -> bool:
-    """Whether, by the best effects that are fitted, some might explain the runs."""
-    return sum(weigh(few).probabilities) > SETTINGS.hope
-
-
 def looked(
     measured: Measured,
     exclude: Collection[str],
@@ -102,24 +72,29 @@ def looked(
         progress: how much is done, of how much, and what.
         baseline: the model fitted to them, in usual segments; None: it is fitted.
     """
-    needs = Needs(measured)
-    ranking = ranked(needs, baseline or fit_baseline(measured), exclude, progress)
+    possible = Needs(measured).allow
+    ranking = rank(baseline or fit_baseline(measured), exclude, progress, possible=possible)
     strictness = LOOSELY if moved_one_way(measured) else 1.0
     found = [evidence(ranking)]
     selection = decide(found[0], strictness)
     first = ranking, selection
     free = None if selection.likely else free_runs(measured, ranking.baseline)
-    if measured.runs and selection.verdict == "unexplained":
-        shorter = _in_shorter(measured, needs, ranking, exclude, progress)
+    if measured.runs and runs_away(found[0], selection):
+        ask = partial(
+            rank, exclude=exclude, progress=progress, promising=hopeful, possible=possible
+        )
+        shorter = in_shorter(measured, ranking.baseline, ask, strictness, progress)
         if shorter is not None:
-            return HorizonSearch(*shorter[:2], shorter[:2], (*found, *shorter[2]), free)
+            own, anew, each = shorter
+            return HorizonSearch(own, anew, (own, anew), (*found, *each), free)
     longer = _longer(measured, ranking.baseline)
     if selection.verdict != "missing_effect":
         drifts = bool(free and free.drifting)
         other = _shown(longer, first, drifts) if measured.runs else _noisier(measured, first)
         if other is not None:
             puzzled = selection.verdict == "unexplained" and bool(measured.runs)
-            again = ranked(needs, other, exclude, progress, hopeful if puzzled else always)
+            promising = hopeful if puzzled else always
+            again = rank(other, exclude, progress, promising, possible)
             found.append(evidence(again))
             if measured.runs:
                 anew = decide(found[-1], SETTINGS.strictly, wholly=True)
@@ -143,58 +118,6 @@ def _unsure(ranking: Ranking, selection: Selection) -> bool:
     as what is wrong besides adds up in longer segments."""
     calm = ranking.level <= WORST
     return calm and selection.verdict == "missing_effect" and selection.probabilities[0] <= SURE
-
-
-def _in_shorter(
-    measured: Measured,
-    needs: Needs,
-    before: Ranking,
-    exclude: Collection[str],
-    progress: Progress,
-) -> tuple[Ranking, Selection, list[Evidence]] | None:
-    """What much shorter segments tell, where that holds in all of them, too, and as long as a joint
-    that moves so can be followed; None where nothing does.
-
-    What is missing, as a detent of a light knob, may drive the joint away so fast that a fit does
-    not come back from there within usual segments.
-    """
-    usual, own = before.baseline.estimator.segments.length, before.baseline.fit.x
-    length = max(usual / SHORTER, shortest(measured.runs))
-    if evidence(before).left[:1] < (RUNAWAY,) or length * FOLLOWED[-1] > usual:
-        return None
-    telling = fit_segments(measured, partial(_telling, measured, length, own), own)
-    if not telling.estimator.samples:
-        return None
-    ranking = ranked(needs, telling, exclude, progress, hopeful)
-    found = [evidence(ranking)]
-    selection = decide(found[0])
-    for longer in FOLLOWED:
-        if selection.verdict == "adequate" or not hopeful(ranking):
-            return None
-        first = ranking.candidates[0]
-        moved = replace(measured, profile=first.written(ranking.baseline.base))
-        cut = partial(segments_for, moved, longer * length)
-        closer = narrowed(fit_segments(measured, cut, ranking.baseline.fit.x), ranking, progress)
-        found.append(evidence(closer))
-        selection, ranking = decide(found[-1]), closer
-        if selection.effects[:1] != (first.hypothesis.effect,):
-            return None
-    return (ranking, selection, found) if selection.verdict == "missing_effect" else None
-
-
-def _telling(measured: Measured, length: float, near: Array, *, fine: bool) -> Segments:
-    """Of all segments of a length (s), those that a model with factors `near` misses most, and as
-    many of the others, evenly."""
-    segments = segments_for(measured, length, fine)
-    estimator, base = posed(measured, segments)
-    squares = estimator.begun(base.simulator, near).squares
-    each = np.where(estimator.counts, squares / np.maximum(segments.count, 1), -np.inf)
-    order = np.argsort(-each)[: np.count_nonzero(estimator.counts)]
-    others = np.sort(order[TELLING:])
-    every = max(len(others) // TELLING, 1)
-    kept = np.full(len(each), not len(order))
-    kept[order[:TELLING]] = kept[others[::every]] = True
-    return segments.only(kept)
 
 
 def _longer(measured: Measured, baseline: Baseline) -> Iterator[Baseline]:

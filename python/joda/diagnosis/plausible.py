@@ -169,6 +169,10 @@ class Needs:
         """Whether a force (N·m or N) is far more than the runs can need."""
         return force > EXCESS * self.force
 
+    def allow(self, profile: Profile, effect: str) -> bool:
+        """Whether an effect of a profile exerts no more than the runs can need."""
+        return not self.exceeded(self.exerted(profile, effect))
+
     def unresisted(self, profile: Profile) -> bool:
         """Whether a fit has taken nearly all resistance from a joint that moves by itself."""
         return not self.forced and self._resisted(profile) < RESISTED * self.resistance

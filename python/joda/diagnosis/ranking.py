@@ -124,6 +124,11 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Se
     return decide(evidence(ranking), strictness, wholly)
 
 
+def hopeful(few: Ranking) -> bool:
+    """Whether, by the best effects that are fitted, some might explain the runs."""
+    return sum(weigh(few).probabilities) > SETTINGS.hope
+
+
 def shows(first: Ranking, longer: Baseline, settings: Settings = SETTINGS) -> bool:
     """Whether more than noise is left of longer segments, be noise what was taken for it or what
     the best candidate left of a first ranking's segments, for each degree of freedom."""

@@ -62,18 +62,21 @@ fitted to data makes them 20 times likelier than the true one does in one of 20 
 class Likelihood:
     """Of measured runs, as MuJoCo would move the joint at the scene's own step, or of curves."""
 
-    def __init__(self, measured: Measured, bounces: bool = False) -> None:
+    def __init__(
+        self, measured: Measured, bounces: bool = False, moved_by: Profile | None = None
+    ) -> None:
         """Cuts the runs into segments.
 
         Args:
             measured: the joint and its runs or curves.
             bounces: whether segments count that tell of an end of the range alone; so they do
                 where there are no others.
+            moved_by: profile with which the joint can be followed to the end of each segment; None:
+                its own.
         """
-        self.joint_model, self.segments = (
-            as_it_is(measured),
-            segments_for(measured, LONGEST, fine=False),
-        )
+        followed = measured.changed(moved_by or measured.profile)
+        self.joint_model = as_it_is(measured)
+        self.segments = segments_for(followed, LONGEST, fine=False)
         self.estimator = SegmentEstimator(
             self.segments, _counted(self.segments, bounces or not self.segments.usable.any())
         )
@@ -105,11 +108,17 @@ class Tried:
 class Trials:
     """Scores profiles of a joint."""
 
-    def __init__(self, train: Measured, held: Measured, bounces: bool = False) -> None:
+    def __init__(
+        self,
+        train: Measured,
+        held: Measured,
+        bounces: bool = False,
+        moved_by: Profile | None = None,
+    ) -> None:
         """Args: the joint and runs to fit; the same with runs held out; see `Likelihood`."""
         self.train = train
         bounces = bounces or bouncy(train.profile)
-        self.seen, self.unseen = Likelihood(train, bounces), Likelihood(held, bounces)
+        self.seen, self.unseen = (Likelihood(one, bounces, moved_by) for one in (train, held))
         longer = LONGER if train.runs else (1.0,)  # curves' segments are all alike
         usual_length = segments_for(train).length
         self.lengths = [factor * usual_length for factor in longer]
@@ -262,12 +271,12 @@ def refitted(
     Args:
         train: measured.
         profile: its shapes are kept.
-        length: of segments, s.
+        length: of segments, s; shorter where the joint with this profile runs away.
         parts: whose numbers stay as they are.
         law: the same curves, of fewer numbers: where no run was they are off it as much as beside.
             None: the profile's.
     """
-    segments = segments_for(train, length, fine=False)  # at the scene's own step
+    segments = segments_for(train.changed(profile), length, fine=False)  # at the scene's own step
     estimator = SegmentEstimator(segments, _counted(segments, bouncy(profile)))
     if not estimator.counts.any():
         return profile

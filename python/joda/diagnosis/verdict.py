@@ -26,14 +26,14 @@ from joda.diagnosis.experiments import Model, means_of, next_experiment, there_a
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
-from joda.diagnosis.horizons import HorizonSearch, hopeful, looked, ranked
+from joda.diagnosis.horizons import HorizonSearch, looked
 from joda.diagnosis.hypothesis_fits import joined
 from joda.diagnosis.joint_calibration import jointly, needed
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.plausible import Needs, unseen_place
-from joda.diagnosis.ranking import Ranking, weigh
+from joda.diagnosis.ranking import Ranking, hopeful, weigh
 from joda.diagnosis.rivals import indistinguishable
-from joda.diagnosis.search import Progress
+from joda.diagnosis.search import Progress, rank
 from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection
 from joda.diagnosis.summary import BOUNCY, FALLEN, SAME, far_off, helps, other_unit, summarised
 from joda.diagnosis.uncertainty import uncertainty
@@ -204,7 +204,7 @@ def _together(
     if not (measured.runs and widths):
         return None
     free = replace(measured, doubtful=widths)
-    ranking = ranked(Needs(measured), fit_baseline(free), exclude, progress, hopeful)
+    ranking = rank(fit_baseline(free), exclude, progress, hopeful, Needs(measured).allow)
     if not weigh(ranking).likely:
         return None
     other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))

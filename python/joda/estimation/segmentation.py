@@ -9,6 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from joda.estimation.segments import GRID, LOOSE, Array, Integers, Segments, rows_of
 from joda.measured import smoothing
+from joda.measured.instability import bearable
 from joda.measured.runs import STOP, Run, held, known
 
 SHORTEST, LONGEST = 0.1, 0.5
@@ -43,10 +44,6 @@ JUMPED = 10.0
 """Noises by which a single one may, where it is more than all others together: one that sticks soon
 after stays where it was moved to, and a free one goes on.
 """
-GROWN, LEAST_GROWTH = 0.03, 0.7
-"""Part of the range to which the noise of a segment's begin may grow until its end, in a joint that
-runs away from where it is: so far the slopes hold by which a fit goes. By that factor's logarithm
-at least it may."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a segment's samples share it."""
 BEYOND = 4.0
@@ -108,7 +105,7 @@ def segments_of(
             spread, push = _spread(time, position, sigma), run.part(piece).force_error()
             far = JOLTED * span, JUMPED * float(np.median(spread))
             begins = _after_jolts(begins, index, time, push / inertia, *far)
-            grows = max(float(np.log(GROWN * span / np.median(spread))), LEAST_GROWTH)
+            grows = bearable(span, float(np.median(spread)))
             begins = _while_followed(begins, index, time, diverges(position), grows)
             place_noise = (position - lo) / span, spread / span
             begins, hits = _before_knocks(begins, index, *place_noise)
@@ -330,20 +327,15 @@ def _after_jolts(
     next) that would move a free joint further than `far` until the segment ends, or one of them
     further than all others and than `alone`."""
     jolts = np.diff(time, append=time[-1]) * push
-    at = 0
-    out = list(begins)
-    while at < len(out):
-        first = np.searchsorted(index, out[at])
-        end = np.searchsorted(index, out[at + 1]) if at + 1 < len(out) else len(index)
+
+    def after(first: int, end: int) -> int:
         moved = jolts[first : end - 1] * (time[end - 1] - time[first : end - 1])
-        begin, both = out[at], np.sum(moved**2)
+        both = np.sum(moved**2)
         if np.sqrt(both) > far or (max(moved, default=0.0) > max(alone, np.sqrt(both / 2))):
-            begin = index[first + int(np.argmax(moved)) + 1] // GRID * GRID
-        if begin > out[at]:
-            out.insert(at + 1, begin)
-        else:
-            at += 1
-    return np.array(out)
+            return first + int(np.argmax(moved)) + 1
+        return end
+
+    return _cut_more(begins, index, after)
 
 
 def _while_followed(
@@ -352,16 +344,26 @@ def _while_followed(
     """Where segments begin, also where an error at a segment's begin, in a joint that runs away at
     a `rate`, has grown by more than the exponential of `most`."""
     grown = cumulative_trapezoid(rate, time, initial=0.0)
+
+    def after(first: int, end: int) -> int:
+        return first + int(np.searchsorted(grown[first:end], grown[first] + most, side="right"))
+
+    return _cut_more(begins, index, after)
+
+
+def _cut_more(begins: Integers, index: Integers, after: Callable[[int, int], int]) -> Integers:
+    """Where segments begin, also at the sample that `after` tells of the first one of a segment and
+    that of the next; there none more begins where it tells that one."""
     at, out = 0, list(begins)
     while at < len(out):
-        first = np.searchsorted(index, out[at])
-        end = np.searchsorted(index, out[at + 1]) if at + 1 < len(out) else len(index)
-        own = grown[first:end] - grown[min(first, len(grown) - 1)]
-        over = first + int(np.searchsorted(own, most, side="right"))
-        begin = index[over] // GRID * GRID if over < end else out[at]
+        first = int(np.searchsorted(index, out[at]))
+        end = int(np.searchsorted(index, out[at + 1])) if at + 1 < len(out) else len(index)
+        sample = after(first, end) if first < end else end
+        begin = index[sample] // GRID * GRID if sample < end else out[at]
         if begin > out[at]:
             out.insert(at + 1, begin)
-        at += 1
+        else:
+            at += 1
     return np.array(out)
 
 

@@ -27,7 +27,7 @@ def longest_followed(measured: Measured, most: float) -> float:
     if not measured.runs:
         return most
     growths = [(run.time, _growth(measured, run)) for run in measured.runs]
-    length, by = most, _bearable(measured, float(np.median(measured.sigma)))
+    length, by = most, bearable(_span(measured), float(np.median(measured.sigma)))
     while _grown(growths, length) > by:
         length *= SHORTER
     return length
@@ -35,14 +35,22 @@ def longest_followed(measured: Measured, most: float) -> float:
 
 def followed(measured: Measured, run: Run, sigma: float) -> Run:
     """A run as far as a model can follow it from its begin, which its noise of `sigma` tells."""
-    end = np.searchsorted(_growth(measured, run), _bearable(measured, sigma), side="right")
+    end = np.searchsorted(_growth(measured, run), bearable(_span(measured), sigma), side="right")
     return run.part(slice(0, int(end)))
 
 
-def _bearable(measured: Measured, sigma: float) -> float:
-    """Logarithm of the factor by which an error of the noise may grow."""
-    span = float(np.ptp(measured.profile.joint.range))
+def bearable(span: float, sigma: float) -> float:
+    """Logarithm of the factor by which an error of the noise may grow.
+
+    Args:
+        span: of the joint's range, rad or m.
+        sigma: the noise, in the same unit.
+    """
     return float(np.log(max(GROWN * span / sigma, 2.0)))
+
+
+def _span(measured: Measured) -> float:
+    return float(np.ptp(measured.profile.joint.range))
 
 
 def _growth(measured: Measured, run: Run) -> Array:
