@@ -12,6 +12,7 @@ from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.improvement import Step, improved
 from joda.diagnosis.pair_search import pairs
 from joda.diagnosis.search import rank
+from joda.diagnosis.split import parted
 from joda.hidden import draw
 
 BOTH = "asymmetric_friction", "constant_damping_hinge"
@@ -87,7 +88,7 @@ def said(verdict, *effects):
 @pytest.mark.parametrize(("refused", "there"), [((), BOTH), (BOTH[1:], BOTH[:1]), (BOTH, ())])
 def test_of_the_best_pair_as_much_is_added_as_lowers_the_error(monkeypatch, train, refused, there):
     joint = Joint(monkeypatch, BOTH, refused)
-    steps, why = improved(train)
+    steps, why = improved(train, parted(train))
     assert tuple(step.effect for step in steps) == (None, *there)
     assert [step.error.window for step in steps] == [0.5**k for k in range(len(steps))]
     assert joint.asked == (list(there) if len(there) > 1 else [])  # each beside the other

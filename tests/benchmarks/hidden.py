@@ -130,7 +130,7 @@ def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
 
 def after_improve(case: Case, train: Measured, held_out: Measured) -> dict:
     """Errors on unseen whole runs, of what the true joint misses; after `improve`."""
-    steps, why = improved(train)
+    steps, why = improved(train, parted(train))
     last, least = steps[-1], case.achievable.together
     right = last.right.of(held_out) if last.right else held_out
     right = right.stopped(last.stop) if last.stop else right
@@ -161,7 +161,7 @@ def few(case: Case, train: Measured, held_out: Measured) -> dict:
 def both(case: Case, train: Measured, held_out: Measured) -> dict:
     """What improve adds to a joint that hides two effects."""
     begun = time.perf_counter()
-    steps, why = improved(train)
+    steps, why = improved(train, parted(train))
     return {
         "seconds": time.perf_counter() - begun,
         "added": [step.effect for step in steps[1:]],

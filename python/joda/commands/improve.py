@@ -111,9 +111,10 @@ def improve(
     target = Path(output)
     composed, picture = beside(target, force, runs, report)
     measured = read_runs(model, joint, runs, passive, trust, templates)
-    steps, why = improved(measured, progress)
+    parts = parted(measured)
+    steps, why = improved(measured, parts, progress)
     progress("drawing")
-    last, right, (_, held) = steps[-1].profile, steps[-1].right, parted(measured)
+    last, right, held = steps[-1].profile, steps[-1].right, parts[1]
     there = len(steps) > 1
     files: dict[Path, bytes | str] = {}
     notes: list[str] = []

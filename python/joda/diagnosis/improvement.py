@@ -14,7 +14,6 @@ from joda.diagnosis.findings import Correction, Diagnosis, Finding
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.pair_search import pairs
 from joda.diagnosis.shape_refinement import refitted
-from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
 from joda.estimation.problem import segments_for
 from joda.measured.measured_joint import Measured
@@ -75,18 +74,18 @@ class Step:
 
 @one_blas_thread
 def improved(
-    measured: Measured, progress: Progress = lambda what: None
+    measured: Measured, parts: Parts, progress: Progress = lambda what: None
 ) -> tuple[tuple[Step, ...], str]:
     """Adds effects while the data support them.
 
     Args:
-        measured: the joint, its profile as it is, and its runs; some are held out of every fit.
+        measured: the joint, its profile as it is, and its runs.
+        parts: the same, see `joda.diagnosis.split.parted`.
         progress: what is being done.
 
     Returns:
         the stairs, the first one the model as it was; and why there are no more, a sentence.
     """
-    parts = parted(measured)
     steps = [Step(None, measured.profile, error(parts[1]))]
     why = f"{MOST} effects were added; that is as many as are tried."
     try:
