@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from joda.diagnosis.outcome import read_runs
-from joda.joints.divergence import divergence_rate
-from joda.measured.instability import GROWN, followed, longest_followed
+from joda.joints.divergence import GROWN, divergence_rate
+from joda.measured.instability import followed, longest_followed
 
 INERTIA, WEIGHT, DAMPING = 0.05, 0.8, 0.03
 SCENE = """<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body>

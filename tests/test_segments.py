@@ -13,8 +13,8 @@ from joda.estimation.problem import joint_model_for, posed, segments_for
 from joda.estimation.segmentation import STEPS, _responses, _step, segments_of
 from joda.estimation.segments import GRID
 from joda.estimation.unknowns import EMPTY, NOTHING
+from joda.joints.divergence import GROWN
 from joda.measured import smoothing
-from joda.measured.instability import GROWN
 from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run

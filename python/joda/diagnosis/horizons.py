@@ -83,7 +83,8 @@ def looked(
         ask = partial(
             rank, exclude=exclude, progress=progress, promising=hopeful, possible=possible
         )
-        shorter = in_shorter(measured, ranking.baseline, ask, strictness, progress)
+        closer_asked = partial(narrowed, progress=progress)
+        shorter = in_shorter(measured, ranking.baseline, ask, closer_asked, strictness)
         if shorter is not None:
             own, anew, each = shorter
             return HorizonSearch(own, anew, (own, anew), (*found, *each), free)

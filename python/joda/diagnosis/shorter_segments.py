@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import Baseline, fit_segments
 from joda.diagnosis.ranking import Ranking, evidence, hopeful
-from joda.diagnosis.search import Progress, narrowed
 from joda.diagnosis.selection import Evidence, Selection, decide
 from joda.estimation.problem import posed, segments_for
 from joda.estimation.segmentation import shortest
@@ -37,8 +36,8 @@ def in_shorter(
     measured: Measured,
     usual: Baseline,
     ask: Callable[[Baseline], Ranking],
+    closer_asked: Callable[[Baseline, Ranking], Ranking],
     strictness: float,
-    progress: Progress,
 ) -> tuple[Ranking, Selection, list[Evidence]] | None:
     """What is named in the longest of them, and what each look found; None where nothing is, or not
     the same in all.
@@ -47,8 +46,8 @@ def in_shorter(
         measured: the joint and its runs.
         usual: the model fitted in usual segments.
         ask: what ranks all that may be missing.
+        closer_asked: what ranks the best of that again, in longer segments.
         strictness: see `decide`.
-        progress: how much is done, of how much, and what.
     """
     longest, near = usual.estimator.segments.length, usual.fit.x
     length = max(longest / SHORTER, shortest(measured.runs))
@@ -63,7 +62,7 @@ def in_shorter(
         first = ranking.candidates[0]
         moved = replace(measured, profile=first.written(ranking.baseline.base))
         cut = partial(segments_for, moved, longer * length)
-        closer = narrowed(fit_segments(measured, cut, ranking.baseline.fit.x), ranking, progress)
+        closer = closer_asked(fit_segments(measured, cut, ranking.baseline.fit.x), ranking)
         found.append(evidence(closer))
         selection, ranking = decide(found[-1], strictness), closer
         if selection.effects[:1] != (first.hypothesis.effect,):

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from joda.estimation.segments import GRID, LOOSE, Array, Integers, Segments, rows_of
+from joda.joints.divergence import bearable
 from joda.measured import smoothing
-from joda.measured.instability import bearable
 from joda.measured.runs import STOP, Run, held, known
 
 SHORTEST, LONGEST = 0.1, 0.5

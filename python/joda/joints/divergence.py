@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 
 AT_END = 0.01
 """How near an end of the range, in ranges, the stop holds a joint."""
+GROWN = 0.03
+"""Part of the range to which an error of a position, its noise, may grow in a segment: so far the
+slopes hold by which a fit goes."""
 
 
 def divergence_rate(profile: Profile, joint_model: JointModel, position: Array) -> Array:
@@ -28,3 +31,13 @@ def divergence_rate(profile: Profile, joint_model: JointModel, position: Array) 
     k = np.where(np.abs(s - 0.5) < 0.5 - AT_END, np.maximum(k, 0.0), 0.0)
     c, inertia = evaluate(profile.channels.damping, s)[0], joint_model.inertia
     return np.asarray((np.sqrt(c**2 + 4 * inertia * k) - c) / (2 * inertia))
+
+
+def bearable(span: float, sigma: float) -> float:
+    """Logarithm of the factor by which an error of the noise may grow.
+
+    Args:
+        span: of the joint's range, rad or m.
+        sigma: the noise, in the same unit.
+    """
+    return float(np.log(max(GROWN * span / sigma, 2.0)))

@@ -7,15 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from joda.joints.divergence import divergence_rate
+from joda.joints.divergence import bearable, divergence_rate
 from joda.measured.measured_joint import Measured
 from joda.measured.runs import Run
 
 Array = NDArray[np.float64]
 
-GROWN = 0.03
-"""Part of the range to which an error of a position, its noise, may grow in a segment: so far the
-slopes hold by which a fit goes."""
 NEARLY_ALL = 0.9
 """Part of all segments in which they grow by no more."""
 SHORTER = 0.8
@@ -37,16 +34,6 @@ def followed(measured: Measured, run: Run, sigma: float) -> Run:
     """A run as far as a model can follow it from its begin, which its noise of `sigma` tells."""
     end = np.searchsorted(_growth(measured, run), bearable(_span(measured), sigma), side="right")
     return run.part(slice(0, int(end)))
-
-
-def bearable(span: float, sigma: float) -> float:
-    """Logarithm of the factor by which an error of the noise may grow.
-
-    Args:
-        span: of the joint's range, rad or m.
-        sigma: the noise, in the same unit.
-    """
-    return float(np.log(max(GROWN * span / sigma, 2.0)))
 
 
 def _span(measured: Measured) -> float:
