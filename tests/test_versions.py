@@ -83,6 +83,7 @@ def test_each_mujoco_warp(version, request, tmp_path):
     assert int(re.search(r"(\d+) passed", result.stdout)[1]) > 12
 
 
+@pytest.mark.sweep(2)
 def test_the_plugins_physics(python):
     """The plugin is compiled once, and then all is as in the newest MuJoCo."""
     code = "import joda, mujoco; print(mujoco.__version__, joda.plugin_path().name)"

@@ -9,7 +9,7 @@ from hidden_cases import read
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.free_runs import BEYOND, worst
 from joda.hidden import draw
-from joda.measured.runs import Run, until_end
+from joda.measured.runs import Run, until_end, visits
 
 
 def test_a_run_counts_up_to_where_the_joint_comes_to_an_end():
@@ -18,6 +18,15 @@ def test_a_run_counts_up_to_where_the_joint_comes_to_an_end():
     assert list(until_end(run, (0.0, 1.0), 3e-3).time) == [1.0, 2.0, 3.0]  # it leaves an end
     assert len(until_end(run, (0.0, 1.0), 3e-5).time) == 7
     assert len(until_end(run, (0.0, 1.0), 3.0).time) == 7
+
+
+def test_each_visit_to_an_end_is_told_with_what_is_around_it():
+    """From a time before it, or the last visit, to a time after it, or the next."""
+    position = np.array([0, 0, 5, 9, 10, 10.2, 9.98, 9.95, 8, 5, 10, 7, 4, 3, 2.0])
+    run = Run("run", np.arange(15.0), position, None, np.zeros(15), True)
+    told = [(part.start, part.stop) for part in visits(run, (0.0, 10.0), 0.04, (2.0, 3.0))]
+    assert told == [(0, 4), (2, 10), (8, 14)]  # what hovers at an end has not left it
+    assert visits(run.part(slice(8, 10)), (0.0, 10.0), 0.04, (2.0, 3.0)) == []
 
 
 def test_a_run_that_begins_pressed_into_an_end_counts_from_where_that_lets_go():

@@ -9,7 +9,7 @@ from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibration
 from joda.diagnosis.corrections import OFF, Corrected, corrected, corrections, numbers
 from joda.diagnosis.departures import FAITHFUL, Departures
-from joda.diagnosis.end_stops import Solref, fitted_stop
+from joda.diagnosis.end_stops import fitted_stop
 from joda.diagnosis.findings import Correction, Diagnosis, Finding
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.pair_search import pairs
@@ -19,6 +19,7 @@ from joda.estimation.problem import segments_for
 from joda.measured.measured_joint import Measured
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
+from joda.scenes.native import Row
 from joda.threads import one_blas_thread
 
 MOST = 5
@@ -50,7 +51,7 @@ class Step:
         corrections: of the model's own numbers, that were made instead.
         servo: of the joint's actuators, with all corrections so far; None where none was made.
         right: what was set right of what the joint moves and of the measurement, so far.
-        stop: solref of the ends of the range that suits the runs there; None: the model's.
+        stop: solref, solimp of the ends of the range that suit the runs there; None: the model's.
         error: on runs held out of every fit.
         diagnosis: of the model with this profile; None if it was not made.
         departs: by what the profile is not what was given and diagnosed.
@@ -64,7 +65,7 @@ class Step:
     corrections: tuple[Correction, ...] = ()
     servo: Servo | None = None
     right: AppliedCorrections | None = None
-    stop: Solref | None = None
+    stop: Row | None = None
 
     @property
     def effect(self) -> str | None:

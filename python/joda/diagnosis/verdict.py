@@ -22,6 +22,7 @@ from joda.diagnosis.corrections import (
     one_factor,
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
+from joda.diagnosis.end_stops import with_other_ends
 from joda.diagnosis.experiments import Model, means_of, next_experiment, there_and_back
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
@@ -103,9 +104,18 @@ ADRIFT = (
     "model, or what the force did between its samples."
 )
 AT_ENDS = (
-    " That holds within the range. From where the joint comes to an end of it, whole runs are "
-    "missed by up to {:.0f} times what noise, start and force explain: there the model's stop "
-    "(solreflimit), or a force close to the end, is not the joint's."
+    " From where the joint comes to an end of its range, whole runs are missed by up to {:.0f} "
+    "times what noise, start and force explain, and by {:.1f} times with other ends: {}; joda "
+    "improve writes them."
+)
+BEYOND_ENDS = (
+    "Something at the ends of the range is missing that no known effect explains: within it there "
+    "is {}, but from where the joint comes to an end, whole runs are missed by up to {:.0f} times "
+    "what noise, start and force explain, whatever the stop (solreflimit, solimplimit).{}"
+)
+PRESS = (
+    "Press the joint slowly against either end and let it go, and let it come there slowly and "
+    "fast, with the force: that parts the stop from a force close to it."
 )
 EITHER = "Either the model's own numbers are off ({}), or a force is missing"
 NAMED, WORTH_NAMING = 5, 0.01
@@ -372,7 +382,11 @@ def _adequate(
         numbers_off = f" Its own numbers are off: {numbers_off}.{by_one_factor(own)}"
     missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
-    if numbers_off and worst_run and worst_run.fault:
+    ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
+    verdict: Verdict = "unexplained" if ends and ends.times > BEYOND else "adequate"
+    if verdict == "unexplained":
+        summary = BEYOND_ENDS.format(noise, left.whole, numbers_off)
+    elif numbers_off and worst_run and worst_run.fault:
         summary = WITH_THESE.format(WHOLE.format(missed), numbers_off, noise)
     elif numbers_off and denying:
         summary = WITH_THESE.format(FREELY, numbers_off, noise)
@@ -382,10 +396,11 @@ def _adequate(
         where = "In windows the model" if adrift or (loose and left.whole > SOME) else "The model"
         summary = f"{where} is adequate: {noise} that an effect would explain.{numbers_off}"
         summary += WITHOUT.format(missed, left.whole) if loose else ADRIFT if adrift else ""
-    summary += AT_ENDS.format(left.whole) if left.whole > BEYOND else ""
+    if ends and verdict == "adequate":
+        summary += AT_ENDS.format(left.whole, ends.times, ends.changes)
     if doubt := other_unit(measured):
         summary += f" But {doubt}."
-    report = _report(measured, "adequate", summary, (), None)
+    report = _report(measured, verdict, summary, (), PRESS if verdict == "unexplained" else None)
     report = replace(report, corrections=corrections(own, measured.profile.joint, least))
     driven = baseline.base.joint_model.servo is not None
     if doubt or (by_one_factor(own) and not driven):

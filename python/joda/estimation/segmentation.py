@@ -64,6 +64,7 @@ def segments_of(
     diverges: Callable[[Array], Array] = np.zeros_like,
     limit_rate: float = 0.0,
     thinned: bool = True,
+    cut_at_ends: bool = True,
 ) -> Segments:
     """Cuts runs into segments; parts where the force is not known are left out.
 
@@ -81,6 +82,8 @@ def segments_of(
         limit_rate: natural frequency of the joint at an end of its range, 1/s: how fast the end,
             pressed as deep as the noise hides, may throw it back.
         thinned: whether of many samples, or where the joint rests, only some count.
+        cut_at_ends: whether segments begin where the joint comes to an end of its range and where
+            it leaves that, so that the others tell of the joint alone, whatever the end does.
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
@@ -108,14 +111,16 @@ def segments_of(
             grows = bearable(span, float(np.median(spread)))
             begins = _while_followed(begins, index, time, diverges(position), grows)
             place_noise = (position - lo) / span, spread / span
-            begins, hits = _before_knocks(begins, index, *place_noise)
-            begins = _after_pressing(begins, index, *place_noise)
-            if thinned and each > chunk:
-                begins = _where_it_stays(begins, index, chunk, *place_noise)
-            for left in _leaves(begins, index, *place_noise):  # in one of these gaps
-                gaps = np.diff(time[left.start : left.stop + 1])
-                thrown = limit_rate * spread[left] / gaps / np.sqrt(len(gaps))
-                push[left] = np.hypot(push[left], inertia * thrown)
+            hits = np.zeros(len(time), bool)
+            if cut_at_ends:
+                begins, hits = _before_knocks(begins, index, *place_noise)
+                begins = _after_pressing(begins, index, *place_noise)
+                if thinned and each > chunk:
+                    begins = _where_it_stays(begins, index, chunk, *place_noise)
+                for left in _leaves(begins, index, *place_noise):  # in one of these gaps
+                    gaps = np.diff(time[left.start : left.stop + 1])
+                    thrown = limit_rate * spread[left] / gaps / np.sqrt(len(gaps))
+                    push[left] = np.hypot(push[left], inertia * thrown)
             many = len(begins)
             window = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(window, minlength=many) >= smoothing.LEAST

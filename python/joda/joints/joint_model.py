@@ -74,9 +74,10 @@ class JointModel:
         servo = self.servo.stepped(h) if self.servo else None
         return replace(self, servo=servo, trapezoidal=True)
 
-    def stopped(self, solref: tuple[float, ...]) -> "JointModel":
-        """The same with another solref of the ends of the range."""
-        return replace(self, solref=solref)
+    def stopped(self, stop: Row) -> "JointModel":
+        """The same with another solref and solimp of the ends of the range."""
+        solref, solimp = stop
+        return replace(self, solref=solref, solimp=solimp)
 
     def heavier(self, inertia: float, gravity: float, turned: float = 0.0) -> "JointModel":
         """The same with factors of its inertia and of gravity's force, and with the centre of mass

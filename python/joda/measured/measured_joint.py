@@ -70,9 +70,9 @@ class Measured:
         """The same joint with runs as they would be if what is wrong with them were right."""
         return replace(self, runs=tuple(map(sensing.of, self.runs)))
 
-    def stopped(self, solref: tuple[float, ...]) -> "Measured":
-        """The same joint with another solref of the ends of its range."""
-        own = self.joint_model.stopped(solref)
+    def stopped(self, stop: Row) -> "Measured":
+        """The same joint with another solref and solimp of the ends of its range."""
+        own = self.joint_model.stopped(stop)
         replayer = Replayer(self.context, self.profile, own, self.timestep)
         return replace(self, joint_model=own, replayer=replayer)
 

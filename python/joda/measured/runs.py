@@ -13,6 +13,8 @@ from joda.measured import smoothing
 
 Array = NDArray[np.float64]
 
+LEFT = 2.0
+"""How far off an end a joint is that has left it, in units of how far one is that is not at it."""
 STOP = 0.004
 """How near an end of the range, in normalised position, counts as touching it, beside noise."""
 
@@ -165,3 +167,30 @@ def until_end(run: Run, span: tuple[float, float], clear: float) -> Run:
     left = int(np.argmax(away))
     back = np.flatnonzero(~away[left:])
     return run.part(slice(max(left - 1, 0), left + int(back[0]) if len(back) else None))
+
+
+def visits(
+    run: Run, span: tuple[float, float], clear: float, around: tuple[float, float]
+) -> list[slice]:
+    """Each time that the joint comes to an end of its range, or begins at one.
+
+    Args:
+        run: measured.
+        span: the range, rad or m.
+        clear: how far off an end the joint must be, rad or m, not to be at it.
+        around: how much of the run before and after a visit belongs to it, s; less where the joint
+            was at an end before, or comes to one again.
+    """
+    inside = np.minimum(run.position - span[0], span[1] - run.position)
+    near = inside <= LEFT * clear
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], near, [0]]).astype(int)))
+    there = [inside[a:b].min() <= clear for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    comes, leaves = edges[::2][there], edges[1::2][there]
+    before = np.append(0, leaves)[:-1]
+    after = np.append(comes, len(run.time))[1:]
+    out = []
+    for come, leave, first, end in zip(comes, leaves, before, after, strict=True):
+        earliest, latest = run.time[come] - around[0], run.time[leave - 1] + around[1]
+        first = max(first, int(np.searchsorted(run.time, earliest)))
+        out.append(slice(first, min(end, int(np.searchsorted(run.time, latest, side="right")))))
+    return out
