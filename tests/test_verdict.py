@@ -329,15 +329,6 @@ def test_what_was_missed_once_is_named(family, effect, seed):
 
 
 @pytest.mark.long
-def test_what_neither_windows_held_out_nor_longer_segments_know_of_is_nothing():
-    """Damping in the last 3 % of the range gains 160 in loss by chance; with it windows held out
-    are missed by more."""
-    model = diagnosed(read(draw(28117002, None, True, family="machinery"))[0])
-    assert any(look.gain > 60 for look in model.looks)
-    assert model.diagnosis.verdict == "adequate"
-
-
-@pytest.mark.long
 def test_what_was_named_though_longer_segments_deny_it_is_unexplained():
     """A cushion of air, which was told as friction of one direction at 84 %."""
     found = diagnosed(read(draw(77709080, "air_cushion", True, family="machinery"))[0]).diagnosis
@@ -347,18 +338,20 @@ def test_what_was_named_though_longer_segments_deny_it_is_unexplained():
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("family", "seed"),
+    ("family", "seed", "forced"),
     [
         # a stop throws back a little more than the model's, once at each end
-        ("machinery", 8301),
+        ("machinery", 8301, False),
         # free runs tell of a damping that is 0.5 % off
-        ("laboratory", 8303),
+        ("laboratory", 8303, False),
         # an encoder so coarse that positions repeat
-        ("switches", 8301),
+        ("switches", 8301, False),
         # a door that is flicked up and creeps back: the loss of its whole run is jagged
-        ("household", 8502),
+        ("household", 8502, False),
+        # damping in the last 3 % of the range gained 160 in loss by chance
+        ("machinery", 28117002, True),
     ],
 )
-def test_what_was_accused_once_is_adequate(family, seed):
-    measured = read(draw(seed, None, False, family=family))[0]
+def test_what_was_accused_once_is_adequate(family, seed, forced):
+    measured = read(draw(seed, None, forced, family=family))[0]
     assert diagnosed(measured).diagnosis.verdict == "adequate"
