@@ -19,7 +19,6 @@ from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.free_runs import worst
 from joda.diagnosis.impacts import some_of
 from joda.diagnosis.shape_refinement import bouncy, clearly
-from joda.diagnosis.split import parted
 from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.problem import as_it_is, segments_for
 from joda.estimation.segmentation import segments_of
@@ -48,7 +47,7 @@ WIDE, TRIED, SETTLING = np.array((0.4, 0.4, 1.0)), 30, 6
 that fit the starts of one."""
 
 
-def fitted_stop(train: Measured, held: Measured) -> Row | None:
+def fitted_stop(train: Measured, held: Measured | None = None) -> Row | None:
     """The parameters solref and solimp of the ends of the range that suit the runs there (Nelder
     and Mead 1965), if they make all runs, also those that were held out, clearly likelier, and each
     number is worth its price (Schwarz 1978); else None. The impedance is changed only where that
@@ -56,11 +55,11 @@ def fitted_stop(train: Measured, held: Measured) -> Row | None:
 
     Args:
         train: the joint with a profile, and runs to fit.
-        held: the same with runs held out.
+        held: the same with runs held out; None where none are.
     """
     if bouncy(train.profile):  # whose ends are its own
         return None
-    fit, judge = _visits(train), _visits(held)
+    fit, judge = _visits(train), _visits(held) if held else None
     if fit is None:
         return None
     price = float(np.log(fit.samples))
@@ -116,7 +115,7 @@ def with_other_ends(
         times: how far they are missed with the model's own.
     """
     fitted = measured.changed(baseline.base.written(baseline.fit.x))
-    if not (stop := fitted_stop(*parted(fitted))):
+    if not (stop := fitted_stop(fitted)):
         return OtherEnds(None, "", times)
     left = worst(measured.stopped(stop), baseline, [other.stopped(stop) for other in others])
     return OtherEnds(stop, changed(measured.joint_model, stop), left.whole)
