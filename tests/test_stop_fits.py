@@ -125,8 +125,9 @@ def test_whole_runs_that_another_stop_explains_leave_the_model_adequate(tmp_path
     assert "solimplimit 0.9 0.95 0.001 0.5 2 → 0" in found.summary
 
 
-def test_whole_runs_that_no_stop_explains_do_not(tmp_path, rng):
+def test_whole_runs_that_no_stop_explains_do_not(tmp_path):
     """Of a slide whose low end is hard, and whose high end is a soft buffer."""
+    rng = np.random.default_rng(0)  # in some draws the buffer is hardly pressed
     model, files = pushed(tmp_path, rng, 'solreflimit="0.004 1"', buffer=True, smoothly=True)
     found = diagnose(model, "slide", files)
     assert found.verdict == "unexplained"
