@@ -93,12 +93,10 @@ class OtherEnds:
     """Whole runs with the stop that suits them best.
 
     Attributes:
-        stop: solref and solimp of the ends of the range; None: the model's own suits them best.
-        changes: what that changes, for a person.
+        changes: what that changes, for a person; nothing where the model's own suits them best.
         times: by how many times what errors explain the worst run is missed with it.
     """
 
-    stop: Row | None
     changes: str
     times: float
 
@@ -116,9 +114,9 @@ def with_other_ends(
     """
     fitted = measured.changed(baseline.base.written(baseline.fit.x))
     if not (stop := fitted_stop(fitted)):
-        return OtherEnds(None, "", times)
+        return OtherEnds("", times)
     left = worst(measured.stopped(stop), baseline, [other.stopped(stop) for other in others])
-    return OtherEnds(stop, changed(measured.joint_model, stop), left.whole)
+    return OtherEnds(changed(measured.joint_model, stop), left.whole)
 
 
 def written(joint_model: JointModel, stop: Row | None) -> tuple[dict[str, str], list[str]]:
