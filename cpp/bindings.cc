@@ -90,8 +90,7 @@ std::pair<Dense<double>, Dense<double>> Replay(const joda::JointSimulator& simul
   const auto starts = ReadStarts(at, start, fresh, force.size());
   Dense<double> before(force.size()), after(force.size());
   const double* applied = force.data();
-  const std::vector<double> none(command ? 0 : force.size());
-  const double* wanted = command ? command->data() : none.data();
+  const double* wanted = command ? command->data() : nullptr;
   double* first = before.mutable_data();
   double* second = after.mutable_data();
   {

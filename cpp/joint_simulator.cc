@@ -7,6 +7,13 @@
 
 #include "stiffness.h"
 
+// The step is compiled into its loop, so that the state stays in registers.
+#if defined(_MSC_VER)
+#define JODA_INLINE __forceinline
+#else
+#define JODA_INLINE [[gnu::always_inline]] inline
+#endif
+
 namespace joda {
 namespace {
 
@@ -28,12 +35,13 @@ struct Motion {
   double acceleration, held;
 };
 
-// Solves mass a = drive + friction(a).
+// Solves mass a = drive + friction(a). The processor divides for both cases at once.
 Motion Solve(double mass, double drive, const Friction& friction) {
-  const double stuck = (drive + friction.offset) / (mass + friction.stiff);
+  const double per_mass = 1 / mass, per_both = 1 / (mass + friction.stiff);
+  const double stuck = (drive + friction.offset) * per_both;
   const double held = friction.offset - friction.stiff * stuck;
-  if (held > friction.bound) return {(drive + friction.bound) / mass, friction.bound};
-  if (held < -friction.bound) return {(drive - friction.bound) / mass, -friction.bound};
+  if (held > friction.bound) return {(drive + friction.bound) * per_mass, friction.bound};
+  if (held < -friction.bound) return {(drive - friction.bound) * per_mass, -friction.bound};
   return {stuck, held};
 }
 
@@ -44,7 +52,9 @@ double Implicit(Scheme scheme, double h, double drag, double inertia) {
   return h * drag > 2 * inertia ? 1 - inertia / (h * drag) : 0.5;
 }
 
+template <bool kEffects>
 bool IsFinite(const JointSimulator::State& state) {
+  if (!kEffects) return std::isfinite(state.q + state.v + state.held);
   return std::isfinite(state.q + state.v + state.held + state.loose.gap + state.loose.velocity +
                        state.remembered);
 }
@@ -77,21 +87,25 @@ JointSimulator::JointSimulator(const Body& body, const Servo& servo,
   }
 }
 
-void JointSimulator::Advance(double h, double force, double command, State* state) const {
+template <bool kEffects, bool kDriven>
+JODA_INLINE void JointSimulator::Advance(double h, double force, double command, Near* near,
+                                         State* state) const {
   const Profile& p = profile_;
-  const Effects* effects = p.effects.get();
+  const Effects* effects = kEffects ? p.effects.get() : nullptr;
   const double q = state->q, v = state->v, s = (q - p.lo) * p.per_range;
   const double inertia = body_.row_inertia, weight = Weight(q);
-  const double servo = Actuate(command, q, v), load = weight + force - state->servo;
+  const double servo = kDriven ? Actuate(command, q, v) : 0;
+  const double load = weight + force - state->servo;
 
-  const double damping = p.damping(s).value, dry = p.friction(s).value;
+  const double damping = p.damping.Value(s, &near->damping);
+  const double dry = p.friction.Value(s, &near->friction);
   const auto resist = [&](double velocity) {
     if (!effects) return Resistance{damping, {dry, dry}};
     return Resistance{damping + ExtraDamping(*effects, s, velocity),
                       FindFrictionBounds(*effects, dry, s, velocity, load)};
   };
   const Resistance own = resist(v);
-  double spring = p.conservative(s).value, pushed = force;
+  double spring = p.conservative.Value(s, &near->conservative), pushed = force;
   if (effects) spring += OffsetForce(effects->gravity, q);
   double yielding = h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
   if (effects) {
@@ -134,7 +148,7 @@ void JointSimulator::Advance(double h, double force, double command, State* stat
     }
   }
   // the engine's implicit integration of an actuator's damping, after all rows
-  const bool free = servo_.limits[0] < servo && servo < servo_.limits[1];
+  const bool free = kDriven && servo_.limits[0] < servo && servo < servo_.limits[1];
   const double slowed = free ? body_.inertia / (body_.inertia + h * servo_.damping) : 1;
   state->v = v + h * slowed * motion.acceleration;
   state->q = q + h * state->v;
@@ -148,17 +162,16 @@ void JointSimulator::Advance(double h, double force, double command, State* stat
 
 // In the leapfrog that steps of symplectic Euler are, v is the velocity half a step before q: where
 // it turns within the step, friction does so too.
-void JointSimulator::Step(double h, double force, double command, State* state) const {
-  const State before = *state;
-  Advance(h, force, command, state);
-  if (scheme_ == Scheme::kEngine || before.v * state->v > 0 || std::abs(before.v) < kStill) return;
+template <bool kEffects, bool kDriven>
+void JointSimulator::Turn(double h, double force, double command, const State& before, Near* near,
+                          State* state) const {
   State turned = before;
-  Advance(kProbe * h, force, command, &turned);
+  Advance<kEffects, kDriven>(kProbe * h, force, command, near, &turned);
   const double turns = kProbe * h * before.v / (before.v - turned.v);  // after that time
   if (!(turns > kProbe * h && turns < (1 - kProbe) * h)) return;
   turned = before;
-  Advance(turns, force, command, &turned);
-  Advance(h - turns, force, command, &turned);
+  Advance<kEffects, kDriven>(turns, force, command, near, &turned);
+  Advance<kEffects, kDriven>(h - turns, force, command, near, &turned);
   turned.q = before.q + h * turned.v;
   *state = turned;
 }
@@ -172,14 +185,32 @@ void JointSimulator::Restart(const Start& start, bool fresh, State* state) const
   state->v = start.v;
 }
 
-// Runs do not depend on one another: side by side, a step of one hides the latency of another's.
 void JointSimulator::Replay(double h, const double* force, const double* command, std::int64_t n,
                             const std::vector<Start>& starts, double* before, double* after) const {
+  const auto with = [&](auto replay) {
+    (this->*replay)(h, force, command, n, starts, before, after);
+  };
+  const bool driven = command || IsDriven();
+  if (profile_.effects) {
+    with(driven ? &JointSimulator::ReplayWith<true, true>
+                : &JointSimulator::ReplayWith<true, false>);
+  } else {
+    with(driven ? &JointSimulator::ReplayWith<false, true>
+                : &JointSimulator::ReplayWith<false, false>);
+  }
+}
+
+// Runs do not depend on one another: side by side, a step of one hides the latency of another's.
+template <bool kEffects, bool kDriven>
+void JointSimulator::ReplayWith(double h, const double* force, const double* command,
+                                std::int64_t n, const std::vector<Start>& starts, double* before,
+                                double* after) const {
   struct Run {
     size_t start, last;                      // the current one, and the first of the next run
     std::int64_t k = 0, end = 0, first = 0;  // the latter is that of its fresh start
     bool lost = true;
     State state = {};
+    Near near = {};
   };
   size_t next = 0;
   const auto begin = [&] {
@@ -191,6 +222,7 @@ void JointSimulator::Replay(double h, const double* force, const double* command
   const double late = servo_.delay / h;
   // Commands are means over a step; what is late by a part of one is part of two of them.
   const auto commanded = [&](const Run& run, std::int64_t k) {
+    if (!command) return 0.0;
     const double at = std::max(k - late, static_cast<double>(run.first));
     const auto i = static_cast<std::int64_t>(std::floor(at));
     const double part = at - i;
@@ -200,7 +232,7 @@ void JointSimulator::Replay(double h, const double* force, const double* command
     const Start& start = starts[run->start++];
     if (start.fresh) run->first = start.step;
     Restart(start, start.fresh || run->lost, &run->state);
-    run->state.servo = Actuate(commanded(*run, start.step), start.q, start.v);
+    if (kDriven) run->state.servo = Actuate(commanded(*run, start.step), start.q, start.v);
     run->lost = false;
     run->k = start.step;
     run->end = run->start < starts.size() ? starts[run->start].step : n;
@@ -232,10 +264,16 @@ void JointSimulator::Replay(double h, const double* force, const double* command
         }
         restart(&run);
       }
-      before[run.k] = run.state.q;
-      Step(h, force[run.k], commanded(run, run.k), &run.state);
+      const State first = run.state;
+      const double wanted = kDriven ? commanded(run, run.k) : 0;
+      before[run.k] = first.q;
+      Advance<kEffects, kDriven>(h, force[run.k], wanted, &run.near, &run.state);
+      if (scheme_ == Scheme::kTrapezoidal && first.v * run.state.v <= 0 &&
+          std::abs(first.v) >= kStill) {
+        Turn<kEffects, kDriven>(h, force[run.k], wanted, first, &run.near, &run.state);
+      }
       after[run.k++] = run.state.q;
-      if (!IsFinite(run.state)) lose(&run);
+      if (!IsFinite<kEffects>(run.state)) lose(&run);
     }
   }
 }
@@ -243,6 +281,12 @@ void JointSimulator::Replay(double h, const double* force, const double* command
 double JointSimulator::Weight(double q) const {
   if (!body_.hinge) return body_.weight[0];
   return heaviest_ == 0 ? 0 : heaviest_ * std::cos(q - heaviest_at_);
+}
+
+// Whether the actuator may exert a force without a command.
+bool JointSimulator::IsDriven() const {
+  const auto [low, high] = servo_.limits;
+  return servo_.stiffness != 0 || servo_.damping != 0 || low > 0 || high < 0;
 }
 
 double JointSimulator::Actuate(double command, double q, double v) const {

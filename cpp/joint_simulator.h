@@ -66,15 +66,12 @@ class JointSimulator {
   JointSimulator(const Body& body, const Servo& servo, const char* const texts[kTexts],
                  Scheme scheme = Scheme::kEngine);
 
-  // One step of h under the applied force and the actuator's command.
-  void Advance(double h, double force, double command, State* state) const;
-
-  // Steps through n forces and as many commands, which come later by the delay; what was before a
-  // fresh start is its first command. before[k] and after[k] are the positions at both ends of step
-  // k. At each start position and velocity are set; unless fresh, friction's memory stays and the
-  // handle or the load as it is beside the part. What follows a number that is not finite is NaN
-  // until the next start, which then is fresh. Starts are in increasing order, the first one at
-  // step 0.
+  // Steps through n forces and as many commands (null: zeros), which come later by the delay; what
+  // was before a fresh start is its first command. before[k] and after[k] are the positions at both
+  // ends of step k. At each start position and velocity are set; unless fresh, friction's memory
+  // stays and the handle or the load as it is beside the part. What follows a number that is not
+  // finite is NaN until the next start, which then is fresh. Starts are in increasing order, the
+  // first one at step 0.
   void Replay(double h, const double* force, const double* command, std::int64_t n,
               const std::vector<Start>& starts, double* before, double* after) const;
 
@@ -84,10 +81,28 @@ class JointSimulator {
     double sign, D, reference;
   };
 
+  // The pieces of the channels that a run found last.
+  struct Near {
+    PiecewiseCubic::Piece conservative, friction, damping;
+  };
+
+  // What acts in steps: compiled for each, as most joints have neither effects nor an actuator.
+  template <bool kEffects, bool kDriven>
+  void ReplayWith(double h, const double* force, const double* command, std::int64_t n,
+                  const std::vector<Start>& starts, double* before, double* after) const;
+
   void Restart(const Start& start, bool fresh, State* state) const;
 
-  // One step as the scheme has it.
-  void Step(double h, double force, double command, State* state) const;
+  // One step of h under the applied force and the actuator's command.
+  template <bool kEffects, bool kDriven>
+  void Advance(double h, double force, double command, Near* near, State* state) const;
+
+  // The same where the joint turns within the step, with friction that turns when it does.
+  template <bool kEffects, bool kDriven>
+  void Turn(double h, double force, double command, const State& before, Near* near,
+            State* state) const;
+
+  bool IsDriven() const;
   double Weight(double q) const;
   double Actuate(double command, double q, double v) const;
   Limit LimitRow(double h, double q, double v) const;

@@ -37,11 +37,12 @@ inline double ImplicitStiffness(const Profile& p, bool field, double h, double s
                                 double force, double inertia) {
   const double soft = kExplicitStiffness * inertia / (h * h);
   const double gravity = p.effects ? p.effects->gravity.descent : 0;
+  const double steepest = field ? p.conservative.MaxStiffness() * p.per_range : 0;
+  double stiffness = std::abs(force) * p.per_range * (1 / kStride);
+  if (std::max(stiffness, steepest + gravity) <= soft) return 0;
   if (StaysBeyond(s, s + h * (v + h / inertia * force) * p.per_range)) {
     return std::max(0.0, gravity - soft);
   }
-  const double steepest = field ? p.conservative.MaxStiffness() * p.per_range : 0;
-  double stiffness = std::abs(force) * p.per_range * (1 / kStride);
   if (steepest + gravity > soft) {
     const double free = h * (std::abs(v) + h / inertia * std::abs(force));
     const double reach = free * p.per_range;

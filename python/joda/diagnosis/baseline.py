@@ -147,9 +147,9 @@ class Baseline:
         estimator, base = self.estimator.coarser, self.base.coarser()
         return CoarseFit(hypothesis, coarse(estimator, base, self.initial_points, hypothesis))
 
-    def refined(self, found: "CoarseFit") -> FittedHypothesis:
-        """The same fitted to the end."""
-        return refined(self.estimator, self.base, found.hypothesis, found.fits)
+    def refined(self, found: "CoarseFit", worth: float = np.inf) -> FittedHypothesis:
+        """The same fitted to the end, if that promises less loss than is worth it."""
+        return refined(self.estimator, self.base, found.hypothesis, found.fits, worth)
 
     def coarse_scored(self, found: "CoarseFit") -> FittedHypothesis:
         """The same as it is, in usual steps."""

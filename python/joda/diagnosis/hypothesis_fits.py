@@ -220,15 +220,20 @@ def coarse(
 
 
 def refined(
-    estimator: SegmentEstimator, base: BaseModel, hypothesis: Hypothesis, near: Sequence[Fit]
+    estimator: SegmentEstimator,
+    base: BaseModel,
+    hypothesis: Hypothesis,
+    near: Sequence[Fit],
+    worth: float = np.inf,
 ) -> FittedHypothesis:
     """The hypothesis fitted to the end, from rough fits; where it is pressed against a bound that
-    is only usual, within wider ones again."""
+    is only usual, within wider ones again. One that promises no less loss than is worth it is left
+    as it is."""
     make, unknowns = joined(base, hypothesis)
-    fits = [
-        estimator.refit(make, unknowns, estimator.fit(make, unknowns, fit.x, fit.start))
-        for fit in near
-    ]
+    fits = [estimator.fit(make, unknowns, fit.x, fit.start, worth=worth) for fit in near]
+    if (least := min(fits, key=lambda fit: fit.loss)).loss > worth:
+        return scored(estimator, hypothesis, least)
+    fits = [estimator.refit(make, unknowns, fit) for fit in fits]
     found = scored(estimator, hypothesis, min(fits, key=lambda f: f.loss))
     wider = hypothesis.unknowns.widened()
     if not hypothesis.unknowns.pressed(found.x) or wider is hypothesis.unknowns:
@@ -293,8 +298,9 @@ def perturbed(
         for way in (-by, by):
             x = best.x.copy()
             x[k] += way
-            trial = estimator.fit(make, unknowns, x, best.start, FEW)
-            if trial.loss < best.loss - 1:
+            worth = best.loss - AS_GOOD
+            trial = estimator.fit(make, unknowns, x, best.start, FEW, worth=worth)
+            if trial.loss < worth:
                 best = estimator.fit(make, unknowns, trial.x, trial.start)
     return _free(
         estimator, base, scored(estimator, found.hypothesis, estimator.refit(make, unknowns, best))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from os import cpu_count
 from typing import TypeVar
 
@@ -174,7 +175,8 @@ def _fitted(
         most = min(most, baseline.coarse_loss - HARDLY)
     near = [one for one in others if one.best.loss < most]
     far = [one for one in others if one.best.loss >= most]
-    return work.all(baseline.refined, near) + work.all(baseline.coarse_scored, far)
+    refined = partial(baseline.refined, worth=FAR * least)
+    return work.all(refined, near) + work.all(baseline.coarse_scored, far)
 
 
 def _beside(

@@ -32,6 +32,8 @@ BACKTRACKS = 6
 """Step lengths that an iteration tries, each shorter than the last."""
 LOSS_TOLERANCE = 0.5
 """Decrease of the loss below which a fit has converged."""
+PROMISE = 20.0
+"""How many times the decrease that a step promises may come of it, and of those after it."""
 STARTED = 0.05
 """Decrease of the squares that is still to be expected, below which starts are fitted."""
 EARLY, MISSED, FEW_MISSED = 0.25, 4.0, 0.5
@@ -338,6 +340,7 @@ class SegmentEstimator:
         iterations: int = 12,
         cauchy_scale: float = CAUCHY_SCALE,
         told: Callable[[Fit], None] = lambda fit: None,
+        worth: float = np.inf,
     ) -> Fit:
         """The numbers and starts with the least loss.
 
@@ -352,6 +355,7 @@ class SegmentEstimator:
             iterations: at most so many.
             cauchy_scale: mean square residual from which a segment counts as its logarithm.
             told: after each iteration, the best so far.
+            worth: loss from which on it ends where the next step promises no less.
         """
         segments = self.segments
         start = segments.start if start is None else start
@@ -365,6 +369,11 @@ class SegmentEstimator:
             H = H + unknowns.known
             gradient = gradient + unknowns.pull(x)
             before = loss
+            if loss > worth:
+                move = _step(H, gradient, damping, unknowns, x)
+                promised = -(2 * gradient + H @ move) @ move
+                if loss - PROMISE * promised > worth:
+                    break
             for _ in range(BACKTRACKS):
                 move = _step(H, gradient, damping, unknowns, x)
                 simulator, moved = make(x + move), start + segments.prior_std * about.follow(move)
