@@ -394,6 +394,31 @@ def test_a_good_fit_stays_as_it_is(tmp_path):
 
 
 # --- rest and pace
+def test_a_fit_ends_where_it_promises_no_less_than_is_worth_it(tmp_path):
+    """A coasting slide with a damping of 1 N s/m, fitted from thrice that, is within reach of noise;
+    one with a constant force is not, whatever its damping."""
+    time, tried = STEP * np.arange(500), []
+    for q in (0.1 + 0.8 * (1 - np.exp(-time)), 0.1 + 0.8 * time**3):
+        joint = measured(tmp_path, q)
+        segments = segments_for(joint)
+        estimator, base = posed(joint, segments)
+        made = []
+
+        def make(x, base=base, made=made):
+            made.append(x)
+            return base.simulator(x)
+
+        far = np.full(base.count, 3.0)
+        whole = estimator.fit(make, base.unknowns, far)
+        calls = len(made)
+        worth = 2 * estimator.samples
+        found = estimator.fit(make, base.unknowns, far, worth=worth)
+        tried.append((calls, len(made) - calls, whole.loss, found.loss, worth))
+    (calls, again, whole, found, worth), (_, few, least, left, _) = tried
+    assert again == calls and found == whole < worth
+    assert few < calls / 2 and left > 1.01 * least > worth
+
+
 def test_rest_at_an_end_does_not_count_and_rest_elsewhere_does_by_few_samples():
     t = STEP * np.arange(1000)
     segments = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0), 0.4 + 0 * t)

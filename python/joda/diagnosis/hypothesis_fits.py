@@ -298,9 +298,8 @@ def perturbed(
         for way in (-by, by):
             x = best.x.copy()
             x[k] += way
-            worth = best.loss - AS_GOOD
-            trial = estimator.fit(make, unknowns, x, best.start, FEW, worth=worth)
-            if trial.loss < worth:
+            trial = estimator.fit(make, unknowns, x, best.start, FEW)
+            if trial.loss < best.loss - AS_GOOD:
                 best = estimator.fit(make, unknowns, trial.x, trial.start)
     return _free(
         estimator, base, scored(estimator, found.hypothesis, estimator.refit(make, unknowns, best))

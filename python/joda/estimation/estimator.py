@@ -32,8 +32,8 @@ BACKTRACKS = 6
 """Step lengths that an iteration tries, each shorter than the last."""
 LOSS_TOLERANCE = 0.5
 """Decrease of the loss below which a fit has converged."""
-PROMISE = 20.0
-"""How many times the decrease that a step promises may come of it, and of those after it."""
+PROMISE = 3.0
+"""How many times the decrease that a step promises may come of it and of those after it."""
 STARTED = 0.05
 """Decrease of the squares that is still to be expected, below which starts are fitted."""
 EARLY, MISSED, FEW_MISSED = 0.25, 4.0, 0.5
@@ -131,6 +131,13 @@ class Linearization:
         H = Jt @ self.J - SJ.transpose(0, 2, 1) @ self.inverse @ SJ
         g = Jt @ self.r[:, :, None] - SJ.transpose(0, 2, 1) @ self.inverse @ Sr
         return np.asarray(w * H), np.asarray((w * g)[:, :, 0])
+
+    def squares(self, move: Array) -> Array:
+        """What is left of each segment's squares when the numbers move, its start following; shape
+        (m,)."""
+        own = self.follow(move)
+        r = self.r + self.J @ move + (self.S @ own[:, :, None])[:, :, 0]
+        return np.asarray((r**2).sum(axis=1) + ((self.z + own) ** 2).sum(axis=1))
 
     def follow(self, move: Array) -> Array:
         """How the starts move, in doubts, when the numbers do; shape (m, d)."""
@@ -371,8 +378,8 @@ class SegmentEstimator:
             before = loss
             if loss > worth:
                 move = _step(H, gradient, damping, unknowns, x)
-                promised = -(2 * gradient + H @ move) @ move
-                if loss - PROMISE * promised > worth:
+                left = self.loss(about.squares(move), cauchy_scale) + unknowns.penalty(x + move)
+                if loss - PROMISE * (loss - left) > worth:
                     break
             for _ in range(BACKTRACKS):
                 move = _step(H, gradient, damping, unknowns, x)
