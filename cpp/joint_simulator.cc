@@ -136,8 +136,10 @@ JODA_INLINE void JointSimulator::Advance(double h, double force, double command,
     friction = {-D * per_second * v, D, bound};
   }
 
-  const double mass =
-      body_.inertia + h * (Implicit(scheme_, h, drag, body_.inertia) * drag + yielding);
+  // without the plugin the engine integrates damping after all rows, as it does an actuator's
+  const bool own_damping = scheme_ == Scheme::kEngine && body_.friction_row[1] > 0;
+  const double implicit = own_damping ? 0 : Implicit(scheme_, h, drag, body_.inertia);
+  const double mass = body_.inertia + h * (implicit * drag + yielding);
   const double drive = behind.scale * (spring + weight + pushed) + behind.force + servo +
                        bounds.Shift() - (drag + yielding) * v;
   Motion motion = Solve(mass, drive, friction);
@@ -147,9 +149,9 @@ JODA_INLINE void JointSimulator::Advance(double h, double force, double command,
       motion = Solve(mass + limit.D, drive + limit.D * limit.sign * limit.reference, friction);
     }
   }
-  // the engine's implicit integration of an actuator's damping, after all rows
   const bool free = kDriven && servo_.limits[0] < servo && servo < servo_.limits[1];
-  const double slowed = free ? body_.inertia / (body_.inertia + h * servo_.damping) : 1;
+  const double later = (own_damping ? drag : 0) + (free ? servo_.damping : 0);
+  const double slowed = later > 0 ? body_.inertia / (body_.inertia + h * later) : 1;
   state->v = v + h * slowed * motion.acceleration;
   state->q = q + h * state->v;
   state->held = motion.held;

@@ -26,6 +26,7 @@ struct Body {
   std::array<double, 2> solref;  // of the range's ends
   std::array<double, 5> solimp;
   // Of MuJoCo's own friction row: damping (1/s), and stiffness over inertia; 0: the plugin's row.
+  // Where the engine's steps have it, the joint's damping is the engine's own too.
   std::array<double, 2> friction_row = {0, 0};
 };
 

@@ -293,6 +293,28 @@ def test_the_engines_own_friction_row_yields_as_in_the_engine(solref, solimp):
     assert np.ptp(expected[2200:2590]) > 1e-4  # it creeps
 
 
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast"])
+@pytest.mark.parametrize("damping", [0.02, 2.0, 200.0])
+def test_without_the_plugin_damping_acts_after_the_rows_as_in_the_engine(integrator, damping):
+    """A slide that is pushed to and fro between its ends, which throw it back a little."""
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco>
+      <option timestep="0.002" gravity="0 0 0" integrator="{integrator}"/>
+      <worldbody><body>
+        <joint name="j" type="slide" axis="1 0 0" frictionloss="0.2" damping="{damping}"
+               range="-0.3 0.3" solreflimit="0.02 0.3"/>
+        <geom size="0.1" mass="0.14"/>
+      </body></worldbody></mujoco>""")
+    own = friction_row(tuple(model.dof_solref[0]), tuple(model.dof_solimp[0]), 2e-3)
+    forces = (1.5 + 3.0 * damping) * np.cos(8e-3 * np.arange(3000))
+    texts = ["", "sum", "0 1 | 0 1 | 0.2 0.2", "sum", f"0 1 | 0 1 | {damping} {damping}", "sum", ""]
+    body = BODY | {"inertia": 0.14, "solref": model.jnt_solref[0], "solimp": model.jnt_solimp[0]}
+    alone = JointSimulator(-0.3, 0.3, texts, **body, friction_row=own)
+    _, after = alone.replay(forces, [0], [(0.0, 0.0)], [True], 2e-3)
+    expected = engine(model, 0.0, forces)[1:]
+    np.testing.assert_allclose(after, expected, rtol=0, atol=1e-8)
+    assert expected.min() < -0.3 and expected.max() > 0.3
+
+
 # --- steps of second order
 
 

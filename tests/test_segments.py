@@ -395,8 +395,8 @@ def test_a_good_fit_stays_as_it_is(tmp_path):
 
 # --- rest and pace
 def test_a_fit_ends_where_it_promises_no_less_than_is_worth_it(tmp_path):
-    """A coasting slide with a damping of 1 N s/m, fitted from thrice that, may leave only noise; one
-    that speeds up may not, whatever its damping."""
+    """A slide that coasts with a damping of 1 N s/m may leave only noise, fitted from thrice that;
+    one that speeds up may not, whatever its damping."""
     time, tried = STEP * np.arange(500), []
     for q in (0.1 + 0.8 * (1 - np.exp(-time)), 0.1 + 0.8 * time**3):
         joint = measured(tmp_path, q)

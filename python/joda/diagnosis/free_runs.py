@@ -98,13 +98,15 @@ def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = (
         missed = rms(path[there] - part.position[there]) / sigma
         if missed <= BEYOND:
             return missed
-        moved = [other.whole(part, start)[there] - path[there] for other in drawn()]
+        moved = [other.whole(part, start, True)[there] - path[there] for other in drawn()]
         for other, with_it in zip(righted(), others, strict=True):
             run = with_it.runs[number]  # a delay leaves it without some of its samples
             force = np.interp(part.time, run.time, run.force)
             zero = float(np.median(np.interp(part.time, run.time, run.position) - part.position))
             begun = replace(start, best=start.best + np.array([zero, 0.0]))
-            moved.append((other.whole(replace(part, force=force), begun) - zero - path)[there])
+            moved.append(
+                (other.whole(replace(part, force=force), begun, True) - zero - path)[there]
+            )
         apart = rms(np.concatenate(moved)) if moved else 0.0
         spread = [sigma, replayer.scatter(part, start), apart]
         return missed * sigma / float(np.linalg.norm(spread))

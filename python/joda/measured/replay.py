@@ -132,23 +132,30 @@ class Replayer:
         self.servo = joint_model.servo
         self.model = rig(alone, profile, joint_model.friction_row, self.servo)
         self.model.opt.timestep = self.h = timestep
-        self.simulator: JointSimulator | None = None
-        if self.model.nplugin:
-            self.simulator = joint_model.simulator(profile, timestep)
-        else:
+        self.simulator: JointSimulator | None = joint_model.simulator(profile, timestep)
+        if not self.model.nplugin:
             self.model.opt.integrator = joint_model.integrator
+            if joint_model.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+                self.simulator = None
         solref, solimp = joint_model.limits(profile, timestep)
         self.model.jnt_solref[0], self.model.jnt_solimp[0] = solref, solimp
         self.data = mujoco.MjData(self.model)
         self.inertia = joint_model.inertia
 
-    def whole(self, run: Run, start: Start | None) -> Array:
-        """Predicted positions at the run's times, from its start; NaN where force is unknown on."""
+    def whole(self, run: Run, start: Start | None, quickly: bool = False) -> Array:
+        """Predicted positions at the run's times, from its start; NaN where force is unknown on.
+
+        Args:
+            run: measured.
+            start: of it; None: where no force is known.
+            quickly: whether the simulator may stand for MuJoCo.
+        """
         out = np.full(len(run.time), np.nan)
         if start:
+            replay = self._quickly if quickly else self._replay
             time, force = _known(run)
             command = _command(run, len(time))
-            out[: len(time)] = self._replay(time, start.best[None], force[None], command)[0]
+            out[: len(time)] = replay(time, start.best[None], force[None], command)[0]
         return out
 
     def scatter(self, run: Run, start: Start | None) -> float:
@@ -257,8 +264,7 @@ class Replayer:
     def _quickly(
         self, time: Array, starts: Array, forces: Array, command: tuple[Array, Array] | None
     ) -> Array:
-        """The same as `_replay`, without MuJoCo where the joint has the plugin, whose steps the
-        simulator takes too."""
+        """The same as `_replay`, without MuJoCo, whose steps the simulator takes too."""
         if self.simulator is None:
             return self._replay(time, starts, forces, command)
         at = np.array(self.h * np.arange(int(np.ceil(time[-1] / self.h)) + 2))
