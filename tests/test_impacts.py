@@ -64,6 +64,30 @@ def test_the_restitution_of_each_end_is_measured(tmp_path, low, high):
         assert abs(mean - true) < max(4 * error, 0.02)
 
 
+def test_a_force_that_presses_on_an_end_is_no_part_of_its_restitution(tmp_path, rng):
+    """A mass that is pressed to its low end by 40 N from 0.2 to 0.4 m, and thrown back with 0.4 of
+    its speed, again and again; 0.3 would be told from the speeds 10 ms before and after."""
+    (tmp_path / "slide.xml").write_text(SLIDE.replace('damping="0.05"/>', SOLREF.format("0.02 1")))
+    runs = []
+    for k, height in enumerate(np.linspace(0.2, 0.4, 6)):
+        time = np.arange(200) / HERTZ
+        fall = np.sqrt(2 * height / 40)
+        hits = np.cumsum([fall, *(2 * fall * 0.4 ** np.arange(1, 12))])
+        n = np.searchsorted(hits, time, side="right")
+        begun, speed = np.append(0.0, hits)[n], 40 * fall * 0.4**n
+        flown = time - begun
+        position = np.where(n == 0, height, speed * flown) - 20 * flown**2
+        noisy = np.maximum(position, 0.0) + SIGMA * rng.standard_normal(len(time))
+        run = Run(f"run{k}.csv", time, noisy, None, np.full(len(time), -40.0), True)
+        write_run(tmp_path / run.name, run)
+        runs.append(tmp_path / run.name)
+    baseline = fit_baseline(read_measured(tmp_path / "slide.xml", "slide", runs))
+    measured = speed_ratios(baseline.estimator.segments, baseline.base, [-1])
+    mean, error = mean_of(measured)
+    assert len(measured) >= 6
+    assert abs(mean - 0.4) < max(4 * error, 0.04)
+
+
 def ends_named(found):
     return [one.interval for one in found.effects if one.effect == RESTITUTION]
 

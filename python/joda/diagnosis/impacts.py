@@ -226,7 +226,7 @@ def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Ar
     """Of the first impact in each segment: speed after per speed before, and its standard error.
 
     The speeds are those of lines through the samples before the joint is at the end, and after it
-    has left it.
+    has left it, and what the recorded force made of them until and since the middle of the impact.
 
     Returns:
         shape (impacts, 2); impacts without enough samples before or after tell none.
@@ -239,6 +239,7 @@ def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Ar
         own = row[row >= 0]
         near = max(own[0] - AROUND, 0), min(own[-1] + 1 + 2 * AROUND, len(segments.time))
         t, y = segments.time[slice(*near)], segments.position[slice(*near)]
+        pushed = segments.force[segments.step[slice(*near)]] / base.joint_model.inertia
         noise = 1 / float(segments.sharpness[k, 0])
         away = hi - y if sides[k] > 0 else y - lo
         inside = away > CLEAR * noise
@@ -252,6 +253,11 @@ def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Ar
         if not inside[parts[1]].all() or (np.diff(t[parts[0].start : parts[1].stop]) <= 0).any():
             continue  # it hops there, or another run begins
         (before, off), (after, off_after) = (_slope(t[part], y[part]) for part in parts)
+        middle = (t[first - 1] + t[back]) / 2
+        before, after = (
+            speed + float(np.mean(pushed[part])) * (middle - float(np.mean(t[part])))
+            for speed, part in zip((before, after), parts, strict=True)
+        )
         if before * sides[k] > 0:
             ratio = -after / before
             out.append((ratio, noise * np.hypot(off_after, ratio * off) / abs(before)))
