@@ -128,7 +128,14 @@ def test_an_encoders_zero_is_told(tmp_path, rng):
 @pytest.mark.sweep(2, "one number")
 def test_an_offset_of_the_force_is_told(tmp_path, rng):
     offset = float(rng.choice([-1, 1]) * rng.uniform(0.05, 0.12))
-    check(*found_of(tmp_path, rng, offset=offset), "force_offset", offset)
+    measured, found = found_of(tmp_path, rng, offset=offset)
+    check(measured, found, "force_offset", offset)
+    said = diagnosed(measured).diagnosis
+    assert said.verdict == "adequate"
+    if "force_offset" in {one.parameter for one in said.corrections}:  # an effect would do the same
+        assert "A constant force that the model lacks would do the same" in said.summary
+        assert "No effect is missing" not in said.summary
+        assert not said.summary.startswith("The model is adequate")
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import numpy as np
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.calibration import Calibration, Calibrator
+from joda.diagnosis.correction_report import SAME_EFFECT
 from joda.diagnosis.corrections import (
     FAR_OFF,
     OFF,
@@ -86,10 +87,8 @@ TOGETHER = (
     "which: as it stands the model leaves more of whole free runs than noise makes, and with other "
     "numbers it would not."
 )
-WITH_THESE = (
-    "No effect is missing, but as it stands the model {}.{} With these there is {} that an effect "
-    "would explain."
-)
+WITH_THESE = "{}s it stands the model {}.{} With these there is {} that an effect would explain."
+NONE_MISSING = "No effect is missing, but a"
 WHOLE = "misses whole runs by up to {:.0f} times the noise"
 FREELY = "leaves more of whole free runs than noise makes"
 WITHOUT = (
@@ -249,7 +248,8 @@ def _set_right(
         found = fewer
         looks = looked(found.of(measured), exclude, progress)
     others = [one.of(measured) for one in found.drawn()]
-    out = replace(_concluded(found.of(measured), looks, others), looks=looks.evidence)
+    same = not SAME_EFFECT.keys().isdisjoint(found.names)
+    out = replace(_concluded(found.of(measured), looks, others, same), looks=looks.evidence)
     numbers = found.corrections(measured)
     report = out.diagnosis
     summary = " ".join(
@@ -260,9 +260,10 @@ def _set_right(
 
 
 def _concluded(
-    measured: Measured, looks: HorizonSearch, others: Sequence[Measured] = ()
+    measured: Measured, looks: HorizonSearch, others: Sequence[Measured] = (), same: bool = False
 ) -> Diagnosed:
-    """What looking at the measurements says; the others have numbers that are as likely."""
+    """What looking at the measurements says; the others have numbers that are as likely, and `same`
+    is whether a number that was set right does what a missing effect would."""
     ranking, selection = looks.ranking, looks.selection
     first_ranking, first_weighed = looks.first
     one_way = moved_one_way(measured)
@@ -272,7 +273,7 @@ def _concluded(
         return Diagnosed(_report(measured, "insufficient_data", why, (), None))
     suffice = not selection.likely and looks.free and looks.free.suffice
     if selection.verdict == "adequate" or suffice:
-        return _adequate(measured, ranking, looks.free, others)
+        return _adequate(measured, ranking, looks.free, others, same)
     held = Holdout(ranking.baseline, measured)
     named = range(min(NAMED, len(ranking.candidates)))
     every = {
@@ -298,10 +299,10 @@ def _concluded(
     hardly |= far_off(first, measured.floor)
     if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
         # nor do segments held out know of anything
-        return _adequate(measured, first_ranking, looks.free, others)
+        return _adequate(measured, first_ranking, looks.free, others, same)
     helped = helps(first, measured.floor)
     if not helped and all(look.model < MUCH for look in looks.evidence):
-        return _adequate(measured, ranking, looks.free, others)
+        return _adequate(measured, ranking, looks.free, others, same)
     verdict = selection.verdict if helped else "unexplained"
     base, candidate = ranking.baseline.base, ranking.candidates[sized[0]]
     doubt = one_factor(base, candidate) or other_unit(measured)
@@ -343,7 +344,11 @@ def _driven(found: Diagnosed, baseline: Baseline) -> Diagnosed:
 
 
 def _adequate(
-    measured: Measured, ranking: Ranking, free: FreeRuns | None, others: Sequence[Measured]
+    measured: Measured,
+    ranking: Ranking,
+    free: FreeRuns | None,
+    others: Sequence[Measured],
+    same: bool,
 ) -> Diagnosed:
     """No effect shows in segments: the model is adequate, unless whole runs or curves deny it."""
 
@@ -381,19 +386,21 @@ def _adequate(
     if numbers_off:
         numbers_off = f" Its own numbers are off: {numbers_off}.{by_one_factor(own)}"
     missed = worst_run.multiple if worst_run else 0.0
+    none = "A" if same else NONE_MISSING
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
     ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
     verdict: Verdict = "unexplained" if ends and ends.times > BEYOND else "adequate"
     if verdict == "unexplained":
         summary = BEYOND_ENDS.format(noise, left.whole, numbers_off)
     elif numbers_off and worst_run and worst_run.fault:
-        summary = WITH_THESE.format(WHOLE.format(missed), numbers_off, noise)
+        summary = WITH_THESE.format(none, WHOLE.format(missed), numbers_off, noise)
     elif numbers_off and denying:
-        summary = WITH_THESE.format(FREELY, numbers_off, noise)
+        summary = WITH_THESE.format(none, FREELY, numbers_off, noise)
     else:
         loose = missed > MULTIPLE and left.whole <= BEYOND
         adrift = not numbers_off and strays(measured) < CHANCE
-        where = "In windows the model" if adrift or (loose and left.whole > SOME) else "The model"
+        where = "With the numbers below the model" if same else "The model"
+        where = "In windows the model" if adrift or (loose and left.whole > SOME) else where
         summary = f"{where} is adequate: {noise} that an effect would explain.{numbers_off}"
         summary += WITHOUT.format(missed, left.whole) if loose else ADRIFT if adrift else ""
     if ends and verdict == "adequate":
