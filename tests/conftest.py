@@ -15,7 +15,7 @@ sys.path[:0] = [str(Path(__file__).parent / name) for name in ("helpers", "bench
 # tests run side by side: threads within matrix products would only be in each other's way
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 SEED = "JODA_SWEEPS"
-LONG, SLOW, FEW = 0.03, 1 / 7, 10
+LONG, SLOW, FEW = 0.02, 1 / 10, 10
 """Part of the long tests, and of the slow ones, that a session of more than so many files draws."""
 
 
