@@ -87,8 +87,8 @@ TOGETHER = (
     "which: as it stands the model leaves more of whole free runs than noise makes, and with other "
     "numbers it would not."
 )
-WITH_THESE = "{}s it stands the model {}.{} With these there is {} that an effect would explain."
-NONE_MISSING = "No effect is missing, but a"
+WITH_THESE = "{}As it stands the model {}.{} With these there is {} that an effect would explain."
+NONE_MISSING = "No effect is missing. "
 WHOLE = "misses whole runs by up to {:.0f} times the noise"
 FREELY = "leaves more of whole free runs than noise makes"
 WITHOUT = (
@@ -386,7 +386,7 @@ def _adequate(
     if numbers_off:
         numbers_off = f" Its own numbers are off: {numbers_off}.{by_one_factor(own)}"
     missed = worst_run.multiple if worst_run else 0.0
-    none = "A" if same else NONE_MISSING
+    none = "" if same else NONE_MISSING
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
     ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
     verdict: Verdict = "unexplained" if ends and ends.times > BEYOND else "adequate"
