@@ -87,8 +87,8 @@ TOGETHER = (
     "which: as it stands the model leaves more of whole free runs than noise makes, and with other "
     "numbers it would not."
 )
-WITH_THESE = "{}As it stands the model {}.{} With these there is {} that an effect would explain."
-NONE_MISSING = "No effect is missing. "
+WITH_THESE = "as it stands the model {}.{} With these there is {} that an effect would explain."
+NONE_MISSING = "No effect is missing, but "
 WHOLE = "misses whole runs by up to {:.0f} times the noise"
 FREELY = "leaves more of whole free runs than noise makes"
 WITHOUT = (
@@ -355,6 +355,10 @@ def _adequate(
     def unexplained(summary: str, experiment: str | None) -> Diagnosed:
         return Diagnosed(_report(measured, "unexplained", summary, (), experiment))
 
+    def with_these(how: str) -> str:
+        told = WITH_THESE.format(how, numbers_off, noise)
+        return f"{told[0].upper()}{told[1:]}" if same else f"{NONE_MISSING}{told}"
+
     baseline = ranking.baseline
     if not measured.runs and _uneven(measured, baseline):
         return unexplained(_report_uneven(measured), GAUGE_AGAIN)
@@ -386,16 +390,15 @@ def _adequate(
     if numbers_off:
         numbers_off = f" Its own numbers are off: {numbers_off}.{by_one_factor(own)}"
     missed = worst_run.multiple if worst_run else 0.0
-    none = "" if same else NONE_MISSING
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
     ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
     verdict: Verdict = "unexplained" if ends and ends.times > BEYOND else "adequate"
     if verdict == "unexplained":
         summary = BEYOND_ENDS.format(noise, left.whole, numbers_off)
     elif numbers_off and worst_run and worst_run.fault:
-        summary = WITH_THESE.format(none, WHOLE.format(missed), numbers_off, noise)
+        summary = with_these(WHOLE.format(missed))
     elif numbers_off and denying:
-        summary = WITH_THESE.format(none, FREELY, numbers_off, noise)
+        summary = with_these(FREELY)
     else:
         loose = missed > MULTIPLE and left.whole <= BEYOND
         adrift = not numbers_off and strays(measured) < CHANCE
