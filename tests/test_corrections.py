@@ -10,6 +10,7 @@ from hidden_cases import read
 from joda import diagnose
 from joda.diagnosis.verdict import diagnosed
 from joda.hidden import draw
+from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run
 
@@ -96,3 +97,34 @@ def test_of_joints_that_lack_nothing_the_right_numbers_are_within_their_errors()
     for one in found.corrections:
         off = abs(one.value - right[one.parameter])
         assert off < 4 * one.error + 0.01 * right[one.parameter], (seed, one)
+
+
+@pytest.mark.slow
+def test_one_factor_where_no_force_was_recorded_is_the_inertias_and_is_set_right(tmp_path, rng):
+    """A slide of 0.6 kg that its model takes for 1 kg, flicked to and fro: friction and damping are
+    1.67 times the model's, beside its inertia, which no positions tell."""
+    (tmp_path / "slide.xml").write_text("""<mujoco>
+      <option gravity="0 0 0"/>
+      <worldbody><body>
+        <joint name="slide" type="slide" axis="1 0 0" range="0 1" frictionloss="0.3" damping="0.5"/>
+        <geom type="box" size=".1 .1 .1" mass="1"/>
+      </body></worldbody></mujoco>""")
+    time, files = np.arange(400) / 250, []
+    for k, speed in enumerate((1.2, -1.1, 1.0, -1.2, 0.9, -1.0)):
+        rate, level = 0.5 / 0.6, 0.3 / 0.5
+        turns = np.log(1 + abs(speed) / level) / rate
+        t = np.minimum(time, turns)
+        path = (abs(speed) + level) / rate * (1 - np.exp(-rate * t)) - level * t
+        position = 0.1 + path if speed > 0 else 0.9 - path
+        noisy = position + 2e-4 * rng.standard_normal(len(time))
+        files.append(tmp_path / f"run{k}.csv")
+        write_run(files[-1], Run(files[-1].name, time, noisy, None, 0 * time, False))
+    found = diagnosed(read_measured(tmp_path / "slide.xml", "slide", files))
+    told = found.diagnosis
+    assert told.verdict == "adequate"
+    assert [one.factor for one in told.corrections] == pytest.approx([1 / 0.6] * 2, rel=0.05)
+    assert "the joint's inertia 0.6 times the model's" in told.summary
+    assert "force may be in another unit" not in told.summary
+    channels = found.corrected.profile.channels
+    assert channels.friction.components[0].y[0] == pytest.approx(0.5, rel=0.05)
+    assert channels.damping.components[0].y[0] == pytest.approx(0.5 / 0.6, rel=0.05)

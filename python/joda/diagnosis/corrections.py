@@ -270,15 +270,20 @@ def off_without(found: Sequence[Number]) -> str:
     return f" The model's own numbers that suit the runs best without it: {told}." if told else ""
 
 
-def by_one_factor(found: Sequence[Number]) -> str:
+def by_one_factor(found: Sequence[Number], forced: bool) -> str:
     """That all strengths that the data tell are off by one factor, a further sentence: then it may
-    be the force's or, of an actuator too, the inertia's."""
+    be the force's or, where none was recorded and of an actuator too, the inertia's.
+
+    Args:
+        found: the numbers.
+        forced: whether a force was measured.
+    """
     told = [one for one in found if one.error < OFF * one.scale and np.isfinite(one.factor)]
     x = np.array([one.factor for one in told])
     mean = float(x.mean()) if len(x) > 1 else 1.0
     if abs(mean - 1) < FAR_OFF or np.abs(x / mean - 1).max() > ALIKE:
         return ""
-    if any(one.parameter == "actuator_gain" for one in told):
+    if not forced or any(one.parameter == "actuator_gain" for one in told):
         return (
             f" All by one factor, about {mean:.2g}: these numbers may be right, and the joint's "
             f"inertia {1 / mean:.2g} times the model's."

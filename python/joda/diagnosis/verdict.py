@@ -387,8 +387,10 @@ def _adequate(
             summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
             return unexplained(summary, experiment)
         own, numbers_off = surely, off(surely, least)
+    forced = not measured.runs or any(run.forced for run in measured.runs)
+    all_alike = by_one_factor(own, forced) if numbers_off else ""
     if numbers_off:
-        numbers_off = f" Its own numbers are off: {numbers_off}.{by_one_factor(own)}"
+        numbers_off = f" Its own numbers are off: {numbers_off}.{all_alike}"
     missed = worst_run.multiple if worst_run else 0.0
     noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
     ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
@@ -413,7 +415,7 @@ def _adequate(
     report = _report(measured, verdict, summary, (), PRESS if verdict == "unexplained" else None)
     report = replace(report, corrections=corrections(own, measured.profile.joint, least))
     driven = baseline.base.joint_model.servo is not None
-    if doubt or (by_one_factor(own) and not driven):
+    if doubt or (all_alike and forced and not driven):
         return Diagnosed(report)
     return Diagnosed(report, corrected=corrected(baseline, own, least, told.fit.x))
 
