@@ -161,8 +161,8 @@ Args:
   weight: hinge: factors of cos q and sin q of gravity's torque; slide: its force, and 0.
   hinge: whether it is a hinge.
   solref, solimp: of the range's ends.
-  friction_row: of MuJoCo's own friction row: damping, 1/s, and stiffness over inertia; zeros: the
-    plugin's row.
+  friction_row: of MuJoCo's own friction row: damping, 1/s, and stiffness over inertia; in MuJoCo's
+    steps the joint's damping then acts as MuJoCo's own too. Zeros: the plugin's row.
   servo: of an actuator that exerts gain (command - stiffness q) - damping v: gain, stiffness,
     damping, the least and the largest force, and the delay of commands, s.
   trapezoidal: whether damping acts by the mean velocity of a step, and friction turns when the

@@ -393,7 +393,6 @@ def test_a_good_fit_stays_as_it_is(tmp_path):
     assert estimator.refit(base.simulator, base.unknowns, fit) is fit
 
 
-# --- rest and pace
 def test_a_fit_ends_where_it_promises_no_less_than_is_worth_it(tmp_path):
     """A slide that coasts with a damping of 1 N s/m may leave only noise, fitted from thrice that;
     one that speeds up may not, whatever its damping."""
@@ -419,6 +418,7 @@ def test_a_fit_ends_where_it_promises_no_less_than_is_worth_it(tmp_path):
     assert few < calls / 2 and left > 1.01 * least > worth
 
 
+# --- rest and pace
 def test_rest_at_an_end_does_not_count_and_rest_elsewhere_does_by_few_samples():
     t = STEP * np.arange(1000)
     segments = cut(np.maximum(0.9 * (1 - (t / 0.15) ** 2), 0.0), 0.4 + 0 * t)

@@ -149,7 +149,7 @@ class Needs:
         inertia = measured.joint_model.inertia * self.acceleration
         self.force = inertia + applied + gravity + self.exerted(measured.profile)
         self.resistance = self._resisted(measured.profile)
-        self.forced = not measured.runs or any(run.pushed for run in measured.runs)
+        self.forced = measured.pushed
 
     def exerted(self, profile: Profile, effect: str | None = None) -> float:
         """Largest force of a profile, or of one effect of it, where and as fast as runs went; N·m

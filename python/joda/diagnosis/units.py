@@ -33,7 +33,7 @@ def units_of(segments: Segments, measured: Measured) -> Units:
         span=float(np.ptp(profile.joint.range)),
         visited=_visited(segments, measured),
         friction=friction,
-        forced=not measured.runs or any(run.pushed for run in measured.runs),
+        forced=measured.pushed,
         weight=max(map(abs, measured.context.gravity_force)),
         hinge=measured.joint_model.hinge,
     )

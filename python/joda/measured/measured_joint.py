@@ -109,6 +109,11 @@ class Measured:
         return float(np.sqrt(np.mean(np.square(noises))))
 
     @property
+    def pushed(self) -> bool:
+        """Whether anything that is known pushed the joint, see `Run`; a gauge did for curves."""
+        return not self.runs or any(run.pushed for run in self.runs)
+
+    @property
     def unit(self) -> str:
         """Of what a model misses: position, or force where there are only curves."""
         joint = self.profile.joint

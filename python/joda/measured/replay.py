@@ -132,11 +132,11 @@ class Replayer:
         self.servo = joint_model.servo
         self.model = rig(alone, profile, joint_model.friction_row, self.servo)
         self.model.opt.timestep = self.h = timestep
-        self.simulator: JointSimulator | None = joint_model.simulator(profile, timestep)
         if not self.model.nplugin:
             self.model.opt.integrator = joint_model.integrator
-            if joint_model.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-                self.simulator = None
+        self.simulator: JointSimulator | None = None
+        if self.model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:  # whose steps it takes
+            self.simulator = joint_model.simulator(profile, timestep)
         solref, solimp = joint_model.limits(profile, timestep)
         self.model.jnt_solref[0], self.model.jnt_solimp[0] = solref, solimp
         self.data = mujoco.MjData(self.model)
