@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hidden_cases import read
+from lids import RATE, SCENE, SIGMA
 
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.free_runs import BEYOND, worst
 from joda.hidden import draw
+from joda.measured.reading import read_measured
+from joda.measured.replay import Start
+from joda.measured.run_files import write_run
 from joda.measured.runs import Run, until_end, visits
 
 
@@ -62,3 +66,22 @@ def test_a_start_is_sought_as_mujoco_moves_the_joint():
         known = run.time - run.time[0], starts, np.tile(run.force, (2, 1)), None
         apart = np.abs(replayer._quickly(*known) - replayer._replay(*known))
         assert apart.max() < 0.01 * sigma
+
+
+def test_a_run_that_begins_just_before_an_end_is_followed(tmp_path, rng):
+    """Smoothed samples, half of them after it threw the joint back, tell another velocity."""
+    (tmp_path / "model.xml").write_text(
+        SCENE.replace('limited="true"', 'limited="true" solreflimit="0.04 0.3"')
+    )
+    time = np.arange(0, 1.2, 1 / RATE)
+    still = Run("run.csv", time, 1 + SIGMA * rng.standard_normal(len(time)), None, 0 * time, False)
+    write_run(tmp_path / "run.csv", still)
+    replayer = read_measured(tmp_path / "model.xml", "lid", [tmp_path / "run.csv"]).replayer
+    lost = 0
+    for _ in range(40):  # of 40 about 12 by the smoothed samples' start
+        true = np.array([rng.uniform(0.01, 0.05), -rng.uniform(2, 4)])
+        path = replayer.whole(still, Start(true, np.eye(2)))
+        run = replace(still, position=path + SIGMA * rng.standard_normal(len(time)))
+        followed = replayer.whole(run, replayer.start(run, SIGMA))
+        lost += np.sqrt(np.mean((followed - path) ** 2)) > 15 * SIGMA
+    assert lost <= 5

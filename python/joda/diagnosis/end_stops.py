@@ -25,8 +25,7 @@ from joda.estimation.segmentation import segments_of
 from joda.joints.joint_model import JointModel
 from joda.measured import smoothing
 from joda.measured.measured_joint import Measured
-from joda.measured.runs import visits
-from joda.measured.whiteness import CLEAR
+from joda.measured.runs import CLEAR, visits
 from joda.profile import Profile
 from joda.scenes.limits import IMPEDANCES
 from joda.scenes.native import Row

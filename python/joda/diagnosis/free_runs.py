@@ -16,8 +16,8 @@ from joda.measured.instability import followed
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
 from joda.measured.replay import Replayer
-from joda.measured.runs import Run, until_end
-from joda.measured.whiteness import CLEAR, drifts, free_parts
+from joda.measured.runs import CLEAR, Run, until_end
+from joda.measured.whiteness import drifts, free_parts
 
 Array = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.segments import Segments
 from joda.joints.joint_model import JointModel
+from joda.measured.runs import CLEAR
 from joda.profile import Channels, Profile
 from joda.scenes.limits import IMPEDANCE, KNOCK_STEPS, rebounding
 
@@ -30,8 +31,6 @@ FEWEST = 3
 """Restitutions between which the best one is told, at the least."""
 SHORTEST, TIMES = 6, 8
 """Steps that a impact lasts at the least without damping, and how many durations are tried."""
-CLEAR = 3.0
-"""How far off an end a joint must be, in noises, not to be at it."""
 AROUND = 5
 """Samples before and after a impact that tell its speeds."""
 KNOCK_TIME = 0.6

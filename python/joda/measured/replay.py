@@ -15,7 +15,7 @@ from joda._core import JointSimulator
 from joda.joints.joint_model import JointModel
 from joda.joints.rig import rig
 from joda.measured import smoothing
-from joda.measured.runs import Run, held
+from joda.measured.runs import CLEAR, Run, held
 from joda.profile import Profile
 from joda.scenes.context import Context
 from joda.scenes.motion import unheard
@@ -54,6 +54,9 @@ STUCK = 1e-9
 """Part of the motion that a force makes of a free joint, squared, below which it makes none."""
 START = 3.0
 """How far a start may be from the measured one, in its standard deviations."""
+WIDER, SOUGHT = 3.0, np.linspace(-START, START, 25)
+"""Where a joint that knocks at an end is followed poorly from there: by how much less well the
+start is known, and other velocities that are tried."""
 FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 APPLIED = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 COMMANDED = int(mujoco.mjtState.mjSTATE_CTRL)
@@ -114,11 +117,37 @@ class Start:
 
 
 @dataclass(frozen=True)
-class _Prior:
-    """What smoothed samples tell of a run's start: position and velocity, shape (2,) each."""
+class _Beginning:
+    """A run up to where its force is known, and what smoothed samples tell of its start.
 
+    Attributes:
+        time: s, from 0 on, shape (n,).
+        position, force: at these times.
+        command: of the servo, and its times.
+        sigma: noise of the position.
+        mean, deviation: of position and velocity at the start, shape (2,) each.
+    """
+
+    time: Array
+    position: Array
+    force: Array
+    command: tuple[Array, Array] | None
+    sigma: float
     mean: Array
     deviation: Array
+
+    @property
+    def count(self) -> int:
+        """Of the samples within `HORIZON`, at least as many as can be smoothed."""
+        return max(int(np.searchsorted(self.time, HORIZON, side="right")), smoothing.LEAST)
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """A start, and the sum of squares, in noises, of what is missed from it."""
+
+    square: float
+    start: Start
 
 
 class Replayer:
@@ -224,19 +253,22 @@ class Replayer:
             return None
         position = run.position[: len(time)]
         begun = smoothing.smooth(time, position, time[:1], sigma)
-        prior = _Prior(
-            np.array([begun.position[0], begun.velocity[0]]),
-            np.array([begun.position_error[0], begun.velocity_error[0]]),
-        )
-        known = time, position, force, _command(run, len(time)), sigma, prior
-        least, best, covariance = self._fitted_start(*known, False)
+        at = np.array([begun.position[0], begun.velocity[0]])
+        error = np.array([begun.position_error[0], begun.velocity_error[0]])
+        begins = _Beginning(time, position, force, _command(run, len(time)), sigma, at, error)
+        found = self._fitted_start(begins, np.zeros(2), FIRST_HORIZON)
+        poor = POOR * min(len(time), begins.count)
         rests = smoothing.begins_at_rest(time, position, sigma)
-        if rests or least > POOR * min(len(time), int(np.searchsorted(time, HORIZON))):
-            still = self._fitted_start(*known, True)  # a release may be too quick for the samples
-            if still[0] < (AT_REST if rests else 1.0) * least:
-                _, best, covariance = still
-        factor = prior.deviation[:, None] * np.linalg.cholesky(covariance)
-        return Start(prior.mean + prior.deviation * best, factor)
+        if found.square > poor and not rests and self._knocks(position[:FIRST_HORIZON], sigma):
+            wide = replace(begins, deviation=WIDER * error)
+            sought = self._fitted_start(wide, self._sought_start(wide), len(time))
+            found = min(found, sought, key=lambda one: one.square)
+        if rests or found.square > poor:  # a release may be too quick for the samples
+            at_rest = np.array([0.0, -at[1] / error[1]])
+            still = self._fitted_start(begins, at_rest, FIRST_HORIZON, moves=False)
+            if still.square < (AT_REST if rests else 1.0) * found.square:
+                found = still
+        return found.start
 
     def _replay(
         self, time: Array, starts: Array, forces: Array, command: tuple[Array, Array] | None
@@ -282,43 +314,51 @@ class Replayer:
             return None
         return held(*command, edges - self.servo.delay)
 
+    def _knocks(self, position: Array, sigma: float) -> bool:
+        """Whether the joint is at an end of its range, which bends what is smoothed."""
+        low, high = self.model.jnt_range[0]
+        inside = np.minimum(position - low, high - position)
+        return bool(self.model.jnt_limited[0] and inside.min() < CLEAR * sigma)
+
+    def _sought_start(self, begins: _Beginning) -> Array:
+        """Of starts at other velocities the one from which the joint is followed best, in standard
+        deviations."""
+        tried = np.stack([np.zeros(len(SOUGHT)), SOUGHT], axis=1)
+        used = slice(0, begins.count)
+        starts = begins.mean + begins.deviation * tried
+        forces = np.tile(begins.force[used], (len(tried), 1))
+        found = self._quickly(begins.time[used], starts, forces, begins.command)
+        off = np.sum(((found - begins.position[used]) / begins.sigma) ** 2, axis=1)
+        squares = off + np.sum(tried**2, axis=1)
+        return np.asarray(tried[np.argmin(np.where(np.isfinite(squares), squares, np.inf))])
+
     def _fitted_start(
-        self,
-        time: Array,
-        position: Array,
-        force: Array,
-        command: tuple[Array, Array] | None,
-        sigma: float,
-        prior: "_Prior",
-        rests: bool,
-    ) -> tuple[float, Array, Array]:
-        """Gauss-Newton over longer and longer horizons.
+        self, begins: _Beginning, z: Array, used: int, moves: bool = True
+    ) -> _Followed:
+        """Gauss-Newton over longer and longer horizons; what the model fails to follow makes the
+        samples tell less.
 
         Args:
-            time, position, force, command, sigma: of the run.
-            prior: of the start.
-            rests: whether the velocity is zero there, and not fitted.
-
-        Returns:
-            sum of squares, its minimiser and the covariance there, both in prior standard
-            deviations; what the model fails to follow makes the samples tell less.
+            begins: the run.
+            z: where it begins, in standard deviations of the start.
+            used: samples of the first horizon.
+            moves: whether the velocity is fitted.
         """
-        z = np.array([0.0, -prior.mean[1] / prior.deviation[1] if rests else 0.0])
         off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
         covariance, least = np.eye(2), np.inf
         low, high = np.full(2, -START), np.full(2, START)
-        if rests:
+        if not moves:
             low[1] = high[1] = z[1]
-        used, most = FIRST_HORIZON, int(np.searchsorted(time, HORIZON, side="right"))
         while True:
-            early = slice(0, max(min(used, most), smoothing.LEAST))
-            forces = np.tile(force[early], (3, 1))
+            early = slice(0, min(used, begins.count))
+            time, position = begins.time[early], begins.position[early] / begins.sigma
+            forces = np.tile(begins.force[early], (3, 1))
             step, least = np.zeros(2), np.inf
             for _ in range(TRIES):
                 tried = np.clip(z + step, low, high)
-                starts = prior.mean + prior.deviation * (tried + off)
-                found = self._quickly(time[early], starts, forces, command) / sigma
-                misfit = found[0] - position[early] / sigma
+                starts = begins.mean + begins.deviation * (tried + off)
+                found = self._quickly(time, starts, forces, begins.command) / begins.sigma
+                misfit = found[0] - position
                 square = float(misfit @ misfit + tried @ tried)
                 if square >= least - SETTLED or not np.isfinite(found).all():
                     if square < least + SETTLED:
@@ -331,10 +371,11 @@ class Replayer:
                 step = -np.linalg.solve(precision + np.eye(2), slopes.T @ misfit + tried)
                 overdispersion = max(float(misfit @ misfit) / len(misfit), 1.0)
                 covariance = np.linalg.inv(precision / overdispersion + np.eye(2))
-            if used >= min(most, len(time)):
+            if used >= min(begins.count, len(begins.time)):
                 break
             used *= LONGER
-        return least, z, covariance
+        spread = begins.deviation[:, None] * np.linalg.cholesky(covariance)
+        return _Followed(least, Start(begins.mean + begins.deviation * z, spread))
 
     def windows(self, run: Run, sigma: float, length: float = WINDOW) -> list[Window]:
         """The run in windows one after another; where the force is unknown there are none.

@@ -13,8 +13,9 @@ from joda.measured import smoothing
 
 Array = NDArray[np.float64]
 
-LEFT = 2.0
-"""How far off an end a joint is that has left it, in units of how far one is that is not at it."""
+CLEAR, LEFT = 3.0, 2.0
+"""How far off an end a joint must be, in noises, not to be at it; and by how much farther to have
+left it."""
 STOP = 0.004
 """How near an end of the range, in normalised position, counts as touching it, beside noise."""
 

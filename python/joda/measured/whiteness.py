@@ -16,15 +16,13 @@ from scipy.stats import chi2
 
 from joda.measured.measured_joint import Measured
 from joda.measured.replay import Start
-from joda.measured.runs import Run, until_end
+from joda.measured.runs import CLEAR, Run, until_end
 from joda.measured.smoothing import resolution
 
 Array = NDArray[np.float64]
 
 BLOCKS, LEAST, FEW = 16, 10, 5
 """Blocks of a run, at most; samples of each, at least; and fewest blocks that tell anything."""
-CLEAR = 3.0
-"""How far off an end a joint must be, in noises, not to be at it."""
 SPIKE = 4.0
 """Errors beyond so many noises count as so many: single wrong samples."""
 DITHER = 2
