@@ -6,13 +6,15 @@ import mujoco
 import numpy as np
 import pytest
 from hidden_cases import read
-from lids import FRICTION, INERTIA, RATE, SIGMA, SPAN, thrown
+from lids import FRICTION, INERTIA, RATE, SCENE, SIGMA, SPAN, thrown
 
 from joda import compare
 from joda.diagnosis.baseline import fit_baseline
+from joda.diagnosis.coverage import too_little
 from joda.diagnosis.free_runs import free_runs
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
+from joda.estimation.problem import segments_for
 from joda.hidden import draw
 from joda.measured.comparison import sentences
 from joda.measured.reading import read_measured
@@ -230,6 +232,20 @@ def test_a_joint_at_rest_tells_nothing(tmp_path, rng):
     said = diagnosed(measured.with_runs([stuck], [0])).diagnosis
     assert (said.verdict, said.effects) == ("insufficient_data", ())
     assert "does not move" in said.summary
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_a_quick_motion_tells_even_where_each_short_window_has_little_of_it(tmp_path, rng, moves):
+    """Of a coarse encoder: 3 rad within 0.1 s, in windows of a dozen samples."""
+    (tmp_path / "model.xml").write_text(SCENE)
+    files = [tmp_path / f"run{k}.csv" for k in range(3)]
+    time = np.arange(0, 0.6, 1e-3)
+    for file in files:
+        away = (3.0 if moves else 0.2) * np.exp(-time / 0.04) + 0.05 * rng.standard_normal(600)
+        write_run(file, Run(file.name, time, np.round(0.5 + away, 1), None, 0 * time, False))
+    measured = read_measured(tmp_path / "model.xml", "lid", files)
+    assert segments_for(measured).length < 0.03 or not moves
+    assert bool(too_little(measured)) != moves
 
 
 def test_positions_that_repeat_clear_nothing(tmp_path, rng):

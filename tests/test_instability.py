@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from joda.diagnosis.outcome import read_runs
-from joda.joints.divergence import GROWN, divergence_rate
+from joda.joints.divergence import GROWN, linearized
 from joda.measured.instability import followed, longest_followed
 
 INERTIA, WEIGHT, DAMPING = 0.05, 0.8, 0.03
@@ -42,7 +42,7 @@ def rod(tmp_path):
 
 def test_at_the_top_it_is_the_root_of_the_linear_equation(rod):
     measured, rows = rod(0.2)
-    top = divergence_rate(measured.profile, measured.joint_model, np.zeros(1))[0]
+    top = linearized(measured.profile, measured.joint_model, np.zeros(1)).rate[0]
     assert top == pytest.approx(max(np.roots([INERTIA, DAMPING, -WEIGHT])), rel=1e-3)
     early = (rows[:, 1] > 0.01) & (rows[:, 1] < 0.1)  # where MuJoCo's own motion is e^(rate t)
     slope = np.polyfit(rows[early, 0], np.log(rows[early, 1]), 1)[0]
@@ -51,19 +51,19 @@ def test_at_the_top_it_is_the_root_of_the_linear_equation(rod):
 
 def test_where_it_hangs_or_lies_at_an_end_it_is_zero(rod):
     measured, _ = rod(-0.2)
-    assert not divergence_rate(measured.profile, measured.joint_model, np.linspace(-1, 1, 9)).any()
+    assert not linearized(measured.profile, measured.joint_model, np.linspace(-1, 1, 9)).rate.any()
     assert longest_followed(measured, 1.5) == 1.5
     (run,), (sigma,) = measured.runs, measured.sigma
     assert len(followed(measured, run, sigma).time) == len(run.time)
     standing, _ = rod(0.2)
     ends = np.deg2rad([-100, -99, 99, 100])
-    assert not divergence_rate(standing.profile, standing.joint_model, ends).any()
+    assert not linearized(standing.profile, standing.joint_model, ends).rate.any()
 
 
 def test_a_rod_that_stands_is_followed_until_its_noise_is_a_part_of_the_range(rod):
     measured, _ = rod(0.2, noise=2e-3)
     (run,), (sigma,) = measured.runs, measured.sigma
-    rate = divergence_rate(measured.profile, measured.joint_model, np.zeros(1))[0]
+    rate = linearized(measured.profile, measured.joint_model, np.zeros(1)).rate[0]
     upright = np.log(GROWN * np.deg2rad(200) / sigma) / rate  # as long as it is nearly
     assert np.ptp(followed(measured, run, sigma).time) == pytest.approx(upright, rel=0.1)
     assert 0.7 * upright < longest_followed(measured, 1.4) < 1.1 * upright < 1.4

@@ -1,6 +1,7 @@
 """How measured runs are cut into segments, and what simulates the joint in them."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from joda.estimation.problem import joint_model_for, posed, segments_for
 from joda.estimation.segmentation import STEPS, _responses, _step, segments_of
 from joda.estimation.segments import GRID
 from joda.estimation.unknowns import EMPTY, NOTHING
-from joda.joints.divergence import GROWN
+from joda.joints.divergence import GROWN, Linearized, undisturbed
 from joda.measured import smoothing
 from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
@@ -201,25 +202,34 @@ def test_starts_are_sought_from_those_of_a_fit_nearby_where_these_miss_less():
     assert np.array_equal(helped.start[others], alone.start[others])
 
 
-def test_errors_of_a_force_grow_where_the_joint_runs_away():
-    """Against the differential equation; a joint that does not run away is a free one."""
+def test_errors_of_a_force_go_on_as_the_joint_makes_them():
+    """Against the differential equation: where it runs away, swings, and is damped, also heavily;
+    a joint of which nothing acts is a free one."""
     rng = np.random.default_rng(0)
     times = np.cumsum(np.append(0.0, rng.uniform(0.01, 0.05, 30)))
     gaps = np.diff(times, append=times[-1])
-    rate = np.where(rng.uniform(size=31) < 0.7, rng.uniform(0, 6, 31), 0.0)
-    found = _responses(times, gaps, rate)
+    push = np.where(rng.uniform(size=31) < 0.7, rng.uniform(-40, 40, 31), 0.0)
+    drag = np.where(rng.uniform(size=31) < 0.7, 10 ** rng.uniform(-1, 2, 31), 0.0)
+    found = _responses(times, gaps, Linearized(push, drag))
     for k in (0, 7, 20):
         x = np.array([0.5 * gaps[k], 1.0])
         assert not found[: k + 1, k].any()
         for i in range(k + 1, 30):
             assert found[i, k] == pytest.approx(x[0], rel=1e-7)
             pushed = solve_ivp(
-                lambda t, y, r=rate[i]: (y[1], r**2 * y[0]), (0, gaps[i]), x, rtol=1e-10, atol=1e-12
+                lambda t, y, k=push[i], c=drag[i]: (y[1], k * y[0] - c * y[1]),
+                *((0, gaps[i]), x),
+                rtol=1e-10,
+                atol=1e-12,
             )
             x = pushed.y[:, -1]
     free = np.maximum(times[:, None] - times - 0.5 * gaps, 0.0)
-    assert np.allclose(_responses(times, gaps, np.zeros(31)), free)
-    assert np.allclose(_responses(times, gaps, np.full(31, 1e-6)), free, atol=1e-9)
+    assert np.allclose(_responses(times, gaps, undisturbed(times)), free)
+    for push, drag in product((-1e-12, 0, 1e-12), (0, 1e-9)):
+        nearly = Linearized(np.full(31, push), np.full(31, drag))
+        assert np.allclose(_responses(times, gaps, nearly), free, atol=1e-8)
+    stuck = _responses(times, gaps, Linearized(np.zeros(31), np.full(31, 1e6)))
+    assert np.isfinite(stuck).all()
 
 
 @pytest.mark.parametrize("each", [1, 30])
@@ -263,8 +273,8 @@ def test_a_segment_begins_after_the_one_jump_of_a_force_that_a_joint_which_stick
 def test_segments_end_where_an_error_at_their_begins_has_grown_to_a_part_of_the_range(rate):
     """Errors grow as exp(rate t) where the joint runs away, above the middle of its range."""
     run = run_of(0.5 + 0.3 * np.sin(np.pi * STEP * np.arange(2000)))
-    diverges = lambda q: np.where(q > 0.5, rate, 0.0)  # noqa: E731
-    segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP, 0.5, diverges=diverges)
+    nearby = lambda q: Linearized(np.where(q > 0.5, rate**2, 0.0), 0 * q)  # noqa: E731
+    segments = segments_of([run], [SIGMA], 1.0, 0.0, 1.0, STEP, 0.5, nearby=nearby)
     lengths = np.diff(segments.h * segments.at, append=2.0)
     most = np.log(GROWN / SIGMA) / rate
     there = segments.at * segments.h < 0.99

@@ -236,6 +236,9 @@ def test_one_way_friction_and_a_force_are_both_named_if_neither_is_sure(extra, t
     assert told.next_experiment == "Measure the way back too, as slowly."
 
 
+COASTING = """<mujoco><option gravity="0 0 0"/><worldbody><body>
+<joint name="lift" type="slide" axis="0 0 1" range="0 3" damping="0.5" frictionloss="0.4"/>
+<geom size=".1" mass="1"/></body></worldbody></mujoco>"""
 SLIDING = """<mujoco>
   <option timestep="0.002" gravity="0 0 -10"/>
   <worldbody>
@@ -269,6 +272,35 @@ def test_a_little_of_the_way_back_tells_friction_from_a_force(speed, tells, tmp_
     told = diagnosed(measured).diagnosis
     assert (told.verdict == "adequate") == tells, told
     assert ("in one direction only" in told.summary) != tells
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("friction", "damping"), [(0.6, 0.6), (0.6, 0.75)])
+def test_numbers_that_coasting_tells_to_be_off_by_one_factor_are_an_inertia(
+    friction, damping, tmp_path, rng
+):
+    """Without another force only friction and damping per inertia show."""
+    model = write_scene(tmp_path, COASTING, "m.xml")
+    files = [tmp_path / f"run{k}.csv" for k in range(6)]
+    f, c = friction * 0.4, damping * 0.5
+    for k, file in enumerate(files):
+        time, speed = np.arange(0, 1.5, 0.002), rng.uniform(0.8, 2.0)
+        moves = np.minimum(time, np.log1p(c * speed / f) / c)
+        path = (speed + f / c) * -np.expm1(-c * moves) / c - f / c * moves
+        noisy = 1.5 + (-1) ** k * (path - 1.4) + 1e-4 * rng.standard_normal(len(time))
+        write_run(file, Run(file.name, time, noisy, None, 0 * time, False))
+    told = diagnose(model, "lift", files)
+    if friction != damping:
+        assert (told.verdict, len(told.corrections)) == ("adequate", 2)
+        return
+    assert (told.verdict, told.corrections) == ("missing_effect", ())
+    (heavier,) = told.effects
+    assert heavier.effect == "added_inertia" and heavier.probability > 0.9
+    assert abs(heavier.magnitude - (1 / 0.6 - 1)) < 3 * heavier.magnitude_error
+    assert "off by one and the same factor" in told.summary
+    (tmp_path / "said.json").write_text(told.to_json())
+    added = add(model, "lift", tmp_path / "said.json", files, tmp_path / "new.xml")
+    assert added.effect == "added_inertia" and added.after.whole < 0.2 * added.before.whole
 
 
 @pytest.mark.slow

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
+from scipy.stats import multivariate_normal
 
 from joda._core import JointSimulator
 from joda.component import Component
@@ -33,6 +35,11 @@ STEP = 1e-3
 ALIKE = 0.12
 """By how much factors may differ that are one."""
 
+SPREAD, USUALLY = 0.3, 10.0
+"""How far numbers of models usually are off, the standard deviation of a factor's logarithm; and
+how many times as often they are as the inertia is, and they are not."""
+ZERO = 1e-9
+"""A factor that is as good as none."""
 SLOW = 0.02
 """A delay of commands (s) of which a part counts as the same part of another number does."""
 
@@ -278,12 +285,11 @@ def by_one_factor(found: Sequence[Number], forced: bool) -> str:
         found: the numbers.
         forced: whether a force was measured.
     """
-    told = [one for one in found if one.error < OFF * one.scale and np.isfinite(one.factor)]
-    x = np.array([one.factor for one in told])
+    x = np.array([one.factor for one in _told(found)])
     mean = float(x.mean()) if len(x) > 1 else 1.0
     if abs(mean - 1) < FAR_OFF or np.abs(x / mean - 1).max() > ALIKE:
         return ""
-    if not forced or any(one.parameter == "actuator_gain" for one in told):
+    if not forced or any(one.parameter == "actuator_gain" for one in found):
         return (
             f" All by one factor, about {mean:.2g}: these numbers may be right, and the joint's "
             f"inertia {1 / mean:.2g} times the model's."
@@ -292,6 +298,28 @@ def by_one_factor(found: Sequence[Number], forced: bool) -> str:
         f" All by one factor, about {mean:.2g}: the measured force may be in another unit, or its "
         "lever arm another."
     )
+
+
+def heavier(found: Sequence[Number]) -> float:
+    """Probability that the joint's inertia is more than the model's, where no force was recorded
+    and all strengths are less by one factor: that each is off by a factor of its own, and these are
+    alike by chance, is the other way to see it. Factors are log-normal before the data; 0 where
+    fewer than two are told."""
+    told = _told(found)
+    off = np.log([max(one.factor, ZERO) for one in told])
+    if len(told) < 2 or off.mean() > 0:
+        return 0.0
+    errors = np.diag([(one.error / one.value) ** 2 for one in told])
+    n, apart, alike = np.zeros(len(told)), np.eye(len(told)), np.ones((len(told), len(told)))
+    one, each = (
+        multivariate_normal.logpdf(off, n, SPREAD**2 * prior + errors) for prior in (alike, apart)
+    )
+    return float(expit(one - each - np.log(USUALLY)))
+
+
+def _told(found: Sequence[Number]) -> list[Number]:
+    """Those that the data tell."""
+    return [one for one in found if one.error < OFF * one.scale and np.isfinite(one.factor)]
 
 
 def one_factor(base: BaseModel, candidate: FittedHypothesis) -> str | None:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.estimation.problem import segments_for
-from joda.estimation.segments import Segments
+from joda.estimation.segments import Integers, Segments
 from joda.measured.curves import FEW, TOO_LOUD, too_loud
 from joda.measured.data_checks.timing import repeats
 from joda.measured.measured_joint import Measured
@@ -12,7 +12,7 @@ from joda.measured.quasi_static import QuasiStaticComparison
 from joda.measured.slow_runs import one_way, ways
 
 WINDOWS, MOVES = 4, 8.0
-"""Fewest segments with motion that tell anything; and what is motion, in noises."""
+"""Fewest segments with motion, or motions, that tell anything; and what is one, in noises."""
 VISITED = 0.02
 """Least part of the range that must be visited."""
 
@@ -48,9 +48,18 @@ def at_rest(measured: Measured) -> str:
 
 
 def _moving(measured: Measured, segments: Segments) -> int:
-    """In how many segments the joint moves by more than noise."""
-    own = [segments.position[row[row >= 0]] for row in segments.rows[segments.usable]]
-    return sum(bool(np.ptp(position) > MOVES * max(measured.sigma)) for position in own)
+    """In how many segments the joint moves by more than noise; where a coarse encoder makes that
+    large for short segments, of how many such motions its runs consist."""
+    far = MOVES * max(measured.sigma)
+
+    def motions(rows: Integers) -> int:
+        own = rows[rows >= 0]
+        return int(np.ptp(segments.position[own]) / far) if len(own) else 0
+
+    usable = segments.usable
+    windows = sum(motions(row) > 0 for row in segments.rows[usable])
+    runs = (usable & (segments.run == number) for number in np.unique(segments.run))
+    return max(windows, sum(motions(segments.rows[own]) for own in runs))
 
 
 def too_little(measured: Measured) -> str:

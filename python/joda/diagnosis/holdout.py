@@ -62,6 +62,14 @@ class Holdout:
             return robust_rms(without, self.floor), robust_rms(with_it, self.floor)
         return self.before, self._error(make, unknowns, found.fit)
 
+    @property
+    def as_given(self) -> float:
+        """The same of the model with its own numbers as they were given."""
+        baseline = self.baseline
+        given = replace(baseline.fit, x=baseline.base.unknowns.mean)
+        own = baseline.estimator.segments, baseline.base.simulator, given
+        return robust_rms(_misfit(*own, np.any(self.folds, axis=0)), self.floor)
+
     def _error(self, make: Make, unknowns: Unknowns, fit: Fit) -> float:
         estimator, missed = self.baseline.estimator, []
         for held in self.folds:

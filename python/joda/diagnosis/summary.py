@@ -77,6 +77,20 @@ def summarised(
     return f"{head} {name} ({likely}).{more}"
 
 
+def heavier_told(found: Finding, numbers_off: str) -> str:
+    """That more inertia is missing, which the model's own numbers tell.
+
+    Args:
+        found: that.
+        numbers_off: how far off they would be without it.
+    """
+    likely = f"probability {phrases.percent(found.probability)}"
+    return (
+        f"The model lacks {phrases.named(found.effect)} ({likely}): without it, its own numbers "
+        f"would be off by one and the same factor ({numbers_off}), which chance seldom makes."
+    )
+
+
 def helps(found: Finding, floor: float) -> bool:
     """Whether what was held out is missed by less with an effect; where it is missed by less than
     the noise even without, whether not by clearly more: there its error is noise with and without.

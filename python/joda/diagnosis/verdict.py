@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
-from joda.diagnosis.calibration import Calibration, Calibrator
+from joda.diagnosis.calibration import HEAVIER, Calibration, Calibrator
 from joda.diagnosis.correction_report import SAME_EFFECT
 from joda.diagnosis.corrections import (
     FAR_OFF,
@@ -16,6 +16,7 @@ from joda.diagnosis.corrections import (
     corrected,
     corrections,
     errors_beside_a_force,
+    heavier,
     numbers,
     off,
     off_beside,
@@ -37,7 +38,16 @@ from joda.diagnosis.ranking import Ranking, hopeful, weigh
 from joda.diagnosis.rivals import indistinguishable
 from joda.diagnosis.search import Progress, rank
 from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection
-from joda.diagnosis.summary import BOUNCY, FALLEN, SAME, far_off, helps, other_unit, summarised
+from joda.diagnosis.summary import (
+    BOUNCY,
+    FALLEN,
+    SAME,
+    far_off,
+    heavier_told,
+    helps,
+    other_unit,
+    summarised,
+)
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.units import units_of
 from joda.estimation.base_model import BaseModel
@@ -388,6 +398,9 @@ def _adequate(
             return unexplained(summary, experiment)
         own, numbers_off = surely, off(surely, least)
     forced = not measured.runs or any(run.forced for run in measured.runs)
+    sure = heavier(own) if numbers_off and not forced else 0.0
+    if sure > SURE and (found := _heavier(measured, ranking, numbers_off, sure)):
+        return found
     all_alike = by_one_factor(own, forced) if numbers_off else ""
     if numbers_off:
         numbers_off = f" Its own numbers are off: {numbers_off}.{all_alike}"
@@ -418,6 +431,23 @@ def _adequate(
     if doubt or (all_alike and forced and not driven):
         return Diagnosed(report)
     return Diagnosed(report, corrected=corrected(baseline, own, least, told.fit.x))
+
+
+def _heavier(
+    measured: Measured, ranking: Ranking, numbers_off: str, probability: float
+) -> Diagnosed | None:
+    """That the joint is heavier, which numbers that are off by one factor tell; None where no more
+    inertia can be asked for."""
+    for number, candidate in enumerate(ranking.candidates):
+        if candidate.hypothesis.effect == HEAVIER:
+            held = Holdout(ranking.baseline, measured)
+            one = finding(measured, ranking, held, number, weigh(ranking))
+            before = held.as_given  # without it, it is the model's numbers that are off
+            one = replace(one, probability=probability, held_out_error_before=before)
+            summary = heavier_told(one, numbers_off)
+            report = _report(measured, "missing_effect", summary, (one,), None)
+            return Diagnosed(report, candidate.written(ranking.baseline.base), (one,))
+    return None
 
 
 def _report_uneven(measured: Measured) -> str:

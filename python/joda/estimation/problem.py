@@ -10,7 +10,7 @@ from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.quasi_static import QuasiStaticJoint, curve_segments
 from joda.estimation.segmentation import BEYOND, segments_of
 from joda.estimation.segments import Segments
-from joda.joints.divergence import divergence_rate
+from joda.joints.divergence import linearized
 from joda.joints.joint_model import JointModel
 from joda.measured.measured_joint import Measured
 from joda.scenes.limits import stiffness_of
@@ -29,8 +29,8 @@ def segments_for(measured: Measured, length: float | None = None, fine: bool = T
     lo, hi = measured.profile.joint.range
     fixed = lo, measured.joint_model.inertia, measured.timestep
     ends = float(np.sqrt(stiffness_of(measured.joint_model.solref, measured.timestep)))
-    diverges = partial(divergence_rate, measured.profile, measured.joint_model)
-    return segments_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine, diverges, ends)
+    nearby = partial(linearized, measured.profile, measured.joint_model)
+    return segments_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine, nearby, ends)
 
 
 def posed(

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from joda.estimation.segments import GRID, LOOSE, Array, Integers, Segments, rows_of
-from joda.joints.divergence import bearable
+from joda.joints.divergence import Linearized, bearable, undisturbed
 from joda.measured import smoothing
 from joda.measured.runs import STOP, Run, held, known
 
@@ -42,10 +42,11 @@ JOLTED = 0.03
 they would more, as where a hand pulls up between two samples, a segment begins after them."""
 JUMPED = 10.0
 """Noises by which a single one may, where it is more than all others together: one that sticks soon
-after stays where it was moved to, and a free one goes on.
-"""
+after stays where it was moved to, and a free one goes on."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a segment's samples share it."""
+FLAT = 1e-6
+"""Argument at which a sine is that."""
 BEYOND = 4.0
 """Noises outside its range at which a joint is beyond it."""
 CLEAR = 1.5
@@ -61,7 +62,7 @@ def segments_of(
     timestep: float,
     length: float | None = None,
     fine: bool = True,
-    diverges: Callable[[Array], Array] = np.zeros_like,
+    nearby: Callable[[Array], Linearized] = undisturbed,
     limit_rate: float = 0.0,
     thinned: bool = True,
     cut_at_ends: bool = True,
@@ -77,8 +78,7 @@ def segments_of(
         length: of the segments, s; None: by the joint's pace.
         fine: whether steps are as short as the segments ask for, so that the laws act and not their
             steps; else they are the scene's.
-        diverges: how fast (1/s) the joint runs away from positions (rad or m), as a force that
-            drives it on makes it; 0 where it does not.
+        nearby: how errors of the joint's motion go on from positions (rad or m).
         limit_rate: natural frequency of the joint at an end of its range, 1/s: how fast the end,
             pressed as deep as the noise hides, may throw it back.
         thinned: whether of many samples, or where the joint rests, only some count.
@@ -108,8 +108,8 @@ def segments_of(
             spread, push = _spread(time, position, sigma), run.part(piece).force_error()
             far = JOLTED * span, JUMPED * float(np.median(spread))
             begins = _after_jolts(begins, index, time, push / inertia, *far)
-            grows = bearable(span, float(np.median(spread)))
-            begins = _while_followed(begins, index, time, diverges(position), grows)
+            rate, grows = nearby(position).rate, bearable(span, float(np.median(spread)))
+            begins = _while_followed(begins, index, time, rate, grows)
             place_noise = (position - lo) / span, spread / span
             hits = np.zeros(len(time), bool)
             if cut_at_ends:
@@ -166,7 +166,7 @@ def segments_of(
         run=run_of,
         rows=rows,
         sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
-        shared=_shared(rows, time, spread, push / inertia, diverges(position)),
+        shared=_shared(rows, time, spread, push / inertia, nearby(position)),
         impacts=_knocks(rows, place, noise, hits),
         rests=_rests(rows, place, noise),
         stays=_stays(rows, place, noise) * np.array([run.forced for run in runs])[run_of[window]],
@@ -276,12 +276,12 @@ def _spread(time: Array, position: Array, sigma: float) -> Array:
     return np.asarray(np.hypot(sigma, late * smooth))
 
 
-def _shared(rows: Integers, time: Array, sigma: Array, push: Array, rate: Array) -> Array:
+def _shared(rows: Integers, time: Array, sigma: Array, push: Array, nearby: Linearized) -> Array:
     """What of the noise a segment's samples share, see `Segments`.
 
     Besides the position's noise there is that of the force: an error of acceleration `push`, from
-    one sample to the next, moves a free joint by that time, and on at the speed that it got; one
-    that runs away at a `rate` further, see `_responses`. In units of the position's noise the
+    one sample to the next, moves the joint by that time, and on at the speed that it got, see
+    `_responses`. In units of the position's noise the
     covariance is 1 + sum of l u uᵀ over few directions u, and its inverse root 1 - sum of
     (1 - 1 / sqrt(1 + l)) u uᵀ.
     """
@@ -296,7 +296,11 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array, rate: Array)
         gaps = np.diff(t, append=t[-1])
         between = np.sqrt(np.diff(given[own], append=given[own[-1:]]))  # in samples left out, too
         speeds = np.maximum(gaps * push[own], between)
-        moved = _responses(t, gaps, rate[own]) * speeds / sigma[own][:, None]
+        moved = (
+            _responses(t, gaps, Linearized(nearby.push[own], nearby.drag[own]))
+            * speeds
+            / sigma[own][:, None]
+        )
         size, way = np.linalg.eigh(moved @ moved.T)
         much = size > SHARED
         found.append(way[:, much] * np.sqrt(1 - 1 / np.sqrt(1 + size[much])))
@@ -306,21 +310,23 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array, rate: Array)
     return out
 
 
-def _responses(t: Array, gaps: Array, rate: Array) -> Array:
-    """Where a joint is at each time that was given a speed of 1 in the midst of each gap before.
-
-    It moves by x'' = rate² x, with the rate of each gap; a free one, of rate 0, by the time since.
-    Shape (n, n): times, gaps.
-    """
-    if not rate.any():
+def _responses(t: Array, gaps: Array, nearby: Linearized) -> Array:
+    """Where a joint is at each time that was given a speed of 1 in the midst of each gap before, in
+    how its errors go on in each gap; a free one by the time since. Shape (n, n): times, gaps."""
+    push, drag = nearby.push, nearby.drag
+    if not push.any() and not drag.any():
         return np.maximum(t[:, None] - t - 0.5 * gaps, 0.0)
+    root = np.sqrt(drag**2 / 4 + push + 0j)  # of x'' = push x - drag x'; imaginary: it swings
+    first, second = np.exp((root - drag / 2) * gaps), np.exp((-root - drag / 2) * gaps)
+    flat = np.abs(root * gaps) < FLAT
+    same = ((first + second) / 2).real
+    new = np.where(flat, gaps * same, ((first - second) / np.where(flat, 1, 2 * root)).real)
     out = np.zeros((len(t), len(t)))
     x, v = np.zeros(len(t)), np.zeros(len(t))
     for i in range(1, len(t)):
-        r, gap = rate[i - 1], gaps[i - 1]
-        growing, going = np.cosh(r * gap), np.sinh(r * gap) / r if r else gap
-        x, v = growing * x + going * v, r**2 * going * x + growing * v
-        x[i - 1], v[i - 1] = 0.5 * gap, 1.0
+        k, half, a, b = push[i - 1], drag[i - 1] / 2, same[i - 1], new[i - 1]
+        x, v = (a + half * b) * x + b * v, k * b * x + (a - half * b) * v
+        x[i - 1], v[i - 1] = 0.5 * gaps[i - 1], 1.0
         out[i] = x
     return out
 

@@ -25,13 +25,13 @@ STILL = 1e-3
 """Velocity up to which a joint counts as at rest, ranges per natural time."""
 
 
-def trembling(draw: Draw, size: float) -> Draw:
-    """The same with a hand that trembles, by up to this force."""
+def trembling(draw: Draw, size: float, pace: tuple[float, float] = (8.0, 20.0)) -> Draw:
+    """The same with a hand that trembles, by up to this force, so often in a natural time."""
 
     def plan(rng: np.random.Generator, ground: Ground, t: Array) -> Plan:
         one = draw(rng, ground, t)
         tremor = np.zeros_like(t)
-        for frequency in rng.uniform(8, 20, 3):
+        for frequency in rng.uniform(*pace, 3):
             tremor += np.sin(2 * np.pi * (frequency * t + rng.random()))
         return replace(one, push=one.push + size * rng.uniform(0.3, 1.0) / 3 * tremor * one.grip)
 

@@ -68,7 +68,7 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
         ramp,
         shove((0.3, 1.0)),
         press((0.0, 0.5), 4.0),
-        trembling(hand(1.5, (5.0, 15.0)), 0.2),
+        trembling(hand(1.5, (5.0, 15.0)), 0.2, (1.0, 3.0)),  # which no sampling shows if quicker
     )
     left: tuple[Draw, ...] = (toss(0.8), flick(0.5), drop, flick(1.0))
     if KNOCKING in names:

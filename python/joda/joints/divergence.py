@@ -1,4 +1,6 @@
-"""How fast a joint runs away from where its force pushes it on."""
+"""How errors of a joint's motion go on: how fast it runs away where its force pushes it on."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +18,42 @@ GROWN = 0.03
 slopes hold by which a fit goes."""
 
 
-def divergence_rate(profile: Profile, joint_model: JointModel, position: Array) -> Array:
-    """How fast two motions of a joint diverge at positions, 1/s, shape (n,); 0 where they do not.
+@dataclass(frozen=True)
+class Linearized:
+    """How errors of a joint's motion go on from positions, x'' = push x - drag x'.
 
-    The larger root of I r² + c r = k, with the inertia I, the damping c, and k by which the
-    force towards larger positions grows with the position (Lyapunov's indirect method).
+    Attributes:
+        push: 1/s², what drives them on is positive; shape (n,).
+        drag: 1/s, shape (n,).
     """
+
+    push: Array
+    drag: Array
+
+    @property
+    def rate(self) -> Array:
+        """How fast they grow, 1/s, shape (n,), the larger root of r² + drag r = push (Lyapunov's
+        indirect method); 0 where they do not."""
+        growing = np.maximum(self.push, 0.0)
+        return np.asarray((np.sqrt(self.drag**2 + 4 * growing) - self.drag) / 2)
+
+
+def undisturbed(position: Array) -> Linearized:
+    """Of what nothing but its inertia moves."""
+    return Linearized(np.zeros(len(position)), np.zeros(len(position)))
+
+
+def linearized(profile: Profile, joint_model: JointModel, position: Array) -> Linearized:
+    """Of a joint at positions, rad or m, shape (n,); at an end of its range the stop holds it."""
     lo, hi = profile.joint.range
-    s = (position - lo) / (hi - lo)
+    s, inertia = (position - lo) / (hi - lo), joint_model.inertia
     k = evaluate(profile.channels.conservative, s)[1] / (hi - lo)
     k = k + joint_model.weight_slope(position)
+    c = evaluate(profile.channels.damping, s)[0]
     if joint_model.servo is not None:
-        k = k - joint_model.servo.stiffness
-    k = np.where(np.abs(s - 0.5) < 0.5 - AT_END, np.maximum(k, 0.0), 0.0)
-    c, inertia = evaluate(profile.channels.damping, s)[0], joint_model.inertia
-    return np.asarray((np.sqrt(c**2 + 4 * inertia * k) - c) / (2 * inertia))
+        k, c = k - joint_model.servo.stiffness, c + joint_model.servo.damping
+    k = np.where(np.abs(s - 0.5) < 0.5 - AT_END, k, 0.0)
+    return Linearized(np.asarray(k / inertia), np.asarray(c / inertia))
 
 
 def bearable(span: float, sigma: float) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from joda.joints.divergence import bearable, divergence_rate
+from joda.joints.divergence import bearable, linearized
 from joda.measured.measured_joint import Measured
 from joda.measured.runs import Run
 
@@ -42,7 +42,7 @@ def _span(measured: Measured) -> float:
 
 def _growth(measured: Measured, run: Run) -> Array:
     """Logarithm of the factor by which errors have grown since the run began, shape (n,)."""
-    rates = divergence_rate(measured.profile, measured.joint_model, run.position)
+    rates = linearized(measured.profile, measured.joint_model, run.position).rate
     return np.asarray(cumulative_trapezoid(rates, run.time, initial=0.0))
 
 
