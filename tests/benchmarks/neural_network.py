@@ -8,6 +8,7 @@ weight decay (Loshchilov and Hutter, Decoupled weight decay regularization, ICLR
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optax
 
 from joda.diagnosis.learning.fitting import Learner
 from joda.diagnosis.shape_refinement import Likelihood
@@ -21,7 +22,7 @@ WIDTH = 32
 ROUNDS = ((600, 1e-2), (100, 3e-3))
 """Iterations and first learning rate: in short windows, and in longer ones at the scene's step."""
 EVERY = 50
-"""Iterations after which the runs held out are looked at."""
+"""Iterations after which the runs held out are looked at; they divide all."""
 
 
 class Network:
@@ -42,7 +43,6 @@ class Network:
         self.force, self.inertia = units.force, joint_model.inertia
         self.weight, self.hinge = joint_model.weight, joint_model.hinge
         self.paths = jax.jit(self._paths)
-        self.descents = [self._descent(segments) for segments in self.segments]
 
     def begun(self, key) -> dict:
         """A network without force, and the model as it is."""
@@ -89,21 +89,21 @@ class Network:
     def fitted(self, numbers, decay: float, held: Likelihood) -> tuple[float, dict]:
         """The numbers with which what was held out has the least loss, and that."""
         best = held.estimator.started(Moved(self, numbers)).loss, numbers
-        pairs = zip(self.segments, self.descents, ROUNDS, strict=True)
-        for segments, go, (count, rate) in pairs:
-            state = (numbers, jnp.zeros((len(segments.at), 2)))
-            state = (state, *(jax.tree.map(jnp.zeros_like, state) for _ in range(2)))
-            for first in range(0, count, EVERY):
-                steps = np.arange(first, min(first + EVERY, count))
-                slower = rate * (1 + np.cos(np.pi * steps / count)) / 2
-                state = go(state, decay, steps + 1.0, slower)
-                numbers = state[0][0]
+        for segments, (count, rate) in zip(self.segments, ROUNDS, strict=True):
+            both = numbers, jnp.zeros((len(segments.at), 2))
+            shrinks = {"layers": [(True, False)] * len(numbers["layers"]), "own": False}, False
+            slower = optax.cosine_decay_schedule(rate, count)
+            descent = optax.adamw(slower, weight_decay=decay, mask=shrinks)
+            state, go = descent.init(both), self._descent(segments, descent)
+            for _ in range(0, count, EVERY):
+                both, state = go(both, state)
+                numbers = both[0]
                 loss = held.estimator.started(Moved(self, numbers)).loss
                 best = min(best, (loss, numbers), key=lambda one: one[0])
         return best
 
-    def _descent(self, segments):
-        """Iterations of Adam over a network's numbers and the windows' starts in their doubts."""
+    def _descent(self, segments, descent):
+        """`EVERY` iterations over a network's numbers and the windows' starts in their doubts."""
         counts = segments.usable
         ends = np.append(segments.at[1:], len(segments.force))
         force = _filled(segments.force, segments.at, ends)
@@ -124,25 +124,12 @@ class Network:
             known = (((numbers["own"] - 1) / BASE_DOUBT) ** 2).sum()
             return jnp.where(counts, room * jnp.log1p(squares / room), 0).sum() + known
 
-        def once(state, count, rate, decay):
-            both, mean, square = state
-            slope = jax.grad(loss)(both)
-            mean = jax.tree.map(lambda m, g: 0.9 * m + 0.1 * g, mean, slope)
-            square = jax.tree.map(lambda s, g: 0.999 * s + 0.001 * g * g, square, slope)
+        def once(both_state, _):
+            both, state = both_state
+            updates, state = descent.update(jax.grad(loss)(both), state, both)
+            return (optax.apply_updates(both, updates), state), None
 
-            def moved(x, m, s):
-                way = m / (1 - 0.9**count) / (jnp.sqrt(s / (1 - 0.999**count)) + 1e-12)
-                return x - rate * way
-
-            numbers, z = jax.tree.map(moved, both, mean, square)
-            shrunk = [(W * (1 - rate * decay), b) for W, b in numbers["layers"]]
-            return ({**numbers, "layers": shrunk}, z), mean, square
-
-        @jax.jit
-        def go(state, decay, *every):
-            return jax.lax.scan(lambda one, now: (once(one, *now, decay), None), state, every)[0]
-
-        return go
+        return jax.jit(lambda *both_state: jax.lax.scan(once, both_state, length=EVERY)[0])
 
 
 def _filled(force, at, ends):
@@ -177,7 +164,7 @@ class Replays(Replayer):
         super().__init__(
             measured.context, measured.profile, measured.joint_model, measured.timestep
         )
-        self.moved = moved
+        self.moved, self.simulator = moved, None  # which knows of no network
 
     def _roll(self, initial, forces, command):
         """See Replayer; after time, a state has position and velocity."""
