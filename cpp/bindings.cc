@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -41,14 +42,19 @@ py::array_t<double> Coefficients(const joda::PiecewiseCubic& channel) {
   return out;
 }
 
+using SecondStop = std::tuple<int, std::array<double, 2>, std::array<double, 5>>;
+
 joda::JointSimulator MakeJointSimulator(double lo, double hi, const Texts& texts, double inertia,
                                         double row_inertia, const std::array<double, 2>& weight,
                                         bool hinge, const std::array<double, 2>& solref,
                                         const std::array<double, 5>& solimp,
                                         const std::array<double, 2>& friction_row,
-                                        const std::array<double, 6>& servo, bool trapezoidal) {
-  const joda::Body body = {{lo, hi}, inertia, row_inertia, weight,
-                           hinge,    solref,  solimp,      friction_row};
+                                        const std::array<double, 6>& servo, bool trapezoidal,
+                                        const SecondStop& second) {
+  const auto& [end, second_solref, second_solimp] = second;
+  const joda::Body body = {{lo, hi},     inertia, row_inertia,
+                           weight,       hinge,   {solref, solimp},
+                           friction_row, end,     {second_solref, second_solimp}};
   const auto [gain, stiffness, damping, low, high, delay] = servo;
   return joda::JointSimulator(body, {gain, stiffness, damping, {low, high}, delay},
                               Pointers(texts).data(),
@@ -167,6 +173,8 @@ Args:
     damping, the least and the largest force, and the delay of commands, s.
   trapezoidal: whether damping acts by the mean velocity of a step, and friction turns when the
     joint does, not with the step, which is of second order; else all as MuJoCo steps.
+  second: of what stops the joint besides at one end, as a tendon's limit does: -1 at the low end, 1
+    at the high one, 0 nowhere; its solref and solimp.
 
 Raises:
   ValueError: a text cannot be read, or a number is impossible; one sentence says why.)")
@@ -175,7 +183,8 @@ Raises:
            py::arg("solref"), py::arg("solimp"),
            py::arg("friction_row") = std::array<double, 2>{0, 0},
            py::arg("servo") = std::array<double, 6>{1, 0, 0, -HUGE_VAL, HUGE_VAL, 0},
-           py::arg("trapezoidal") = false)
+           py::arg("trapezoidal") = false,
+           py::arg("second") = SecondStop{0, joda::Stop().solref, joda::Stop().solimp})
       .def("replay", &Replay, py::arg("force"), py::arg("at"), py::arg("start"), py::arg("fresh"),
            py::arg("h"), py::arg("command") = py::none(),
            R"(Steps through forces, set to a start here and there.

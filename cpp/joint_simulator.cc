@@ -52,6 +52,36 @@ double Implicit(Scheme scheme, double h, double drag, double inertia) {
   return h * drag > 2 * inertia ? 1 - inertia / (h * drag) : 0.5;
 }
 
+double Impedance(const std::array<double, 5>& solimp, double depth) {
+  const auto [dmin, dmax, width, middle, exponent] = solimp;
+  if (dmin == dmax || width <= kLeastWidth) return 0.5 * (dmin + dmax);
+  const double x = std::min(depth / width, 1.0);
+  const double power = std::max(exponent, 1.0);
+  const auto raise = [power](double base) {
+    return power == 2 ? base * base : std::pow(base, power);
+  };
+  const double rise =
+      x < middle ? middle * raise(x / middle) : 1 - (1 - middle) * raise((1 - x) / (1 - middle));
+  return dmin + rise * (dmax - dmin);
+}
+
+// A stop's row, as in "Solver parameters" of MuJoCo's documentation: its D, and the acceleration
+// back into the range that it aims at.
+template <typename Row>
+Row StoppedBy(const Stop& stop, double inertia, double h, double depth, double back) {
+  const double dmax = stop.solimp[1], impedance = Impedance(stop.solimp, depth);
+  double stiffness = -stop.solref[0], damping = -stop.solref[1];
+  if (stop.solref[0] > 0) {
+    const double constant = std::max(stop.solref[0], 2 * h);  // the engine's "refsafe"
+    const double per_second = 1 / (constant * stop.solref[1]);
+    stiffness = per_second * per_second;
+    damping = 2 / constant;
+  }
+  stiffness /= dmax * dmax;
+  damping /= dmax;
+  return {impedance / (1 - impedance) * inertia, stiffness * impedance * depth - damping * back};
+}
+
 template <bool kEffects>
 bool IsFinite(const JointSimulator::State& state) {
   if (!kEffects) return std::isfinite(state.q + state.v + state.held);
@@ -82,8 +112,10 @@ JointSimulator::JointSimulator(const Body& body, const Servo& servo,
   if (profile_.effects) body_.inertia += profile_.effects->added_inertia;
   if (!(body_.inertia > 0)) throw std::invalid_argument("the inertia must be positive");
   if (!(body_.row_inertia > 0)) body_.row_inertia = body_.inertia;
-  for (const int k : {0, 1, 3}) {
-    body_.solimp[k] = std::clamp(body_.solimp[k], kLeastImpedance, kMostImpedance);
+  for (Stop* stop : {&body_.stop, &body_.second}) {
+    for (const int k : {0, 1, 3}) {
+      stop->solimp[k] = std::clamp(stop->solimp[k], kLeastImpedance, kMostImpedance);
+    }
   }
 }
 
@@ -143,10 +175,17 @@ JODA_INLINE void JointSimulator::Advance(double h, double force, double command,
   const double drive = behind.scale * (spring + weight + pushed) + behind.force + servo +
                        bounds.Shift() - (drag + yielding) * v;
   Motion motion = Solve(mass, drive, friction);
-  if (q < body_.range[0] || q > body_.range[1]) {
-    const Limit limit = LimitRow(h, q, v);
-    if (limit.sign * motion.acceleration < limit.reference) {
-      motion = Solve(mass + limit.D, drive + limit.D * limit.sign * limit.reference, friction);
+  if (const bool low = q < body_.range[0]; low || q > body_.range[1]) {
+    const double sign = low ? 1 : -1, depth = sign * (body_.range[low ? 0 : 1] - q);
+    std::array<Limit, 2> rows = {OwnLimit(h, low, depth, sign * v),
+                                 SecondLimit(h, low, depth, sign * v)};
+    if (rows[0].reference < rows[1].reference) std::swap(rows[0], rows[1]);
+    double D = 0, push = 0;  // what aims at more acts first, the other one beside it
+    for (const Limit& row : rows) {
+      if (row.D == 0 || sign * motion.acceleration >= row.reference) break;
+      D += row.D;
+      push += row.D * row.reference;
+      motion = Solve(mass + D, drive + sign * push, friction);
     }
   }
   const bool free = kDriven && servo_.limits[0] < servo && servo < servo_.limits[1];
@@ -296,42 +335,21 @@ double JointSimulator::Actuate(double command, double q, double v) const {
   return std::clamp(wanted, servo_.limits[0], servo_.limits[1]);
 }
 
-// MuJoCo's solver parameters, as in "Solver parameters" of its documentation.
-JointSimulator::Limit JointSimulator::LimitRow(double h, double q, double v) const {
-  const auto [lo, hi] = body_.range;
-  const bool low = q < lo;
-  const double sign = low ? 1 : -1, distance = low ? q - lo : hi - q;
+JointSimulator::Limit JointSimulator::OwnLimit(double h, bool low, double depth,
+                                               double back) const {
   if (const Effects* effects = profile_.effects.get()) {
     if (const auto& own = low ? effects->stops.low : effects->stops.high) {
       const StopRow stop = FindStopRow(*own, h, body_.row_inertia);
-      return {sign, stop.D, -stop.damping * sign * v - stop.stiffness * distance};
+      return {stop.D, stop.stiffness * depth - stop.damping * back};
     }
   }
-  const double dmax = body_.solimp[1], impedance = Impedance(-distance);
-  double stiffness = -body_.solref[0], damping = -body_.solref[1];
-  if (body_.solref[0] > 0) {
-    const double constant = std::max(body_.solref[0], 2 * h);  // the engine's "refsafe"
-    const double per_second = 1 / (constant * body_.solref[1]);
-    stiffness = per_second * per_second;
-    damping = 2 / constant;
-  }
-  stiffness /= dmax * dmax;
-  damping /= dmax;
-  return {sign, impedance / (1 - impedance) * body_.row_inertia,
-          -damping * sign * v - stiffness * impedance * distance};
+  return StoppedBy<Limit>(body_.stop, body_.row_inertia, h, depth, back);
 }
 
-double JointSimulator::Impedance(double depth) const {
-  const auto [dmin, dmax, width, middle, exponent] = body_.solimp;
-  if (dmin == dmax || width <= kLeastWidth) return 0.5 * (dmin + dmax);
-  const double x = std::min(depth / width, 1.0);
-  const double power = std::max(exponent, 1.0);
-  const auto raise = [power](double base) {
-    return power == 2 ? base * base : std::pow(base, power);
-  };
-  const double rise =
-      x < middle ? middle * raise(x / middle) : 1 - (1 - middle) * raise((1 - x) / (1 - middle));
-  return dmin + rise * (dmax - dmin);
+JointSimulator::Limit JointSimulator::SecondLimit(double h, bool low, double depth,
+                                                  double back) const {
+  if (body_.second_end != (low ? -1 : 1)) return {0, -HUGE_VAL};
+  return StoppedBy<Limit>(body_.second, body_.inertia, h, depth, back);
 }
 
 }  // namespace joda

@@ -16,6 +16,12 @@
 
 namespace joda {
 
+// The stop at an end of a range, in MuJoCo's solver parameters.
+struct Stop {
+  std::array<double, 2> solref = {0.02, 1};
+  std::array<double, 5> solimp = {0.9, 0.95, 0.001, 0.5, 2};
+};
+
 // What of a joint is not in its profile. Units are those of a hinge; for a slide read N, m and kg.
 struct Body {
   std::array<double, 2> range;   // joint positions at s = 0 and s = 1
@@ -23,11 +29,13 @@ struct Body {
   double row_inertia;            // what MuJoCo's rows take for it, <= 0: all of it (kg m^2)
   std::array<double, 2> weight;  // hinge: cos q and sin q of gravity's torque; slide: force and 0
   bool hinge;
-  std::array<double, 2> solref;  // of the range's ends
-  std::array<double, 5> solimp;
+  Stop stop;  // of both of the range's ends
   // Of MuJoCo's own friction row: damping (1/s), and stiffness over inertia; 0: the plugin's row.
   // Where the engine's steps have it, the joint's damping is the engine's own too.
   std::array<double, 2> friction_row = {0, 0};
+  // What acts besides at one end, as the limit of a tendon does: -1 the low one, 1 the high one.
+  int second_end = 0;
+  Stop second = {};
 };
 
 // How steps stand for the motion between them.
@@ -77,9 +85,10 @@ class JointSimulator {
               const std::vector<Start>& starts, double* before, double* after) const;
 
  private:
-  // The row of the end that is overstepped: direction, D (0: none) and reference acceleration.
+  // A row of the end that is overstepped: D (0: none), and the acceleration back into the range
+  // that it aims at.
   struct Limit {
-    double sign, D, reference;
+    double D, reference;
   };
 
   // The pieces of the channels that a run found last.
@@ -106,8 +115,9 @@ class JointSimulator {
   bool IsDriven() const;
   double Weight(double q) const;
   double Actuate(double command, double q, double v) const;
-  Limit LimitRow(double h, double q, double v) const;
-  double Impedance(double depth) const;
+  // The rows of an end: how deep the joint is in it, and how fast it comes out.
+  Limit OwnLimit(double h, bool low, double depth, double back) const;
+  Limit SecondLimit(double h, bool low, double depth, double back) const;
 
   Body body_;
   // Of a hinge's weight: its largest torque, and the position of that.

@@ -1,6 +1,8 @@
 """How stiff the ends of a range are, and how far they yield to a force, is found by runs that come
 to them, and written."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -8,12 +10,14 @@ from scenes import write
 
 from joda import diagnose, improve
 from joda.diagnosis.adding import error
-from joda.diagnosis.end_stops import fitted_stop
+from joda.diagnosis.end_stops import _visits, fitted_stops
 from joda.diagnosis.split import parted
 from joda.measured.reading import read_measured
+from joda.measured.replay import Start
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run
-from joda.scenes.limits import stiffness_of
+from joda.scenes.besides import acting_besides
+from joda.scenes.limits import SecondStop, stiffness_of
 
 SIGMA, EVERY, STEP = 2e-4, 2, 0.002
 SLIDE = """<mujoco>
@@ -23,13 +27,10 @@ SLIDE = """<mujoco>
       <joint name="slide" type="slide" axis="1 0 0" range="0 0.5" damping="0.4" {}/>
       <geom type="box" size=".1 .1 .1" mass="1"/>
     </body>
-    {}
   </worldbody>
+  {}
 </mujoco>
 """
-
-
-BUFFER = '<geom type="box" size=".1 .1 .1" pos="0.7 0 0" solref="0.1 1" solimp="0.05 0.05"/>'
 
 
 PUSHES = {
@@ -40,13 +41,11 @@ PUSHES = {
 force between two samples is not known, nor therefore how fast an end lets go of the joint."""
 
 
-def pushed(folder, rng, stop, count=6, buffer=False, smoothly=False):
+def pushed(folder, rng, stop, count=6, smoothly=False, besides="", kicks=0.0):
     """Runs of a slide with such ends, that a hand pushes against them and lets go; and its model,
-    which has MuJoCo's own ends. A buffer may be what the high end is."""
-    text = SLIDE.format(stop, BUFFER if buffer else "")
-    if buffer:
-        text = text.replace('range="0 0.5"', 'range="0 2"')
-    model = mujoco.MjModel.from_xml_string(text)
+    which has MuJoCo's own ends. Besides there may be a tendon; and the high end may throw back, at
+    always the same speed, what comes to it."""
+    model = mujoco.MjModel.from_xml_string(SLIDE.format(stop, besides))
     data, files = mujoco.MjData(model), []
     for k in range(count):
         mujoco.mj_resetData(model, data)
@@ -58,19 +57,31 @@ def pushed(folder, rng, stop, count=6, buffer=False, smoothly=False):
                 noisy = data.qpos[0] + SIGMA * rng.standard_normal()
                 rows.append((step * STEP, noisy, data.qfrc_applied[0]))
             mujoco.mj_step(model, data)
+            if kicks and data.qpos[0] > 0.5 and data.qvel[0] > 0:
+                data.qvel[0] = -kicks
         time, position, force = np.array(rows).T
         files.append(folder / f"run{k}.csv")
         write_run(files[-1], Run(files[-1].name, time, position, None, force, True))
     return write(folder, SLIDE.format("", "")), files
 
 
+def apart(stop):
+    """A tendon that stops the slide at its high end besides."""
+    return f"<tendon>{stop.element('stop', 'slide', (0.0, 0.5))}</tendon>"
+
+
+STIFFER = SecondStop(1, (0.01, 0.8), (0.3, 0.3, 0.001, 0.5, 2.0))
+SOFTER = 'solreflimit="0.03 1" solimplimit="0.05 0.05"'
+"""A tendon's limit, and the joint's."""
+
+
 @pytest.mark.parametrize("solref", [(0.06, 1.0), (0.01, 1.0), (0.05, 0.7)])
 def test_the_stop_of_the_runs_is_found(tmp_path, rng, solref):
     model, files = pushed(tmp_path, rng, 'solreflimit="{:g} {:g}"'.format(*solref))
     train, held = parted(read_measured(model, "slide", files))
-    found = fitted_stop(train, held)
-    assert stiffness_of(found[0], STEP) == pytest.approx(stiffness_of(solref, STEP), rel=0.15)
-    assert found[0][1] == pytest.approx(solref[1], rel=0.1)
+    found = fitted_stops(train, held)
+    assert stiffness_of(found.solref, STEP) == pytest.approx(stiffness_of(solref, STEP), rel=0.15)
+    assert found.solref[1] == pytest.approx(solref[1], rel=0.1) and found.second is None
     assert error(held.stopped(found)).window < 0.7 * error(held).window
 
 
@@ -81,20 +92,19 @@ def test_how_far_an_end_yields_to_a_force_is_found(tmp_path, rng, impedance):
     stop = 'solreflimit="{:g} {:g}" solimplimit="{:g} {:g}"'
     model, files = pushed(tmp_path, rng, stop.format(*solref, impedance, impedance), smoothly=True)
     train, held = parted(read_measured(model, "slide", files))
-    found, solimp = fitted_stop(train, held)
-    stiffness = stiffness_of(found, STEP)
+    found = fitted_stops(train, held)
+    stiffness = stiffness_of(found.solref, STEP)
     assert stiffness == pytest.approx(stiffness_of(solref, STEP), rel=0.15)
     yields = (1 - impedance) / stiffness_of(solref, STEP)
-    assert (1 - solimp[1]) / stiffness == pytest.approx(yields, rel=0.1)
-    stiffer = train.joint_model.solref, train.joint_model.solimp
-    best, own = (error(held.stopped(one)).whole for one in ((found, solimp), stiffer))
+    assert (1 - found.solimp[1]) / stiffness == pytest.approx(yields, rel=0.1)
+    best, own = (error(held.stopped(one)).whole for one in (found, train.joint_model.stops))
     assert best < 0.3 * own
 
 
 def test_a_stop_that_is_right_stays(tmp_path, rng):
-    found = fitted_stop(*parted(read_measured(*slide(tmp_path, rng))))
+    found = fitted_stops(*parted(read_measured(*slide(tmp_path, rng))))
     if found:  # by chance, in one of 20 at most: then it is nearly what it was
-        assert stiffness_of(found[0], STEP) == pytest.approx(2500, rel=0.1)
+        assert stiffness_of(found.solref, STEP) == pytest.approx(2500, rel=0.1)
 
 
 def slide(folder, rng):
@@ -106,7 +116,7 @@ def slide(folder, rng):
 def test_improve_writes_it_and_says_so(tmp_path, rng):
     model, files = pushed(tmp_path, rng, 'solreflimit="0.06 1"')
     found = improve(model, "slide", files, tmp_path / "new.xml")
-    assert found.steps[-1].stop
+    assert found.steps[-1].stops
     assert any(
         line.startswith("ends of the range: solreflimit 0.02 1 → 0.0") for line in found.changes
     )
@@ -125,11 +135,65 @@ def test_whole_runs_that_another_stop_explains_leave_the_model_adequate(tmp_path
     assert "solimplimit 0.9 0.95 0.001 0.5 2 → 0" in found.summary
 
 
-def test_whole_runs_that_no_stop_explains_do_not(tmp_path):
-    """Of a slide whose low end is hard, and whose high end is a soft buffer."""
-    rng = np.random.default_rng(0)  # in some draws the buffer is hardly pressed
-    model, files = pushed(tmp_path, rng, 'solreflimit="0.004 1"', buffer=True, smoothly=True)
+def test_whole_runs_that_no_stop_explains_do_not(tmp_path, rng):
+    """Of a slide whose high end throws back what comes slowly and fast alike."""
+    model, files = pushed(tmp_path, rng, SOFTER, smoothly=True, kicks=0.15)
     found = diagnose(model, "slide", files)
     assert found.verdict == "unexplained"
     assert found.summary.startswith("Something at the ends of the range is missing")
     assert found.next_experiment.startswith("Press the joint slowly against either end")
+
+
+# --- ends that differ
+@pytest.mark.parametrize("end", [-1, 1])
+def test_what_stops_a_joint_besides_is_simulated_as_mujoco_does(tmp_path, rng, end):
+    besides = apart(replace(STIFFER, end=end))
+    _, files = pushed(tmp_path, rng, SOFTER, 2, True, besides)
+    scene = write(tmp_path, SLIDE.format(SOFTER, besides), "scene.xml")
+    measured = read_measured(scene, "slide", files)
+    assert measured.joint_model.second == replace(STIFFER, end=end)
+    assert not acting_besides(mujoco.MjModel.from_xml_path(str(scene)), 0)
+    model, replayer = mujoco.MjModel.from_xml_path(str(scene)), measured.replayer
+    for run in measured.runs:
+        data, path = mujoco.MjData(model), []
+        data.qpos[0], steps = run.position[0], round(run.time[-1] / STEP)
+        for force in np.interp(STEP * np.arange(steps + 1), run.time, run.force):
+            path.append(data.qpos[0])
+            data.qfrc_applied[0] = force
+            mujoco.mj_step(model, data)
+        start = Start(np.array([run.position[0], 0.0]), np.eye(2))
+        alone, quick = (replayer.whole(run, start, quickly) for quickly in (False, True))
+        assert np.allclose(alone, quick, atol=1e-8)
+        assert np.allclose(alone, path[::EVERY], atol=SIGMA)  # its damping is MuJoCo's own
+
+
+@pytest.mark.parametrize("end", [-1, 1])
+def test_ends_that_differ_are_found(tmp_path, rng, end):
+    besides = apart(replace(STIFFER, end=end))
+    model, files = pushed(tmp_path, rng, SOFTER, 9, True, besides)
+    train, held = parted(read_measured(model, "slide", files))
+    found = fitted_stops(train, held)
+    assert found.second.end == end
+    assert stiffness_of(found.solref, STEP) == pytest.approx(0.03**-2, rel=0.2)
+    scene = write(tmp_path, SLIDE.format(SOFTER, besides), "true.xml")
+    true = read_measured(scene, "slide", files).joint_model.stops
+    own = train.joint_model.stops
+    assert error(held.stopped(found)).whole < 0.4 * error(held.stopped(own)).whole
+    for part in (train, held):  # as little is left as the true ends leave
+        visits = _visits(part)
+        assert visits.loss(found) < 1.3 * visits.loss(true) < 0.1 * visits.loss(own)
+
+
+@pytest.mark.slow
+def test_improve_writes_ends_that_differ(tmp_path, rng):
+    model, files = pushed(tmp_path, rng, SOFTER, 9, True, apart(STIFFER))
+    told = diagnose(model, "slide", files)
+    assert told.verdict == "adequate"
+    assert "at the high end besides a tendon's limit with solreflimit 0.0" in told.summary
+    found = improve(model, "slide", files, tmp_path / "new.xml")
+    assert any("at the high end besides a tendon's limit" in line for line in found.changes)
+    written = mujoco.MjModel.from_xml_path(str(found.scene))
+    assert written.ntendon == 1 and written.tendon_range[0, 1] == 0.5
+    new, old = (error(read_measured(scene, "slide", files)).whole for scene in (found.scene, model))
+    assert new < 0.1 * old
+    assert diagnose(found.scene, "slide", files).verdict == "adequate"

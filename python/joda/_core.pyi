@@ -40,6 +40,7 @@ class JointSimulator:
         friction_row: Sequence[float] = (0.0, 0.0),
         servo: Sequence[float] = (1.0, 0.0, 0.0, -inf, inf, 0.0),
         trapezoidal: bool = False,
+        second: tuple[int, Sequence[float], Sequence[float]] = ...,
     ) -> None: ...
     def replay(
         self,

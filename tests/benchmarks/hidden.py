@@ -133,7 +133,7 @@ def after_improve(case: Case, train: Measured, held_out: Measured) -> dict:
     steps, why = improved(train, parted(train))
     last, least = steps[-1], case.achievable.together
     right = last.right.of(held_out) if last.right else held_out
-    right = right.stopped(last.stop) if last.stop else right
+    right = right.stopped(last.stops) if last.stops else right
     return {
         "steps": [step.effect for step in steps[1:]],
         "why": why,

@@ -231,18 +231,24 @@ bool IsReplay(const std::vector<double>& q, const std::vector<JointSimulator::St
   return true;
 }
 
+Stop OddStop(Random& random) {
+  return {
+      {Odd(random, 0.02), Odd(random, 1)},
+      {Odd(random, 0.9), Odd(random, 0.95), Odd(random, 0.001), Odd(random, 0.5), Odd(random, 2)}};
+}
+
 Trial TryJointSimulator(Random& random) {
   const auto texts = Texts(random);
   const auto positive = [&random] { return Odd(random, std::pow(10, 4 * Uniform(random) - 3)); };
-  const Body body = {
-      {Odd(random, -Uniform(random)), Odd(random, Uniform(random))},
-      positive(),
-      positive(),
-      {Odd(random, 1), Odd(random, -1)},
-      Below(random, 2) == 0,
-      {Odd(random, 0.02), Odd(random, 1)},
-      {Odd(random, 0.9), Odd(random, 0.95), Odd(random, 0.001), Odd(random, 0.5), Odd(random, 2)},
-      {Odd(random, 100), Odd(random, Below(random, 2) ? 9 : 0)}};
+  const Body body = {{Odd(random, -Uniform(random)), Odd(random, Uniform(random))},
+                     positive(),
+                     positive(),
+                     {Odd(random, 1), Odd(random, -1)},
+                     Below(random, 2) == 0,
+                     OddStop(random),
+                     {Odd(random, 100), Odd(random, Below(random, 2) ? 9 : 0)},
+                     static_cast<int>(Below(random, 3)) - 1,
+                     OddStop(random)};
   Trial out = {Joined(texts)};
   try {
     const Servo servo = {Odd(random, 1),

@@ -175,4 +175,4 @@ def mended(
         return added, held_out
     added = with_stop(added, *parts)
     right = held_out.changed(by_all(train, added.profile, added.effect, added.departs, interval))
-    return added, right.stopped(added.stop) if added.stop else right
+    return added, right.stopped(added.stops) if added.stops else right

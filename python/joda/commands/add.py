@@ -9,7 +9,7 @@ from typing import Any
 from joda.commands.diagnose import check_effect
 from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error, with_stop
 from joda.diagnosis.applied_corrections import as_told
-from joda.diagnosis.end_stops import written
+from joda.diagnosis.end_stops import stops_told
 from joda.diagnosis.findings import read_diagnosis
 from joda.diagnosis.learning.account import Account, account, learned_picture
 from joda.diagnosis.learning.account import sentences as law_sentences
@@ -164,7 +164,8 @@ def add(
     nearest = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
     told_law = account(train, held, law, added_effect.after.window, nearest) if law else None
     notes: list[str] = []
-    ends, moved = written(measured.joint_model, added_effect.stop)
+    stops = added_effect.stops
+    moved = stops_told(measured.joint_model, stops)
     corrections: Path | None = corrections_beside(target)
     if added_effect.effect:
         if not told_law:  # of a learned law nothing is where no run was
@@ -172,7 +173,7 @@ def add(
             notes += filter(None, [extrapolated(unvisited_part(measured, there)).strip()])
         progress("drawing")
         files, more = scene_files(
-            Path(model), added_effect.profile, target, composed, right=right, ends=ends
+            Path(model), added_effect.profile, target, composed, right=right, stops=stops
         )
         corrections = corrections if corrections in files else None
         notes += more

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from joda.diagnosis.end_stops import written
+from joda.diagnosis.end_stops import stops_told
 from joda.diagnosis.improvement import Step, improved
 from joda.diagnosis.outcome import (
     NO_TRUST,
@@ -118,10 +118,10 @@ def improve(
     there = len(steps) > 1
     files: dict[Path, bytes | str] = {}
     notes: list[str] = []
-    ends, moved = written(measured.joint_model, steps[-1].stop)
+    moved = stops_told(measured.joint_model, steps[-1].stops)
     if there:
         files, notes = scene_files(
-            Path(model), last, target, composed, steps[-1].servo, right, ends
+            Path(model), last, target, composed, steps[-1].servo, right, steps[-1].stops
         )
     own = corrections_beside(target)
     result = Improved(
@@ -212,7 +212,7 @@ def _errors(result: Improved) -> dict[str, list[float]]:
 def _step(step: Step) -> str:
     if step.effect:
         return f"+ {step.effect}"
-    return "corrected" if step.corrections or step.stop else "as it was"
+    return "corrected" if step.corrections or step.stops else "as it was"
 
 
 def _explanations(result: Improved) -> list[str]:

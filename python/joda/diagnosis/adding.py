@@ -13,7 +13,7 @@ import numpy as np
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.coverage import at_rest
 from joda.diagnosis.departures import FAITHFUL, SHARED, Departures, departures, restored
-from joda.diagnosis.end_stops import fitted_stop
+from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.overlap import overlap
 from joda.diagnosis.paired_test import FALLEN, worse
@@ -35,7 +35,7 @@ from joda.measured.errors import Errors, errors, known
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
 from joda.profile import Profile
-from joda.scenes.native import Row
+from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
 
 NO_LESS = "it does not lower the error on what was held out of the fit"
@@ -77,7 +77,7 @@ class AddedEffect:
         before, after: errors on runs held out of the fit.
         reason: why nothing was added, a clause; None if something was.
         departs: by what the profile is not what was given and diagnosed.
-        stop: solref, solimp of the ends of the range that suit the runs there; None: the model's.
+        stops: ends of the range that suit the runs there; None: the model's.
     """
 
     profile: Profile
@@ -86,7 +86,7 @@ class AddedEffect:
     after: Error
     reason: str | None = None
     departs: Departures = FAITHFUL
-    stop: Row | None = None
+    stops: Stops | None = None
 
 
 def error(measured: Measured, profile: Profile | None = None, *, within: bool = True) -> Error:
@@ -191,9 +191,9 @@ def add_effect(
 def with_stop(added: AddedEffect, train: Measured, held: Measured) -> AddedEffect:
     """What was added to these, with ends of the range that suit the runs there."""
     own, judged = (one.changed(added.profile) for one in (train, held))
-    if not (stop := fitted_stop(own, judged)):
+    if not (stops := fitted_stops(own, judged)):
         return added
-    return replace(added, after=error(judged.stopped(stop)), stop=stop)
+    return replace(added, after=error(judged.stopped(stops)), stops=stops)
 
 
 @one_blas_thread

@@ -8,7 +8,8 @@ stiff against a force as against an impact, and a spring and a damper that press
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,7 @@ from joda.measured import smoothing
 from joda.measured.measured_joint import Measured
 from joda.measured.runs import CLEAR, visits
 from joda.profile import Profile
-from joda.scenes.limits import IMPEDANCES
-from joda.scenes.native import Row
+from joda.scenes.limits import IMPEDANCES, SecondStop, Stops
 
 Array = NDArray[np.float64]
 
@@ -41,16 +41,19 @@ FIRST = (-2.8, -1.4, 0.0, 1.4, 2.8), (-0.7, 0.0, 0.7), (-5.0, -3.0, -1.5)
 tried first, one at a time."""
 USUAL = np.array((1.5, 0.4, 3.0))
 """How far off they are, as logarithms, before the data; one standard deviation."""
+MISSED, APART, FEWEST = 1.5, 6, 2
+"""Loss per sample of the visits to the ends from which one may have a stop of its own; numbers of
+both; and fewest visits to an end that tell of it."""
 WIDE, TRIED, SETTLING = np.array((0.4, 0.4, 1.0)), 30, 6
 """How far a search begins to look, in those; models that it tries for each number, and iterations
 that fit the starts of one."""
 
 
-def fitted_stop(train: Measured, held: Measured | None = None) -> Row | None:
-    """The parameters solref and solimp of the ends of the range that suit the runs there (Nelder
-    and Mead 1965), if they make all runs, also those that were held out, clearly likelier, and each
-    number is worth its price (Schwarz 1978); else None. The impedance is changed only where that
-    does so again.
+def fitted_stops(train: Measured, held: Measured | None = None) -> Stops | None:
+    """Ends of the range that suit the runs there (Nelder and Mead 1965), if they make all runs,
+    also those that were held out, clearly likelier, and each number is worth its price (Schwarz
+    1978); else None. The impedance is changed only where that does so again. Where much is left,
+    one end may get a stop besides the joint's limit, of which MuJoCo has one for both.
 
     Args:
         train: the joint with a profile, and runs to fit.
@@ -61,20 +64,58 @@ def fitted_stop(train: Measured, held: Measured | None = None) -> Row | None:
     fit, judge = _visits(train), _visits(held) if held else None
     if fit is None:
         return None
-    price = float(np.log(fit.samples))
-    own = train.joint_model.solref, train.joint_model.solimp
-    best, least, z = own, fit.loss(own) + (judge.loss(own) if judge else 0.0), np.zeros(0)
+    price, own = float(np.log(fit.samples)), train.joint_model.stops
+
+    def priced(stops: Stops, numbers: int) -> float:
+        return fit.loss(stops) + (judge.loss(stops) if judge else 0.0) + numbers * price
+
+    best, least, z = own, priced(own, 0), np.zeros(0)
+    for numbers in (2, 3):
+        z = _searched(partial(_misfit, fit, own), z, numbers)
+        found = _changed(own, z)
+        total = priced(found, numbers) + _unusual(z)
+        if clearly(total, least):
+            best, least = found, total
+    if own.second is None and fit.loss(best) > MISSED * fit.samples:
+        for end in (-1, 1):
+            apart = _apart(fit, own, end)
+            total = priced(apart, APART) if apart else np.inf
+            if apart and clearly(total, least):
+                best, least = apart, total
+    return None if best is own else best
+
+
+def _apart(fit: "_Visits", own: Stops, end: int) -> Stops | None:
+    """The stop that suits the other end's visits, and what that end has besides, which suits its
+    own; None where one of them has no visits."""
+    here, there = fit.at(end), fit.at(-end)
+    if here is None or there is None:
+        return None
+    alone, z = partial(_misfit, there, own), np.zeros(0)
+    for numbers in (2, 3):
+        z = _searched(alone, z, numbers)
+    both = _changed(own, z)
 
     def loss(x: Array) -> float:
-        return fit.loss(_changed(own, x)) + float(np.sum((x / USUAL[: len(x)]) ** 2))
+        second = _changed(both, x)
+        stops = replace(both, second=SecondStop(end, second.solref, second.solimp))
+        return here.loss(stops) + _unusual(x)
 
+    x = np.zeros(0)
     for numbers in (2, 3):
-        z = _searched(loss, z, numbers)
-        found = _changed(own, z)
-        both = loss(z) + (judge.loss(found) if judge else 0.0) + numbers * price
-        if clearly(both, least):
-            best, least = found, both
-    return None if best is own else best
+        x = _searched(loss, x, numbers)
+    second = _changed(both, x)
+    return replace(both, second=SecondStop(end, second.solref, second.solimp))
+
+
+def _misfit(visits: "_Visits", own: Stops, z: Array) -> float:
+    """Loss of what changes the joint's limit, with what is known of that."""
+    return visits.loss(_changed(own, z)) + _unusual(z)
+
+
+def _unusual(z: Array) -> float:
+    """How far numbers are off what is usual before the data, in squared standard deviations."""
+    return float(np.sum((z / USUAL[: len(z)]) ** 2))
 
 
 def _searched(loss: Callable[[Array], float], near: Array, numbers: int) -> Array:
@@ -112,33 +153,30 @@ def with_other_ends(
         times: how far they are missed with the model's own.
     """
     fitted = measured.changed(baseline.base.written(baseline.fit.x))
-    if not (stop := fitted_stop(fitted)):
+    if not (stops := fitted_stops(fitted)):
         return OtherEnds("", times)
-    left = worst(measured.stopped(stop), baseline, [other.stopped(stop) for other in others])
-    return OtherEnds(changed(measured.joint_model, stop), left.whole)
+    left = worst(measured.stopped(stops), baseline, [other.stopped(stops) for other in others])
+    return OtherEnds(changed(measured.joint_model, stops), left.whole)
 
 
-def written(joint_model: JointModel, stop: Row | None) -> tuple[dict[str, str], list[str]]:
-    """Attributes of a joint's element in MJCF for a stop that was fitted, and what is changed, for
-    a person; nothing of either where none was fitted."""
-    if stop is None:
-        return {}, []
-    own = {
-        name: " ".join(f"{value:.6g}" for value in values)
-        for name, values in zip(ATTRIBUTES, stop, strict=True)
-    }
-    change = changed(joint_model, stop)
-    return own, [f"ends of the range: {change}, as the runs that come to them show"]
+def stops_told(joint_model: JointModel, stops: Stops | None) -> list[str]:
+    """What ends of the range that were fitted change, for a person; nothing where none were."""
+    if stops is None:
+        return []
+    change = changed(joint_model, stops)
+    return [f"ends of the range: {change}, as the runs that come to them show"]
 
 
-def changed(joint_model: JointModel, stop: Row) -> str:
-    """What a stop changes of a joint's own, for a person."""
-    own = joint_model.solref, joint_model.solimp
-    return ", ".join(
-        f"{name} {_short(before)} → {_short(now)}"
-        for name, before, now in zip(ATTRIBUTES, own, stop, strict=True)
-        if before != now
-    )
+def changed(joint_model: JointModel, stops: Stops) -> str:
+    """What ends of the range change of a joint's own, for a person."""
+    own, second = joint_model.stops, stops.second
+    pairs = zip(ATTRIBUTES, (own.solref, own.solimp), (stops.solref, stops.solimp), strict=True)
+    changes = [f"{name} {_short(old)} → {_short(new)}" for name, old, new in pairs if old != new]
+    if second and second != own.second:
+        values = zip(ATTRIBUTES, (second.solref, second.solimp), strict=True)
+        words = " ".join(f"{name} {_short(value)}" for name, value in values)
+        changes.append(f"at the {second.where} end besides a tendon's limit with {words}")
+    return ", ".join(changes)
 
 
 def _short(values: tuple[float, ...]) -> str:
@@ -163,11 +201,20 @@ class _Visits:
     def samples(self) -> float:
         return self.estimator.samples
 
-    def loss(self, stop: Row) -> float:
-        """Twice the negative log-likelihood for a stop, robustly."""
+    def loss(self, stops: Stops) -> float:
+        """Twice the negative log-likelihood for ends of the range, robustly."""
         h = self.estimator.segments.h
-        own = self.joint_model.stopped(stop).simulator(self.profile, h)
+        own = self.joint_model.stopped(stops).simulator(self.profile, h)
         return self.estimator.started(own, SETTLING).loss
+
+    def at(self, end: int) -> "_Visits | None":
+        """Those to one end, -1 the low one, 1 the high one; None where there are fewer than two."""
+        segments, middle = self.estimator.segments, float(np.mean(self.profile.joint.range))
+        away = [segments.position[row[row >= 0]] - middle for row in segments.rows]
+        numbers = np.flatnonzero([end * one[np.argmax(np.abs(one))] > 0 for one in away])
+        if len(numbers) < FEWEST:
+            return None
+        return replace(self, estimator=some_of(segments, numbers))
 
 
 def _visits(measured: Measured) -> _Visits | None:
@@ -194,12 +241,12 @@ def _visits(measured: Measured) -> _Visits | None:
     return _Visits(some_of(segments, numbers), as_it_is(measured), measured.profile)
 
 
-def _changed(own: Row, z: Array) -> Row:
+def _changed(own: Stops, z: Array) -> Stops:
     """With factors of the stiffness and of the damping ratio, and of the impedance's odds, by their
     logarithms (MuJoCo's documentation, Computation, Parameters: the stiffness is 1 / (time constant
     x damping ratio)², or a number of its own)."""
     stiffness, ratio = map(float, np.exp(z[:2]))
-    (first, second), (least, most, *shape) = own
+    (first, second), (least, most, *shape) = own.solref, own.solimp
     if first > 0:
         solref = first / (np.sqrt(stiffness) * ratio), second * ratio
     else:
@@ -207,4 +254,5 @@ def _changed(own: Row, z: Array) -> Row:
     if len(z) > 2:
         odds = logit(np.clip(most, *IMPEDANCES))
         least = most = np.clip(expit(odds + z[2]), *IMPEDANCES)  # the same however deep
-    return tuple(map(float, solref)), tuple(map(float, (least, most, *shape)))
+    solimp = tuple(map(float, (least, most, *shape)))
+    return replace(own, solref=tuple(map(float, solref)), solimp=solimp)

@@ -13,7 +13,7 @@ from joda.estimation.segments import Segments
 from joda.joints.joint_model import JointModel
 from joda.measured.runs import CLEAR
 from joda.profile import Channels, Profile
-from joda.scenes.limits import IMPEDANCE, KNOCK_STEPS, rebounding
+from joda.scenes.limits import IMPEDANCE, KNOCK_STEPS, Stops, rebounding
 
 Array = NDArray[np.float64]
 
@@ -190,7 +190,7 @@ def some_of(segments: Segments, numbers: NDArray[np.intp]) -> SegmentEstimator:
 def stopped(joint_model: JointModel, ratio: float, time: float) -> JointModel:
     """The joint with ends of a restitution, at which a impact without damping lasts a time (s)."""
     solimp = IMPEDANCE, IMPEDANCE, *joint_model.solimp[2:]
-    return replace(joint_model, solref=rebounding(ratio, time / KNOCK_STEPS), solimp=solimp)
+    return joint_model.stopped(Stops(rebounding(ratio, time / KNOCK_STEPS), solimp))
 
 
 def ends_of(hypothesis: Hypothesis) -> list[int]:

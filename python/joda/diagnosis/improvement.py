@@ -9,7 +9,7 @@ from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibration
 from joda.diagnosis.corrections import OFF, Corrected, corrected, corrections, numbers
 from joda.diagnosis.departures import FAITHFUL, Departures
-from joda.diagnosis.end_stops import fitted_stop
+from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.findings import Correction, Diagnosis, Finding
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.pair_search import pairs
@@ -19,7 +19,7 @@ from joda.estimation.problem import segments_for
 from joda.measured.measured_joint import Measured
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
-from joda.scenes.native import Row
+from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
 
 MOST = 5
@@ -51,7 +51,7 @@ class Step:
         corrections: of the model's own numbers, that were made instead.
         servo: of the joint's actuators, with all corrections so far; None where none was made.
         right: what was set right of what the joint moves and of the measurement, so far.
-        stop: solref, solimp of the ends of the range that suit the runs there; None: the model's.
+        stops: ends of the range that suit the runs there; None: the model's.
         error: on runs held out of every fit.
         diagnosis: of the model with this profile; None if it was not made.
         departs: by what the profile is not what was given and diagnosed.
@@ -65,7 +65,7 @@ class Step:
     corrections: tuple[Correction, ...] = ()
     servo: Servo | None = None
     right: AppliedCorrections | None = None
-    stop: Row | None = None
+    stops: Stops | None = None
 
     @property
     def effect(self) -> str | None:
@@ -143,9 +143,9 @@ def _stopped(parts: Parts, steps: list[Step]) -> list[Step]:
     """The stairs, the last one with ends of the range that suit the runs there; one more where
     nothing else was missing."""
     train, held = _with(parts, steps[-1].profile)
-    if not (stop := fitted_stop(train, held)):
+    if not (stops := fitted_stops(train, held)):
         return steps
-    last = replace(steps[-1], stop=stop, error=error(held.stopped(stop)))
+    last = replace(steps[-1], stops=stops, error=error(held.stopped(stops)))
     return [*steps[: max(len(steps) - 1, 1)], last]
 
 

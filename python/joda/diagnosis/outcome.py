@@ -26,6 +26,7 @@ from joda.pictures.style import house_style
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.attaching import attached
+from joda.scenes.limits import Stops
 from joda.template import read_templates
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def scene_files(
     composed: Path,
     servo: Servo | None = None,
     right: AppliedCorrections | None = None,
-    ends: Mapping[str, str] = MappingProxyType({}),
+    stops: Stops | None = None,
 ) -> tuple[dict[Path, bytes | str], list[str]]:
     """What a scene with a whole profile (`joda.scenes.native`) and the profile's file hold.
 
@@ -99,14 +100,14 @@ def scene_files(
         scene, composed: to be written.
         servo: of the joint's actuators, with another gain or delay; None: as they are.
         right: what was set right of what the joint moves and of the measurement.
-        ends: attributes of the ends of its range, where they are not as they were.
+        stops: of the ends of its range; None: as they were.
 
     Returns:
         contents by path, and what is done there, a sentence each.
     """
     name, heavier = profile.joint.name, right.heavier if right else None
     content, notes, _ = attached(
-        model, profile, scene, joint=name, also=ends, servo=servo, heavier=heavier
+        model, profile, scene, joint=name, servo=servo, heavier=heavier, stops=stops
     )
     files: dict[Path, bytes | str] = {scene: content, composed: profile.to_json()}
     if right and right.sensing != RIGHT:

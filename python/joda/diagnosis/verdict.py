@@ -120,7 +120,7 @@ AT_ENDS = (
 BEYOND_ENDS = (
     "Something at the ends of the range is missing that no known effect explains: within it there "
     "is {}, but from where the joint comes to an end, whole runs are missed by up to {:.0f} times "
-    "what noise, start and force explain, whatever the stop (solreflimit, solimplimit).{}"
+    "what noise, start and force explain, whatever the stops (solreflimit, solimplimit).{}"
 )
 PRESS = (
     "Press the joint slowly against either end and let it go, and let it come there slowly and "

@@ -12,7 +12,7 @@ from joda.joints.rig import gravity_factors
 from joda.profile import CHANNELS, Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.context import Context
-from joda.scenes.limits import IMPEDANCES, limit_parameters
+from joda.scenes.limits import IMPEDANCES, SecondStop, Stops, limit_parameters, second_stop
 from joda.scenes.native import Row
 
 Array = NDArray[np.float64]
@@ -31,6 +31,7 @@ class JointModel:
         weight: hinge: factors of cos q and sin q of gravity's torque, N·m; slide: force, N, and 0.
         hinge: whether it is a hinge.
         solref, solimp: of the ends of the range.
+        second: what one end has besides; None for nothing.
         friction_row: solref and solimp of MuJoCo's own friction row, which yields where the joint
             all but rests; None: the plugin's, which hardly does.
         servo: what the joint's actuators make of commands; None where none acted.
@@ -44,6 +45,7 @@ class JointModel:
     hinge: bool
     solref: tuple[float, ...]
     solimp: tuple[float, ...]
+    second: SecondStop | None = None
     friction_row: Row | None = None
     servo: Servo | None = None
     integrator: int = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
@@ -62,7 +64,10 @@ class JointModel:
         row = friction_row(*self.friction_row, h) if self.friction_row else (0.0, 0.0)
         own = self.servo or Servo()
         servo = own.gain, own.stiffness, own.drag, own.low, own.high, own.delay
-        return JointSimulator(lo, hi, texts, *fixed, solref, solimp, row, servo, self.trapezoidal)
+        other = self.second or SecondStop(0, solref, solimp)
+        second = other.end, other.solref, other.solimp
+        how = row, servo, self.trapezoidal, second
+        return JointSimulator(lo, hi, texts, *fixed, solref, solimp, *how)
 
     @property
     def with_plugin(self) -> "JointModel":
@@ -74,10 +79,14 @@ class JointModel:
         servo = self.servo.stepped(h) if self.servo else None
         return replace(self, servo=servo, trapezoidal=True)
 
-    def stopped(self, stop: Row) -> "JointModel":
-        """The same with another solref and solimp of the ends of the range."""
-        solref, solimp = stop
-        return replace(self, solref=solref, solimp=solimp)
+    @property
+    def stops(self) -> Stops:
+        """Of the ends of the range."""
+        return Stops(self.solref, self.solimp, self.second)
+
+    def stopped(self, stops: Stops) -> "JointModel":
+        """The same with other ends of the range."""
+        return replace(self, solref=stops.solref, solimp=stops.solimp, second=stops.second)
 
     def heavier(self, inertia: float, gravity: float, turned: float = 0.0) -> "JointModel":
         """The same with factors of its inertia and of gravity's force, and with the centre of mass
@@ -149,6 +158,7 @@ def joint_model(
         hinge=hinge,
         solref=tuple(map(float, model.jnt_solref[joint])),
         solimp=tuple(map(float, model.jnt_solimp[joint])),
+        second=second_stop(model, joint),
         integrator=int(model.opt.integrator),
     )
 

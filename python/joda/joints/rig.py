@@ -17,6 +17,7 @@ from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.attaching import in_scene
 from joda.scenes.context import Context
+from joda.scenes.limits import SecondStop
 from joda.scenes.native import Row, native_attributes
 
 GRAVITY = 9.81
@@ -35,6 +36,7 @@ XML = """
     </body>
   </worldbody>
   {servo}
+  {second}
 </mujoco>
 """
 SERVO = """<actuator>
@@ -48,6 +50,7 @@ def rig(
     profile: Profile,
     friction_row: Row | None = None,
     servo: Servo | None = None,
+    second: SecondStop | None = None,
 ) -> mujoco.MjModel:
     """The joint alone, with a profile.
 
@@ -57,6 +60,7 @@ def rig(
         friction_row: solref and solimp of MuJoCo's own friction row: a profile of nothing but
             native elements is then the joint's own, without the plugin.
         servo: on the joint; its signal is the command, N·m or N.
+        second: what stops the joint at one end besides its limit.
 
     Returns:
         a model whose only joint has the same range, generalised inertia and gravity force.
@@ -72,6 +76,7 @@ def rig(
         lo=lo,
         hi=hi,
         servo=_actuator(servo) if servo else "",
+        second=f"<tendon>{second.element('stop', 'joint', (lo, hi))}</tendon>" if second else "",
         own=" ".join(f'{key}="{" ".join(map(repr, x))}"' for key, x in native.items()),
         **{"gravity": -GRAVITY, "inertia": inertia, **numbers},
     )

@@ -15,6 +15,7 @@ from joda.measured.trust import USUAL, Trust
 from joda.profile import Profile
 from joda.scenes.contacts import Contact
 from joda.scenes.context import Context
+from joda.scenes.limits import Stops
 from joda.scenes.native import Row
 from joda.template import Template, read_templates
 
@@ -70,9 +71,9 @@ class Measured:
         """The same joint with runs as they would be if what is wrong with them were right."""
         return replace(self, runs=tuple(map(sensing.of, self.runs)))
 
-    def stopped(self, stop: Row) -> "Measured":
-        """The same joint with another solref and solimp of the ends of its range."""
-        own = self.joint_model.stopped(stop)
+    def stopped(self, stops: Stops) -> "Measured":
+        """The same joint with other ends of its range."""
+        own = self.joint_model.stopped(stops)
         replayer = Replayer(self.context, self.profile, own, self.timestep)
         return replace(self, joint_model=own, replayer=replayer)
 

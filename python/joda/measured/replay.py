@@ -159,7 +159,7 @@ class Replayer:
         """Args: the joint in its scene; its whole profile (`scenes.native`); the rest; step, s."""
         alone = context.model_copy(update={"equivalent_inertia": joint_model.inertia})
         self.servo = joint_model.servo
-        self.model = rig(alone, profile, joint_model.friction_row, self.servo)
+        self.model = rig(alone, profile, joint_model.friction_row, self.servo, joint_model.second)
         self.model.opt.timestep = self.h = timestep
         if not self.model.nplugin:
             self.model.opt.integrator = joint_model.integrator

@@ -21,6 +21,7 @@ from joda.files import check_target, write_bytes
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.editing import EditedScene
+from joda.scenes.limits import Stops
 from joda.scenes.model import find_joint, joint_name, load, sentence
 from joda.scenes.weights import Heavier
 
@@ -93,6 +94,7 @@ def attached(
     also: Mapping[str, str] = MappingProxyType({}),
     servo: Servo | None = None,
     heavier: Heavier | None = None,
+    stops: Stops | None = None,
 ) -> Attached:
     """The scene that `attach`, with the same arguments, writes to `output`.
 
@@ -100,6 +102,7 @@ def attached(
         model, profiles, output, joint, native, also: as there.
         servo: of the actuators on the (only) joint, with another gain or delay; None: as they are.
         heavier: what the (only) joint moves is so much so; None: it is as it was.
+        stops: of the (only) joint's ends of the range; None: as they were.
     """
     model = Path(model)
     items = [profiles] if isinstance(profiles, str | Path | Profile) else list(profiles)
@@ -114,7 +117,7 @@ def attached(
 
     scene = EditedScene(model, spec, compiled, targets)
     for target, profile in zip(targets, loaded, strict=True):
-        scene.add(target, profile, native, also, heavier)
+        scene.add(target, profile, native, also, heavier, stops)
     if servo is not None:
         scene.drive(targets[0], servo)
     if heavier is not None:

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from joda.scenes.engine import is_on, polynomial
+from joda.scenes.limits import stop_of
 from joda.scenes.model import moves_with
 from joda.scenes.scene import DAMPING_ROW
 
@@ -25,7 +26,7 @@ def acting_besides(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
     cubic = any(polynomial(model, "dof_damping", int(model.jnt_dofadr[joint]))[2:])
     medium = model.opt.density > 0 or model.opt.viscosity > 0
     return (
-        *(_named("a tendon", model.tendon(k).name) for k in moved if _resists(model, k)),
+        *(_named("a tendon", model.tendon(k).name) for k in moved if _resists(model, k, joint)),
         *(_named("an equality", model.equality(k).name) for k in _equalities(model, joint, moved)),
         *(["a medium (<option density viscosity wind>)"] if medium else []),
         *(["its damping's third power"] if cubic and is_on(model, "damper") else []),
@@ -46,13 +47,13 @@ def _moved_tendons(model: mujoco.MjModel, joint: int) -> list[int]:
     return [int(k) for k in np.flatnonzero(np.ptp(lengths, axis=0) > 1e-9)]
 
 
-def _resists(model: mujoco.MjModel, tendon: int) -> bool:
-    """Whether a tendon has a strength or a limit."""
+def _resists(model: mujoco.MjModel, tendon: int, joint: int) -> bool:
+    """Whether a tendon has a strength or a limit; but for a stop at an end, which is replayed."""
     fields = "tendon_stiffness", "tendon_damping", "tendon_armature"
     strengths = (getattr(model, field) for field in fields if hasattr(model, field))
     return bool(
         model.tendon_frictionloss[tendon] > TINY
-        or model.tendon_limited[tendon]
+        or (model.tendon_limited[tendon] and not stop_of(model, tendon, joint))
         or any(np.any(one[tendon] != 0) for one in strengths)
     )
 

@@ -17,7 +17,7 @@ from joda.plugin import PLUGIN
 from joda.profile import ATTRIBUTES, Profile
 from joda.scenes.actuators import Servo, redriven
 from joda.scenes.engine import is_discrete, polynomial
-from joda.scenes.limits import firm_limit, limit_parameters
+from joda.scenes.limits import Stops, firm_limit, limit_parameters, second_stop
 from joda.scenes.mjcf import Element, MjcfError, Source, quoted
 from joda.scenes.model import joint_name, joint_type, write_out
 from joda.scenes.scene import (
@@ -31,6 +31,8 @@ from joda.scenes.scene import (
 )
 from joda.scenes.weights import LEAST, Heavier, gravcomp, inertial, moved_bodies
 
+STOP = "joda_stop_"
+"""Begins the name of the tendon that is a second stop at one end of a joint's range."""
 DAMP_RATIO = {"weak": 0.5, "medium": 0.25, "strong": 0.1}
 """Damping ratio of the joint's limit, by the elasticity that the joint-limit hint asks for."""
 
@@ -66,6 +68,7 @@ class EditedScene:
         self.source, self.joints = self._open(path, targets)
         self.instances: dict[int, Instance] = {}  # by body
         self.rows: list[str] = []  # equalities to add
+        self.tendons: list[str] = []
         self.names = [model.joint(k).name for k in range(model.njnt)]
 
     def _open(
@@ -103,8 +106,16 @@ class EditedScene:
         native: str,
         also: Mapping[str, str],
         heavier: Heavier | None = None,
+        stops: Stops | None = None,
     ) -> None:
-        """Edits the text for one joint; `heavier`: what it moves is so much so."""
+        """Edits the text for one joint.
+
+        Args:
+            joint: its id.
+            profile, native, also: see `joda.scenes.attaching.attach`.
+            heavier: what it moves is so much so.
+            stops: other ends of its range.
+        """
         kind = joint_type(self.model, joint)
         if kind != profile.joint.type:
             raise JodaError(
@@ -123,6 +134,7 @@ class EditedScene:
             changes["name"] = self._new_name(joint)
             self._note(joint, f"had no name and is now '{changes['name']}'")
             self.names[joint] = changes["name"]
+        changes |= self._stops(joint, stops) if stops else {}
         self.joints[joint][1].set(**{**changes, **also})
         self._configure(joint, profile)
         if damping_equality(self.model, joint) < 0:
@@ -209,6 +221,9 @@ class EditedScene:
         if self.rows:
             lines = "\n  ".join(self.rows)
             self.source.root.insert_last(f"<equality>\n  {lines}\n</equality>")
+        if self.tendons:
+            lines = "\n".join(self.tendons).replace("\n", "\n  ")
+            self.source.root.insert_last(f"<tendon>\n  {lines}\n</tendon>")
         self.source.relocate(folder)
         return self.source.render()
 
@@ -329,6 +344,15 @@ class EditedScene:
             return {}
         self._note(joint, "has firmer limits now, to bear the force with which the profile presses")
         return dict(zip(("solreflimit", "solimplimit"), firm, strict=True))
+
+    def _stops(self, joint: int, stops: Stops) -> dict[str, str]:
+        """Ends of the range as they are given; what one has besides is a tendon."""
+        if stops.second and stops.second != second_stop(self.model, joint):
+            name = STOP + self.names[joint]
+            span = float(self.model.jnt_range[joint, 0]), float(self.model.jnt_range[joint, 1])
+            self.tendons.append(stops.second.element(name, self.names[joint], span))
+        values = {"solreflimit": stops.solref, "solimplimit": stops.solimp}
+        return {name: " ".join(f"{x:.6g}" for x in numbers) for name, numbers in values.items()}
 
     def _inertia(self, joint: int, profile: Profile, factor: float) -> dict[str, str]:
         """The armature with the profile's added inertia, without that of the one it replaces;

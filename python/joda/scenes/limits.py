@@ -1,4 +1,5 @@
-"""Solver parameters of a joint's end stops: for a restitution, and to bear what presses on them.
+"""Solver parameters of a joint's end stops: for a restitution, to bear what presses on them, and of
+a stop that one end has besides.
 
 MuJoCo's limit is a spring and a damper that only push (docs, "Solver parameters"), with the
 acceleration -stiffness * depth - damping * speed per unit of inertia where the impedance is
@@ -7,11 +8,14 @@ a ratio is in cpp/end_stop.h, where the plugin takes it for an end with a restit
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 
+import mujoco
 import numpy as np
 
 from joda._core import stop_damping
+from joda.scenes.mjcf import quoted
 
 KNOCK_STEPS = 16
 """How many timesteps a knock at a stop with a restitution lasts without damping: as kKnockSteps in
@@ -26,6 +30,83 @@ LEAST_TIME = 1e-7
 """Of a stop's time constant times its damping ratio, s, that makes a stiffness."""
 IMPEDANCES = 1e-4, 0.9999
 """Smallest and largest impedance that MuJoCo takes."""
+
+ALIKE = 1e-6
+"""Part of the range by which a tendon's limit may be off an end to be there."""
+
+
+@dataclass(frozen=True)
+class SecondStop:
+    """What stops a joint at one end besides its limit, of which MuJoCo has one for both ends: the
+    limit of a fixed tendon on it alone.
+
+    Attributes:
+        end: -1 the low one, 1 the high one.
+        solref, solimp: of the tendon's limit.
+    """
+
+    end: int
+    solref: tuple[float, ...]
+    solimp: tuple[float, ...]
+
+    @property
+    def where(self) -> str:
+        """The end, in words."""
+        return "high" if self.end > 0 else "low"
+
+    def element(self, name: str, joint: str, span: tuple[float, float]) -> str:
+        """The tendon in MJCF.
+
+        Args:
+            name: of it.
+            joint: name of the joint.
+            span: of the joint's range, rad or m; the tendon's begins or ends as far beyond it.
+        """
+        lo, hi = span
+        reach = (2 * lo - hi, hi) if self.end > 0 else (lo, 2 * hi - lo)
+        numbers = {"range": reach, "solreflimit": self.solref, "solimplimit": self.solimp}
+        text = " ".join(
+            f'{key}="{" ".join(f"{value:.9g}" for value in values)}"'
+            for key, values in numbers.items()
+        )
+        inner = f'<joint joint={quoted(joint)} coef="1"/>'
+        return f'<fixed name={quoted(name)} limited="true" {text}>\n  {inner}\n</fixed>'
+
+
+@dataclass(frozen=True)
+class Stops:
+    """Of the ends of a range.
+
+    Attributes:
+        solref, solimp: of the joint's limit, for both.
+        second: what one end has besides; None for nothing.
+    """
+
+    solref: tuple[float, ...]
+    solimp: tuple[float, ...]
+    second: SecondStop | None = None
+
+
+def second_stop(model: mujoco.MjModel, joint: int) -> SecondStop | None:
+    """What stops a joint of a compiled model besides its limit; of several tendons the first."""
+    found = (stop_of(model, tendon, joint) for tendon in range(model.ntendon))
+    return next((stop for stop in found if stop), None)
+
+
+def stop_of(model: mujoco.MjModel, tendon: int, joint: int) -> SecondStop | None:
+    """What a tendon is to a joint, if that is a second stop at one end; else None."""
+    at = int(model.tendon_adr[tendon])
+    alone = model.tendon_num[tendon] == 1 and model.wrap_type[at] == mujoco.mjtWrap.mjWRAP_JOINT
+    own = alone and model.wrap_objid[at] == joint and model.wrap_prm[at] == 1
+    if not (own and model.tendon_limited[tendon] and model.jnt_limited[joint]):
+        return None
+    (lo, hi), (first, last) = model.jnt_range[joint], model.tendon_range[tendon]
+    near = ALIKE * (hi - lo)
+    low, high = abs(first - lo) <= near < last - hi, abs(last - hi) <= near < lo - first
+    if low == high:
+        return None
+    solref, solimp = model.tendon_solref_lim[tendon], model.tendon_solimp_lim[tendon]
+    return SecondStop(1 if high else -1, tuple(map(float, solref)), tuple(map(float, solimp)))
 
 
 def rebounding(restitution: float, timestep: float) -> tuple[float, float]:
