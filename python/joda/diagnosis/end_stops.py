@@ -87,7 +87,7 @@ def fitted_stops(train: Measured, held: Measured | None = None) -> Stops | None:
 
 def _apart(fit: "_Visits", own: Stops, end: int) -> Stops | None:
     """The stop that suits the other end's visits, and what that end has besides, which suits its
-    own; None where one of them has no visits."""
+    own; None where one of them has too few."""
     here, there = fit.at(end), fit.at(-end)
     if here is None or there is None:
         return None

@@ -281,9 +281,8 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array, nearby: Line
 
     Besides the position's noise there is that of the force: an error of acceleration `push`, from
     one sample to the next, moves the joint by that time, and on at the speed that it got, see
-    `_responses`. In units of the position's noise the
-    covariance is 1 + sum of l u uᵀ over few directions u, and its inverse root 1 - sum of
-    (1 - 1 / sqrt(1 + l)) u uᵀ.
+    `_responses`. In units of the position's noise the covariance is 1 + sum of l u uᵀ over few
+    directions u, and its inverse root 1 - sum of (1 - 1 / sqrt(1 + l)) u uᵀ.
     """
     found = []
     given = np.cumsum(np.append(0.0, (push[:-1] * np.maximum(np.diff(time), 0.0)) ** 2))
@@ -296,11 +295,8 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array, nearby: Line
         gaps = np.diff(t, append=t[-1])
         between = np.sqrt(np.diff(given[own], append=given[own[-1:]]))  # in samples left out, too
         speeds = np.maximum(gaps * push[own], between)
-        moved = (
-            _responses(t, gaps, Linearized(nearby.push[own], nearby.drag[own]))
-            * speeds
-            / sigma[own][:, None]
-        )
+        there = Linearized(nearby.push[own], nearby.drag[own])
+        moved = _responses(t, gaps, there) * speeds / sigma[own][:, None]
         size, way = np.linalg.eigh(moved @ moved.T)
         much = size > SHARED
         found.append(way[:, much] * np.sqrt(1 - 1 / np.sqrt(1 + size[much])))
