@@ -36,7 +36,7 @@ def arm(mass=1.0):
 
 
 def logged(
-    folder, rng, scale=1.0, offset=0.0, delay=0.0, zero=0.0, extra=lambda q: 0.0, noise=SIGMA
+    folder, rng, scale=1.0, offset=0.0, delay=0.0, zero=0.0, extra=lambda q, v: 0.0, noise=SIGMA
 ):
     """Four runs of 2 s of the arm in MuJoCo at 200 Hz, with what is wrong of what is logged."""
     model = mujoco.MjModel.from_xml_string(arm())
@@ -51,7 +51,7 @@ def logged(
             push = float(sizes @ np.sin(rates * data.time + phases))
             force = push - stiff * (data.qpos[0] - held)
             rows.append((data.time, data.qpos[0], force))
-            data.qfrc_applied[0] = force + extra(data.qpos[0])
+            data.qfrc_applied[0] = force + extra(data.qpos[0], data.qvel[0])
             mujoco.mj_step(model, data)
         time, position, force = np.array(rows).T
         if np.abs(position).max() > 3.7:  # a knock at an end is no number's
@@ -147,9 +147,22 @@ def test_of_runs_of_which_nothing_is_wrong_nothing_is_told(tmp_path, rng):
 def test_a_force_along_the_way_is_not_explained_by_numbers(tmp_path, rng):
     place = rng.uniform(-0.5, 0.5)
     _, found = found_of(
-        tmp_path, rng, extra=lambda q: 0.5 * np.sin(6 * (q - place)) * (abs(q - place) < 0.5)
+        tmp_path, rng, extra=lambda q, v: 0.5 * np.sin(6 * (q - place)) * (abs(q - place) < 0.5)
     )
     assert found is None or not found.alone
+
+
+@pytest.mark.slow
+def test_a_friction_of_one_direction_is_no_offset_and_no_mass(tmp_path, rng):
+    """With a damping that is off it is nearly the same as a constant force, a mass, the scale of
+    the force and another friction, three numbers that are off for one effect."""
+    measured, found = found_of(
+        tmp_path, rng, extra=lambda q, v: -0.3 * np.tanh(np.maximum(v, 0) / 0.02) - 0.02 * v
+    )
+    assert found is None or not found.alone
+    said = diagnosed(measured).diagnosis
+    assert "asymmetric_friction" in {one.effect for one in said.effects}
+    assert not {one.parameter for one in said.corrections} & {"mass", "force_scale", "force_offset"}
 
 
 @pytest.mark.slow

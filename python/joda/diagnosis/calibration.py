@@ -66,7 +66,7 @@ HEAVIER = "added_inertia"
 """An effect that without gravity is a force of another scale but for what else resists: it is named
 where it is any likelier."""
 EQUIVALENT = (
-    *(HEAVIER, "gravity_offset"),
+    *(HEAVIER, "gravity_offset", "asymmetric_friction"),
     *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
 )
 """Effects that may be the same as one of the numbers."""

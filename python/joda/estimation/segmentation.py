@@ -40,13 +40,12 @@ SURE = 0.1
 JOLTED = 0.03
 """Part of the range by which errors of the force, alone, may move the joint within a segment; where
 they would more, as where a hand pulls up between two samples, a segment begins after them."""
-JUMPED = 10.0
+JUMPED, JUMPS = 10.0, 3
 """Noises by which a single one may, where it is more than all others together: one that sticks soon
-after stays where it was moved to, and a free one goes on."""
+after stays where it was moved to, and a free one goes on. Where a force or damping acts, so that
+how it goes on is less well known, so many of the largest may be no more than all others."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a segment's samples share it."""
-FLAT = 1e-6
-"""Argument at which a sine is that."""
 BEYOND = 4.0
 """Noises outside its range at which a joint is beyond it."""
 CLEAR = 1.5
@@ -107,9 +106,9 @@ def segments_of(
             index = np.minimum(np.floor(place + 1e-9).astype(int), steps - 1)
             spread, push = _spread(time, position, sigma), run.part(piece).force_error()
             far = JOLTED * span, JUMPED * float(np.median(spread))
-            begins = _after_jolts(begins, index, time, push / inertia, *far)
-            rate, grows = nearby(position).rate, bearable(span, float(np.median(spread)))
-            begins = _while_followed(begins, index, time, rate, grows)
+            here, grows = nearby(position), bearable(span, float(np.median(spread)))
+            begins = _after_jolts(begins, index, time, push / inertia, here.acts, *far)
+            begins = _while_followed(begins, index, time, here.rate, grows)
             place_noise = (position - lo) / span, spread / span
             hits = np.zeros(len(time), bool)
             if cut_at_ends:
@@ -166,7 +165,7 @@ def segments_of(
         run=run_of,
         rows=rows,
         sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
-        shared=_shared(rows, time, spread, push / inertia, nearby(position)),
+        shared=_shared(rows, time, spread, push / inertia, nearby(position).rate),
         impacts=_knocks(rows, place, noise, hits),
         rests=_rests(rows, place, noise),
         stays=_stays(rows, place, noise) * np.array([run.forced for run in runs])[run_of[window]],
@@ -276,13 +275,14 @@ def _spread(time: Array, position: Array, sigma: float) -> Array:
     return np.asarray(np.hypot(sigma, late * smooth))
 
 
-def _shared(rows: Integers, time: Array, sigma: Array, push: Array, nearby: Linearized) -> Array:
+def _shared(rows: Integers, time: Array, sigma: Array, push: Array, rate: Array) -> Array:
     """What of the noise a segment's samples share, see `Segments`.
 
     Besides the position's noise there is that of the force: an error of acceleration `push`, from
-    one sample to the next, moves the joint by that time, and on at the speed that it got, see
-    `_responses`. In units of the position's noise the covariance is 1 + sum of l u uᵀ over few
-    directions u, and its inverse root 1 - sum of (1 - 1 / sqrt(1 + l)) u uᵀ.
+    one sample to the next, moves a free joint by that time, and on at the speed that it got; one
+    that runs away at a `rate` further, see `_responses`. In units of the position's noise the
+    covariance is 1 + sum of l u uᵀ over few directions u, and its inverse root 1 - sum of
+    (1 - 1 / sqrt(1 + l)) u uᵀ.
     """
     found = []
     given = np.cumsum(np.append(0.0, (push[:-1] * np.maximum(np.diff(time), 0.0)) ** 2))
@@ -295,8 +295,7 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array, nearby: Line
         gaps = np.diff(t, append=t[-1])
         between = np.sqrt(np.diff(given[own], append=given[own[-1:]]))  # in samples left out, too
         speeds = np.maximum(gaps * push[own], between)
-        there = Linearized(nearby.push[own], nearby.drag[own])
-        moved = _responses(t, gaps, there) * speeds / sigma[own][:, None]
+        moved = _responses(t, gaps, rate[own]) * speeds / sigma[own][:, None]
         size, way = np.linalg.eigh(moved @ moved.T)
         much = size > SHARED
         found.append(way[:, much] * np.sqrt(1 - 1 / np.sqrt(1 + size[much])))
@@ -306,41 +305,48 @@ def _shared(rows: Integers, time: Array, sigma: Array, push: Array, nearby: Line
     return out
 
 
-def _responses(t: Array, gaps: Array, nearby: Linearized) -> Array:
-    """Where a joint is at each time that was given a speed of 1 in the midst of each gap before, in
-    how its errors go on in each gap; a free one by the time since. Shape (n, n): times, gaps."""
-    push, drag = nearby.push, nearby.drag
-    if not push.any() and not drag.any():
+def _responses(t: Array, gaps: Array, rate: Array) -> Array:
+    """Where a joint is at each time that was given a speed of 1 in the midst of each gap before.
+
+    It moves by x'' = rate² x, with the rate of each gap; a free one, of rate 0, by the time since.
+    Shape (n, n): times, gaps.
+    """
+    if not rate.any():
         return np.maximum(t[:, None] - t - 0.5 * gaps, 0.0)
-    root = np.sqrt(drag**2 / 4 + push + 0j)  # of x'' = push x - drag x'; imaginary: it swings
-    first, second = np.exp((root - drag / 2) * gaps), np.exp((-root - drag / 2) * gaps)
-    flat = np.abs(root * gaps) < FLAT
-    same = ((first + second) / 2).real
-    new = np.where(flat, gaps * same, ((first - second) / np.where(flat, 1, 2 * root)).real)
     out = np.zeros((len(t), len(t)))
     x, v = np.zeros(len(t)), np.zeros(len(t))
     for i in range(1, len(t)):
-        k, half, a, b = push[i - 1], drag[i - 1] / 2, same[i - 1], new[i - 1]
-        x, v = (a + half * b) * x + b * v, k * b * x + (a - half * b) * v
-        x[i - 1], v[i - 1] = 0.5 * gaps[i - 1], 1.0
+        r, gap = rate[i - 1], gaps[i - 1]
+        growing, going = np.cosh(r * gap), np.sinh(r * gap) / r if r else gap
+        x, v = growing * x + going * v, r**2 * going * x + growing * v
+        x[i - 1], v[i - 1] = 0.5 * gap, 1.0
         out[i] = x
     return out
 
 
 def _after_jolts(
-    begins: Integers, index: Integers, time: Array, push: Array, far: float, alone: float
+    begins: Integers,
+    index: Integers,
+    time: Array,
+    push: Array,
+    acts: NDArray[np.bool_],
+    far: float,
+    alone: float,
 ) -> Integers:
     """Where segments begin, also after errors `push` (of an acceleration, from each sample to the
     next) that would move a free joint further than `far` until the segment ends, or one of them
-    further than all others and than `alone`."""
+    further than `alone`, and than all others together; those but for the `JUMPS` largest where
+    anything else `acts`."""
     jolts = np.diff(time, append=time[-1]) * push
 
     def after(first: int, end: int) -> int:
         moved = jolts[first : end - 1] * (time[end - 1] - time[first : end - 1])
-        both = np.sum(moved**2)
-        if np.sqrt(both) > far or (max(moved, default=0.0) > max(alone, np.sqrt(both / 2))):
-            return first + int(np.argmax(moved)) + 1
-        return end
+        if not len(moved):
+            return end
+        squares = np.sort(moved**2)
+        others = squares[: -JUMPS if acts[first:end].any() else -1].sum()
+        jumps = moved.max() > max(alone, np.sqrt(others))
+        return first + int(np.argmax(moved)) + 1 if jumps or squares.sum() > far**2 else end
 
     return _cut_more(begins, index, after)
 

@@ -31,6 +31,11 @@ class Linearized:
     drag: Array
 
     @property
+    def acts(self) -> NDArray[np.bool_]:
+        """Where anything but its inertia moves the joint, shape (n,)."""
+        return np.asarray((self.push != 0) | (self.drag != 0))
+
+    @property
     def rate(self) -> Array:
         """How fast they grow, 1/s, shape (n,), the larger root of r² + drag r = push (Lyapunov's
         indirect method); 0 where they do not."""
