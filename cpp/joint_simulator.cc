@@ -139,7 +139,10 @@ JODA_INLINE void JointSimulator::Advance(double h, double force, double command,
   const Resistance own = resist(v);
   double spring = p.conservative.Value(s, &near->conservative), pushed = force;
   if (effects) spring += OffsetForce(effects->gravity, q);
-  double yielding = h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
+  // without the plugin the engine takes springs as they are before the step, and integrates damping
+  // after all rows, as it does an actuator's
+  const bool bare = scheme_ == Scheme::kEngine && body_.friction_row[1] > 0;
+  double yielding = bare ? 0 : h * ImplicitStiffness(p, true, h, s, v, spring, inertia);
   if (effects) {
     const Push learned = LearnedForce(effects->learned, h, s, v, state->remembered);
     spring += learned.push;
@@ -168,9 +171,7 @@ JODA_INLINE void JointSimulator::Advance(double h, double force, double command,
     friction = {-D * per_second * v, D, bound};
   }
 
-  // without the plugin the engine integrates damping after all rows, as it does an actuator's
-  const bool own_damping = scheme_ == Scheme::kEngine && body_.friction_row[1] > 0;
-  const double implicit = own_damping ? 0 : Implicit(scheme_, h, drag, body_.inertia);
+  const double implicit = bare ? 0 : Implicit(scheme_, h, drag, body_.inertia);
   const double mass = body_.inertia + h * (implicit * drag + yielding);
   const double drive = behind.scale * (spring + weight + pushed) + behind.force + servo +
                        bounds.Shift() - (drag + yielding) * v;
@@ -189,7 +190,7 @@ JODA_INLINE void JointSimulator::Advance(double h, double force, double command,
     }
   }
   const bool free = kDriven && servo_.limits[0] < servo && servo < servo_.limits[1];
-  const double later = (own_damping ? drag : 0) + (free ? servo_.damping : 0);
+  const double later = (bare ? drag : 0) + (free ? servo_.damping : 0);
   const double slowed = later > 0 ? body_.inertia / (body_.inertia + h * later) : 1;
   state->v = v + h * slowed * motion.acceleration;
   state->q = q + h * state->v;

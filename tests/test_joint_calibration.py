@@ -33,7 +33,7 @@ def found(tmp_path_factory):
         covariance=np.diag([mass.covariance[0, 0], 1e-6]),
         others=((), ()),
     )
-    pulled, _ = found_of(folder, rng, mass=HEAVIER, extra=lambda q: PULL)
+    pulled, _ = found_of(folder, rng, mass=HEAVIER, extra=lambda q, v: PULL)
     return pulled, both
 
 

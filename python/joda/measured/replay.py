@@ -3,7 +3,7 @@
 The joint is simulated by itself (`joda.joints.rig`) under the measured force, from measured starts.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -126,6 +126,7 @@ class _Beginning:
         command: of the servo, and its times.
         sigma: noise of the position.
         mean, deviation: of position and velocity at the start, shape (2,) each.
+        exactly: whether MuJoCo itself must move the joint: without the plugin, at an end.
     """
 
     time: Array
@@ -135,6 +136,7 @@ class _Beginning:
     sigma: float
     mean: Array
     deviation: Array
+    exactly: bool = False
 
     @property
     def count(self) -> int:
@@ -256,6 +258,8 @@ class Replayer:
         at = np.array([begun.position[0], begun.velocity[0]])
         error = np.array([begun.position_error[0], begun.velocity_error[0]])
         begins = _Beginning(time, position, force, _command(run, len(time)), sigma, at, error)
+        if not self.model.nplugin and self._knocks(position[: begins.count], sigma):
+            begins = replace(begins, exactly=True)
         found = self._fitted_start(begins, np.zeros(2), FIRST_HORIZON)
         poor = POOR * min(len(time), begins.count)
         rests = smoothing.begins_at_rest(time, position, sigma)
@@ -314,6 +318,10 @@ class Replayer:
             return None
         return held(*command, edges - self.servo.delay)
 
+    def _moved(self, begins: _Beginning) -> Callable[..., Array]:
+        """What tells where the joint goes from starts."""
+        return self._replay if begins.exactly else self._quickly
+
     def _knocks(self, position: Array, sigma: float) -> bool:
         """Whether the joint is at an end of its range, which bends what is smoothed."""
         low, high = self.model.jnt_range[0]
@@ -327,7 +335,7 @@ class Replayer:
         used = slice(0, begins.count)
         starts = begins.mean + begins.deviation * tried
         forces = np.tile(begins.force[used], (len(tried), 1))
-        found = self._quickly(begins.time[used], starts, forces, begins.command)
+        found = self._moved(begins)(begins.time[used], starts, forces, begins.command)
         off = np.sum(((found - begins.position[used]) / begins.sigma) ** 2, axis=1)
         squares = off + np.sum(tried**2, axis=1)
         return np.asarray(tried[np.argmin(np.where(np.isfinite(squares), squares, np.inf))])
@@ -357,7 +365,7 @@ class Replayer:
             for _ in range(TRIES):
                 tried = np.clip(z + step, low, high)
                 starts = begins.mean + begins.deviation * (tried + off)
-                found = self._quickly(time, starts, forces, begins.command) / begins.sigma
+                found = self._moved(begins)(time, starts, forces, begins.command) / begins.sigma
                 misfit = found[0] - position
                 square = float(misfit @ misfit + tried @ tried)
                 if square >= least - SETTLED or not np.isfinite(found).all():
