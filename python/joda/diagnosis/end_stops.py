@@ -91,21 +91,21 @@ def _apart(fit: "_Visits", own: Stops, end: int) -> Stops | None:
     here, there = fit.at(end), fit.at(-end)
     if here is None or there is None:
         return None
-    alone, z = partial(_misfit, there, own), np.zeros(0)
-    for numbers in (2, 3):
-        z = _searched(alone, z, numbers)
-    both = _changed(own, z)
+    both = _changed(own, _all_searched(partial(_misfit, there, own)))
 
-    def loss(x: Array) -> float:
+    def stops(x: Array) -> Stops:
         second = _changed(both, x)
-        stops = replace(both, second=SecondStop(end, second.solref, second.solimp))
-        return here.loss(stops) + _unusual(x)
+        return replace(both, second=SecondStop(end, second.solref, second.solimp))
 
-    x = np.zeros(0)
+    return stops(_all_searched(lambda x: here.loss(stops(x)) + _unusual(x)))
+
+
+def _all_searched(loss: Callable[[Array], float]) -> Array:
+    """All three numbers of a stop that suit best, the third sought with the other two near."""
+    z = np.zeros(0)
     for numbers in (2, 3):
-        x = _searched(loss, x, numbers)
-    second = _changed(both, x)
-    return replace(both, second=SecondStop(end, second.solref, second.solimp))
+        z = _searched(loss, z, numbers)
+    return z
 
 
 def _misfit(visits: "_Visits", own: Stops, z: Array) -> float:
