@@ -57,7 +57,8 @@ def run(command: str, folder: Path) -> str:
 def masked(text: str) -> set[str]:
     """The lines without their numbers: other machines round otherwise."""
     return {
-        re.sub(r"-?\d[\d.e]*", "#", re.sub(" +", " ", line).rstrip()) for line in text.splitlines()
+        re.sub(r"-?\d[\d.]*(e-?\d+)?", "#", re.sub(" +", " ", line).rstrip())
+        for line in text.splitlines()
     }
 
 

@@ -16,7 +16,7 @@ from joda.diagnosis.departures import FAITHFUL, SHARED, Departures, departures, 
 from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.overlap import overlap
-from joda.diagnosis.paired_test import FALLEN, worse
+from joda.diagnosis.paired_test import FALLEN, MISSED_MORE, WORSE, risen, worse
 from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
 from joda.diagnosis.shape_refinement import (
     LIKELIER,
@@ -31,7 +31,7 @@ from joda.diagnosis.shape_refinement import (
     likeliest,
     refitted,
 )
-from joda.measured.errors import Errors, errors, known
+from joda.measured.errors import Errors, errors, known, until_an_end
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
 from joda.profile import Profile
@@ -158,6 +158,8 @@ def add_effect(
                     reason = NO_LESS
                 elif replays and anew:
                     reason = worse(replays, anew)
+                    if reason == MISSED_MORE and not _missed_before_an_end(held, replays, anew):
+                        reason = None
                 if not reason:
                     return one, after, ""
             reasons.append(reason)
@@ -229,6 +231,12 @@ def fallen(before: Error, after: Error) -> bool:
     if before.whole is None or after.whole is None:
         return windows
     return windows or (after.whole < FALLEN * before.whole and after.window < before.window)
+
+
+def _missed_before_an_end(held: Measured, before: Errors, after: Errors) -> bool:
+    """Whether whole runs are missed by more until they come to an end: what they do after that is
+    also the stop's, which may be another than the model's."""
+    return risen(until_an_end(held, before), until_an_end(held, after)) > WORSE
 
 
 def _as_good(other: Tried, first: Tried) -> bool:

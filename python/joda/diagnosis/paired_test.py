@@ -17,6 +17,9 @@ FEWEST = 5
 """Of fewer windows that change, none may become worse, and all together must be better."""
 EXACT, DRAWS = 12, 4000
 """Windows up to which all signs are gone through; else so many are drawn."""
+MISSED_MORE = (
+    "what was held out of the fit, replayed as a whole from its start, is missed by more"
+)
 WORSE = 1.05
 """How much the geometric mean of the errors of whole runs or blocks may rise."""
 FALLEN = 0.5
@@ -41,7 +44,7 @@ def worse(before: Errors, after: Errors) -> str | None:
     if not improves(pairs[0], pairs[1]) and not (shows_late and not improves(pairs[1], pairs[0])):
         return "windows held out of the fit are not missed by clearly less with it (paired test)"
     if risen(pairs[2], pairs[3]) > WORSE:
-        return "what was held out of the fit, replayed as a whole from its start, is missed by more"
+        return MISSED_MORE
     return None
 
 

@@ -44,9 +44,10 @@ USUAL: dict[NuisanceName, float] = {
 """How far off they usually are (one standard deviation): factors relatively, an offset of the force
 in units of its root mean square, a delay in s, a position's zero in ranges, the direction of the
 centre of mass as seen from the hinge in rad: an encoder's zero stands in for it unless told."""
-FULL_SCALE = 0.04
+FULL_SCALE, MOST_OFFSET = 0.04, 0.2
 """How far off an offset of the force usually is, of the largest force, if that is more: of joints
-that go by themselves most of the time."""
+that go by themselves most of the time; and the most, of the root mean square: an offset that is
+about all that was recorded is a force that was held against."""
 MOST = {"factor": 7.0, "time_delay": 0.1}
 """Largest logarithm of a factor, and longest delay (s)."""
 FAR = 20.0
@@ -234,9 +235,9 @@ def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:
     joint = measured.profile.joint
     usual = dict(USUAL)
     force = np.concatenate([run.force for run in measured.runs if run.forced] or [np.zeros(1)])
-    largest = FULL_SCALE * float(np.nanmax(np.abs(force)))
-    usual["force_offset"] = max(
-        usual["force_offset"] * float(np.sqrt(np.nanmean(force**2))), largest
+    mean, largest = float(np.sqrt(np.nanmean(force**2))), float(np.nanmax(np.abs(force)))
+    usual["force_offset"] = min(
+        max(usual["force_offset"] * mean, FULL_SCALE * largest), MOST_OFFSET * mean
     )
     usual["position_offset"] *= float(np.ptp(joint.range))
     weight = max(map(abs, measured.context.gravity_force))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import joined, rms
 from joda.measured.replay import Window
-from joda.measured.runs import Run
+from joda.measured.runs import CLEAR, Run, arrival
 
 Array = NDArray[np.float64]
 
@@ -153,6 +153,19 @@ def worst_missed(measured: Measured) -> Missed | None:
     nothing is replayed."""
     missed = errors(measured, windows=False, explained=True).missed
     return max(missed, key=lambda one: one.order, default=None)
+
+
+def until_an_end(measured: Measured, found: Errors) -> Array:
+    """How much whole runs are missed by until they come to an end of the range (the first samples
+    of a run that begins there count), in units of the noise, shape (r,); fewer where a run has no
+    such samples."""
+    out = []
+    for run, sigma, path in zip(measured.runs, measured.sigma, found.paths, strict=True):
+        before = slice(arrival(run, measured.profile.joint.range, CLEAR * sigma))
+        misfit = (path - run.position)[before]
+        if len(misfit := misfit[~np.isnan(misfit)]):
+            out.append(_multiple(rms(misfit), sigma))
+    return np.array(out)
 
 
 def _multiple(error: float, sigma: float) -> float:

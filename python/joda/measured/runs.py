@@ -170,6 +170,19 @@ def until_end(run: Run, span: tuple[float, float], clear: float) -> Run:
     return run.part(slice(max(left - 1, 0), left + int(back[0]) if len(back) else None))
 
 
+def arrival(run: Run, span: tuple[float, float], clear: float) -> int:
+    """The first sample at an end of the range after the joint was off it; else their number.
+
+    Args:
+        run: measured.
+        span: the range, rad or m.
+        clear: how far off an end the joint must be, rad or m, not to be at it.
+    """
+    off = np.minimum(run.position - span[0], span[1] - run.position) > clear
+    comes = np.flatnonzero(off[:-1] & ~off[1:])
+    return int(comes[0]) + 1 if len(comes) else len(off)
+
+
 def visits(
     run: Run, span: tuple[float, float], clear: float, around: tuple[float, float]
 ) -> list[slice]:
