@@ -118,7 +118,11 @@ def added(job: Job, row: dict, case: Case, train: Measured, held_out: Measured) 
 
 
 def unseen(row: dict, case: Case, train: Measured, held_out: Measured) -> dict:
-    """Errors on unseen whole runs, of what the true joint misses; after adding what was named."""
+    """Errors on unseen whole runs, of what the true joint misses; after adding what was named, or
+    after `improve` where only numbers are off."""
+    if row["verdict"] != "missing_effect" and row["corrections"]:
+        found = after_improve(case, train, held_out)
+        return {key: found[key] for key in ("unseen_before", "unseen")}
     before = after = missed(held_out).whole
     if row["verdict"] == "missing_effect":
         first = row["named"][0]

@@ -17,9 +17,7 @@ FEWEST = 5
 """Of fewer windows that change, none may become worse, and all together must be better."""
 EXACT, DRAWS = 12, 4000
 """Windows up to which all signs are gone through; else so many are drawn."""
-MISSED_MORE = (
-    "what was held out of the fit, replayed as a whole from its start, is missed by more"
-)
+MISSED_MORE = "what was held out of the fit, replayed as a whole from its start, is missed by more"
 WORSE = 1.05
 """How much the geometric mean of the errors of whole runs or blocks may rise."""
 FALLEN = 0.5
