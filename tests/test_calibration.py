@@ -138,6 +138,22 @@ def test_an_offset_of_the_force_is_told(tmp_path, rng):
         assert not said.summary.startswith("The model is adequate")
 
 
+@pytest.mark.parametrize(("pushed", "share"), [(1.0, 0.1), (4.0, 0.04), (20.0, 0.2)])
+def test_how_far_off_a_forces_offset_may_be(tmp_path, pushed, share):
+    """A tenth of what was recorded, or 4 % of the strongest push; but what is about all that was
+    recorded was held against, however strong a push besides."""
+    time, force = np.arange(400) * 0.005, np.full(400, -1.0)
+    force[7] = pushed
+    path = tmp_path / "run.csv"
+    write_run(path, Run(path.name, time, 0.1 * np.sin(time), None, force, True))
+    (tmp_path / "arm.xml").write_text(arm())
+    measured = read_measured(tmp_path / "arm.xml", "arm", [path])
+    numbers = nuisances_of(measured, fit_baseline(measured).base)
+    width = dict(zip(numbers.names, numbers.prior_stds, strict=True))["force_offset"]
+    mean = np.sqrt(np.mean(force**2))
+    assert width == pytest.approx(share * (pushed if share == 0.04 else mean), rel=1e-3)
+
+
 @pytest.mark.slow
 def test_of_runs_of_which_nothing_is_wrong_nothing_is_told(tmp_path, rng):
     assert found_of(tmp_path, rng)[1] is None

@@ -12,10 +12,11 @@ from joda import diagnose, improve
 from joda.diagnosis.adding import error
 from joda.diagnosis.end_stops import _visits, fitted_stops
 from joda.diagnosis.split import parted
+from joda.measured.errors import errors, until_an_end
 from joda.measured.reading import read_measured
 from joda.measured.replay import Start
 from joda.measured.run_files import write_run
-from joda.measured.runs import Run
+from joda.measured.runs import Run, arrival
 from joda.scenes.besides import acting_besides
 from joda.scenes.limits import SecondStop, stiffness_of
 
@@ -99,6 +100,28 @@ def test_how_far_an_end_yields_to_a_force_is_found(tmp_path, rng, impedance):
     assert (1 - found.solimp[1]) / stiffness == pytest.approx(yields, rel=0.1)
     best, own = (error(held.stopped(one)).whole for one in (found, train.joint_model.stops))
     assert best < 0.3 * own
+
+
+def test_until_an_end_another_stop_does_not_count(tmp_path, rng):
+    """Whole runs with ends of the range that are not the model's are missed by little more than the
+    noise until they come there, by much after."""
+    model, files = pushed(tmp_path, rng, 'solreflimit="0.1 0.3"', smoothly=True)
+    measured = read_measured(model, "slide", files)
+    found = errors(measured, windows=False)
+    assert max(one.multiple for one in found.missed) > 100
+    assert np.all(until_an_end(measured, found) < 10)  # the start is fitted to what follows
+    for run in measured.runs:
+        there = arrival(run, (0, 0.5), 3 * SIGMA)
+        assert np.all(np.abs(run.position[:there] - 0.25) < 0.25 - 2 * SIGMA)
+        assert abs(run.position[there] - 0.25) > 0.25 - 4 * SIGMA
+
+
+@pytest.mark.parametrize(
+    ("position", "first"), [([0, 0, 2, 5, 9, 10, 9], 5), ([0, 0, 0], 3), ([5, 6, 5], 3)]
+)
+def test_the_first_sample_at_an_end_after_the_joint_was_off_it(position, first):
+    run = Run("run", np.arange(len(position)), np.array(position), None, None, False)
+    assert arrival(run, (0, 10), 0.5) == first
 
 
 def test_a_stop_that_is_right_stays(tmp_path, rng):
