@@ -133,10 +133,12 @@ class OtherEnds:
     """Whole runs with the stop that suits them best.
 
     Attributes:
-        changes: what that changes, for a person; nothing where the model's own suits them best.
+        stops: that; None: the model's own.
+        changes: what it changes, for a person; nothing where the model's own suits them best.
         times: by how many times what errors explain the worst run is missed with it.
     """
 
+    stops: Stops | None
     changes: str
     times: float
 
@@ -152,11 +154,15 @@ def with_other_ends(
         others: see `worst`.
         times: how far they are missed with the model's own.
     """
-    fitted = measured.changed(baseline.base.written(baseline.fit.x))
-    if not (stops := fitted_stops(fitted)):
-        return OtherEnds("", times)
+    if not (stops := suited(measured, baseline)):
+        return OtherEnds(None, "", times)
     left = worst(measured.stopped(stops), baseline, [other.stopped(stops) for other in others])
-    return OtherEnds(changed(measured.joint_model, stops), left.whole)
+    return OtherEnds(stops, changed(measured.joint_model, stops), left.whole)
+
+
+def suited(measured: Measured, baseline: Baseline) -> Stops | None:
+    """Ends of the range that suit the runs, with the model fitted to them; None: its own."""
+    return fitted_stops(measured.changed(baseline.base.written(baseline.fit.x)))
 
 
 def stops_told(joint_model: JointModel, stops: Stops | None) -> list[str]:

@@ -71,7 +71,7 @@ def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = (
 
     @cache  # only a run that is missed by much asks for them
     def drawn() -> list[Replayer]:
-        return [_replayer(measured, baseline, x, finest) for x in _drawn(baseline)]
+        return [_replayer(measured, baseline, x, finest) for x in drawn_strengths(baseline)]
 
     @cache
     def righted() -> list[Replayer]:
@@ -163,7 +163,8 @@ def free_runs(measured: Measured, baseline: Baseline) -> FreeRuns | None:
     ways = [_Whole(measured, baseline.base, parts, accurate) for accurate in (True, False)]
     smooth = [way.fitted(baseline.fit.x) for way in ways]
     fits = [
-        way.searched(fit) if way.denied(fit) else fit for way, fit in zip(ways, smooth, strict=True)
+        searched(way.estimator, way.base, fit) if way.denied(fit) else fit
+        for way, fit in zip(ways, smooth, strict=True)
     ]
     best = int(np.argmin([fit.loss for fit in fits]))
     samples = sum(len(run.time) for run in measured.runs)
@@ -213,33 +214,6 @@ class _Whole:
         fits = [self.estimator.fit(make, unknowns, one.x, one.start) for one in begins]
         return self.estimator.refit(make, unknowns, min(fits, key=lambda fit: fit.loss))
 
-    def searched(self, found: Fit) -> Fit:
-        """A fit after a search without derivatives (Nelder and Mead 1965) of its numbers and the
-        runs' starts, if these are not too many: where a joint sticks, the loss is jagged."""
-        make, unknowns, unknown = self.base.simulator, self.base.unknowns, self.segments.prior_std
-        k = len(found.x)
-        scale = np.append(ASIDE * unknowns.step, AWAY * unknown.ravel())
-        if len(scale) > SEARCHED:
-            return found
-
-        def at(z: Array) -> tuple[Array, Array]:
-            off = scale * z
-            x = np.clip(found.x + off[:k], unknowns.low, unknowns.high)
-            return x, found.start + off[k:].reshape(unknown.shape)
-
-        def loss(z: Array) -> float:
-            x, start = at(z)
-            left = self.estimator.loss(self.estimator.squares(make(x), start)[1])
-            return left + unknowns.penalty(x)
-
-        z = np.zeros(len(scale))
-        for _ in range(TIMES):
-            simplex = z + np.vstack([np.zeros(len(z)), np.eye(len(z))])
-            options = {"initial_simplex": simplex, "maxfev": EACH * len(z), "adaptive": True}
-            z = minimize(loss, z, method="Nelder-Mead", options=options).x
-        fit = self.estimator.fit(make, unknowns, *at(z))
-        return min(found, self.estimator.refit(make, unknowns, fit), key=lambda one: one.loss)
-
     def denied(self, fit: Fit) -> bool:
         """Whether more is left than noise makes."""
         missed = self.segments.misfit(self.base.simulator(fit.x), fit.start)
@@ -262,6 +236,33 @@ class _Whole:
         return np.asarray(np.hypot(np.sqrt(np.diag(found)), APART * np.abs(fit.x)))
 
 
+def searched(estimator: SegmentEstimator, base: BaseModel, found: Fit) -> Fit:
+    """A fit to whole runs after a search without derivatives (Nelder and Mead 1965) of its numbers
+    and the runs' starts, if these are not too many: where a joint sticks, the loss is jagged."""
+    make, unknowns, unknown = base.simulator, base.unknowns, estimator.segments.prior_std
+    k = len(found.x)
+    scale = np.append(ASIDE * unknowns.step, AWAY * unknown.ravel())
+    if len(scale) > SEARCHED:
+        return found
+
+    def at(z: Array) -> tuple[Array, Array]:
+        off = scale * z
+        x = np.clip(found.x + off[:k], unknowns.low, unknowns.high)
+        return x, found.start + off[k:].reshape(unknown.shape)
+
+    def loss(z: Array) -> float:
+        x, start = at(z)
+        return estimator.loss(estimator.squares(make(x), start)[1]) + unknowns.penalty(x)
+
+    z = np.zeros(len(scale))
+    for _ in range(TIMES):
+        simplex = z + np.vstack([np.zeros(len(z)), np.eye(len(z))])
+        options = {"initial_simplex": simplex, "maxfev": EACH * len(z), "adaptive": True}
+        z = minimize(loss, z, method="Nelder-Mead", options=options).x
+    fit = estimator.fit(make, unknowns, *at(z))
+    return min(found, estimator.refit(make, unknowns, fit), key=lambda one: one.loss)
+
+
 def _replayer(measured: Measured, baseline: Baseline, x: Array, finer: int) -> Replayer:
     """Of the model with other numbers, and the friction row of its fit, in so many times finer
     steps, which then stand for none."""
@@ -275,7 +276,7 @@ def _replayer(measured: Measured, baseline: Baseline, x: Array, finer: int) -> R
     )
 
 
-def _drawn(baseline: Baseline) -> Array:
+def drawn_strengths(baseline: Baseline) -> Array:
     """Strengths within the errors of the fitted ones, shape (draws, k)."""
     base, x = baseline.base, baseline.fit.x
     if not len(x):

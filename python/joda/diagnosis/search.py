@@ -131,6 +131,19 @@ def narrowed(
     return Ranking(baseline, *scored(estimator, there), restitution=before.restitution)
 
 
+def searched_on(ranking: Ranking, progress: Progress = lambda done, total, what: None) -> Ranking:
+    """A ranking whose best effects were searched without derivatives besides, for whole runs, of
+    which the loss is jagged wherever a joint sticks."""
+    baseline = ranking.baseline
+    least = min((one.fit.loss for one in ranking.candidates), default=0.0)
+    near = [one for one in ranking.candidates if one.fit.loss < NEAR * least + HARDLY]
+    far = [one for one in ranking.candidates if one not in near]
+    with ThreadPoolExecutor(cpu_count()) as pool:
+        work = _Work(pool, progress, len(near))
+        there = work.all(baseline.simplex_searched, near) + far
+    return Ranking(baseline, *scored(baseline.estimator, there), restitution=ranking.restitution)
+
+
 @dataclass
 class _Work:
     """Threads, and how much they have done."""

@@ -1,6 +1,6 @@
 """What a model lacks: the verdict on a ranking, with probabilities, sizes and sentences."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from joda.diagnosis.corrections import (
     one_factor,
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
-from joda.diagnosis.end_stops import with_other_ends
+from joda.diagnosis.end_stops import suited, with_other_ends
 from joda.diagnosis.experiments import Model, means_of, next_experiment, there_and_back
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
@@ -50,6 +50,7 @@ from joda.diagnosis.summary import (
 )
 from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.units import units_of
+from joda.diagnosis.whole_run_search import WholeRuns, in_whole_runs
 from joda.estimation.base_model import BaseModel
 from joda.estimation.nuisance import nuisances_of
 from joda.estimation.problem import segments_for
@@ -60,6 +61,7 @@ from joda.measured.misfit import rms
 from joda.measured.visited import unvisited, unvisited_part, visited_share
 from joda.measured.whiteness import strays
 from joda.profile import Profile
+from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
 
 TOO_SHORT = "The measurements are too short to tell anything."
@@ -122,6 +124,9 @@ BEYOND_ENDS = (
     "is {}, but from where the joint comes to an end, whole runs are missed by up to {:.0f} times "
     "what noise, start and force explain, whatever the stops (solreflimit, solimplimit).{}"
 )
+WHOLLY = " Windows show nothing of it; whole runs do."
+MOST_LEFT = 0.5
+"""Part of what whole runs are missed by that an effect may leave to be worth a word."""
 PRESS = (
     "Press the joint slowly against either end and let it go, and let it come there slowly and "
     "fast, with the force: that parts the stop from a force close to it."
@@ -284,15 +289,7 @@ def _concluded(
     suffice = not selection.likely and looks.free and looks.free.suffice
     if selection.verdict == "adequate" or suffice:
         return _adequate(measured, ranking, looks.free, others, same)
-    held = Holdout(ranking.baseline, measured)
-    named = range(min(NAMED, len(ranking.candidates)))
-    every = {
-        k: finding(
-            measured, ranking, held, k, selection, indistinguishable(ranking, selection, k, one_way)
-        )
-        for k in named
-        if k == 0 or selection.probabilities[k] > WORTH_NAMING
-    }
+    every = _findings(measured, ranking, selection)
     sized = [k for k, one in every.items() if one.sized]
     experiment = _next(measured, ranking, selection, one_way)
     if not sized or unseen_place(measured, every[sized[0]].interval):
@@ -302,25 +299,51 @@ def _concluded(
             why = OUT_THERE.format(*there, 100 * visited_share(measured, there))
         report = _report(measured, "unexplained", why, (), experiment)
         return _driven(Diagnosed(report, puzzling=puzzling), ranking.baseline)
-    findings = tuple(every[k] for k in sized)
-    profile = ranking.candidates[sized[0]].written(ranking.baseline.base)
-    first = findings[0]
+    first = every[sized[0]]
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
     hardly |= far_off(first, measured.floor)
     if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
         # nor do segments held out know of anything
         return _adequate(measured, first_ranking, looks.free, others, same)
-    helped = helps(first, measured.floor)
-    if not helped and all(look.model < MUCH for look in looks.evidence):
+    if not helps(first, measured.floor) and all(look.model < MUCH for look in looks.evidence):
         return _adequate(measured, ranking, looks.free, others, same)
-    verdict = selection.verdict if helped else "unexplained"
-    base, candidate = ranking.baseline.base, ranking.candidates[sized[0]]
-    doubt = one_factor(base, candidate) or other_unit(measured)
+    findings = {k: every[k] for k in sized}
+    return _missing(measured, ranking, selection, findings, experiment, puzzling)
+
+
+def _findings(measured: Measured, ranking: Ranking, selection: Selection) -> dict[int, Finding]:
+    """The first few effects of a ranking that are worth a word, by their place there."""
+    held, one_way = Holdout(ranking.baseline, measured), moved_one_way(measured)
+    return {
+        k: finding(
+            measured, ranking, held, k, selection, indistinguishable(ranking, selection, k, one_way)
+        )
+        for k in range(min(NAMED, len(ranking.candidates)))
+        if k == 0 or selection.probabilities[k] > WORTH_NAMING
+    }
+
+
+def _missing(
+    measured: Measured,
+    ranking: Ranking,
+    selection: Selection,
+    findings: Mapping[int, Finding],
+    experiment: str | None,
+    puzzling: Ranking | None,
+) -> Diagnosed:
+    """That something is missing, and what may be, the likeliest first, by the places of these in a
+    ranking."""
+    (number, first), *_ = findings.items()
+    verdict = selection.verdict if helps(first, measured.floor) else "unexplained"
+    base, candidate = ranking.baseline.base, ranking.candidates[number]
+    doubt = (_forced(measured) and one_factor(base, candidate)) or other_unit(measured)
+    one_way = moved_one_way(measured)
     summary = summarised(first, selection, measured.floor, one_way, ranking.restitution, doubt)
     sure = verdict == "missing_effect" and not doubt  # else they stand in for what is not known
     own = numbers(ranking.baseline, candidate) if sure else ()
     summary += f" But {doubt}." if doubt else off_beside(own)
-    worth = tuple(one for one in findings if one.probability >= WORTH_NAMING)
+    told = tuple(findings.values())
+    worth = tuple(one for one in told if one.probability >= WORTH_NAMING)
     report = replace(
         _report(measured, verdict, summary, worth, experiment),
         corrections=corrections(own, measured.profile.joint, FAR_OFF),
@@ -332,7 +355,8 @@ def _concluded(
         if sure
         else None
     )
-    diagnosis = Diagnosed(report, profile if worth else None, findings, puzzling, corrected=servo)
+    profile = candidate.written(base) if worth else None
+    diagnosis = Diagnosed(report, profile, told, puzzling, corrected=servo)
     return diagnosis if sure or doubt else _driven(diagnosis, ranking.baseline)
 
 
@@ -365,6 +389,10 @@ def _adequate(
     def unexplained(summary: str, experiment: str | None) -> Diagnosed:
         return Diagnosed(_report(measured, "unexplained", summary, (), experiment))
 
+    def whole_runs_tell(summary: str) -> Diagnosed:
+        stops = suited(measured, baseline)
+        return _by_whole_runs(measured, ranking, stops, unexplained(summary, AGAIN))
+
     def with_these(how: str) -> str:
         told = WITH_THESE.format(how, numbers_off, noise)
         return f"{told[0].upper()}{told[1:]}" if same else f"{NONE_MISSING}{told}"
@@ -374,16 +402,18 @@ def _adequate(
         return unexplained(_report_uneven(measured), GAUGE_AGAIN)
     left = worst(measured, baseline, others)
     if left.free > BEYOND:
-        return unexplained(DRIFTING.format(left.free), AGAIN)
+        return whole_runs_tell(DRIFTING.format(left.free))
     if free and free.drifting:
-        return unexplained(SLOWLY, AGAIN)
+        return whole_runs_tell(SLOWLY)
     denying = free if free and free.denied else None
     told, least = (denying, 0.0) if denying else (baseline, OFF)
     by_runs = (denying.fit.x, denying.errors) if denying else None
     own, worst_run = numbers(baseline, found=by_runs), worst_missed(measured)
     numbers_off = off(own, least)
     if denying and not numbers_off:
-        return unexplained(TOGETHER, AGAIN)
+        by_whole = whole_runs_tell(TOGETHER)
+        guessed = by_whole.diagnosis.verdict == "unexplained"  # where other numbers do as well
+        return unexplained(TOGETHER, AGAIN) if guessed else by_whole
     if numbers_off and moved_one_way(measured):
         usual = units_of(baseline.estimator.segments, measured).force
         errors = errors_beside_a_force(told.estimator, told.base, told.fit, usual)
@@ -397,7 +427,7 @@ def _adequate(
             summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
             return unexplained(summary, experiment)
         own, numbers_off = surely, off(surely, least)
-    forced = not measured.runs or any(run.forced for run in measured.runs)
+    forced = _forced(measured)
     sure = heavier(own) if numbers_off and not forced else 0.0
     if sure > SURE and (found := _heavier(measured, ranking, numbers_off, sure)):
         return found
@@ -430,7 +460,70 @@ def _adequate(
     driven = baseline.base.joint_model.servo is not None
     if doubt or (all_alike and forced and not driven):
         return Diagnosed(report)
-    return Diagnosed(report, corrected=corrected(baseline, own, least, told.fit.x))
+    found = Diagnosed(report, corrected=corrected(baseline, own, least, told.fit.x))
+    if ends and verdict == "unexplained":
+        return _by_whole_runs(measured, ranking, ends.stops, found)
+    return found
+
+
+def _by_whole_runs(
+    measured: Measured, ranking: Ranking, stops: Stops | None, plain: Diagnosed
+) -> Diagnosed:
+    """What whole runs say of the effects, where they alone tell that something is missing.
+
+    Args:
+        measured: the joint and its runs.
+        ranking: of the effects by segments.
+        stops: ends of the range that suit the runs best; None: the model's.
+        plain: what is said where that is nothing.
+    """
+    whole = in_whole_runs(measured, ranking, stops)
+    again, selection = whole.ranking, weigh(whole.ranking)
+    if selection.verdict == "adequate":
+        return _by_other_numbers(measured, whole, stops) or plain
+    if selection.share > MOST_LEFT:
+        return plain
+    every = _findings(measured, again, selection)
+    if not every[0].sized or unseen_place(measured, every[0].interval):
+        return plain
+    report, given = plain.diagnosis, plain.diagnosis.summary
+    found = _missing(measured, again, selection, every, report.next_experiment, None)
+    said = found.diagnosis
+    if said.verdict == "missing_effect":
+        return replace(found, diagnosis=replace(said, summary=f"{said.summary}{WHOLLY}"))
+    guess = replace(said, summary=f"{given} {said.summary}", corrections=report.corrections)
+    return replace(found, diagnosis=guess, corrected=plain.corrected)
+
+
+def _by_other_numbers(
+    measured: Measured, whole: WholeRuns, stops: Stops | None
+) -> Diagnosed | None:
+    """That no effect is missing, and the model's own numbers are off as whole runs show them; None
+    where these leave more of the runs than errors explain, or a force would do the same.
+
+    Args:
+        measured: the joint and its runs.
+        whole: what whole runs say.
+        stops: ends of the range that these have there; None: the model's.
+    """
+    fitted = whole.ranking.baseline
+    own = numbers(fitted, found=(fitted.fit.x, whole.errors))
+    there = measured.stopped(stops) if stops else measured
+    if not off(own) or moved_one_way(measured) or worst(there, fitted).whole > BEYOND:
+        return None
+    missed = worst_missed(measured)
+    misses = WHOLE.format(missed.multiple if missed else 0.0)
+    noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
+    told = f" Its own numbers are off: {off(own)}.{by_one_factor(own, _forced(measured))}"
+    summary = NONE_MISSING + WITH_THESE.format(misses, told, noise)
+    report = _report(measured, "adequate", summary, (), None)
+    report = replace(report, corrections=corrections(own, measured.profile.joint, OFF))
+    return Diagnosed(report, corrected=corrected(fitted, own, OFF, fitted.fit.x))
+
+
+def _forced(measured: Measured) -> bool:
+    """Whether a force was recorded."""
+    return not measured.runs or any(run.forced for run in measured.runs)
 
 
 def _heavier(

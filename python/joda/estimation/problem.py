@@ -22,7 +22,13 @@ STRAYS = 3
 """At most so many samples are beyond the range by chance."""
 
 
-def segments_for(measured: Measured, length: float | None = None, fine: bool = True) -> Segments:
+def segments_for(
+    measured: Measured,
+    length: float | None = None,
+    fine: bool = True,
+    *,
+    cut_at_ends: bool = True,
+) -> Segments:
     """Runs in segments of some length (s), see `segments_of`; curves where there are no runs."""
     if not measured.runs:
         return curve_segments(measured.curves, measured.context, measured.timestep)
@@ -30,7 +36,8 @@ def segments_for(measured: Measured, length: float | None = None, fine: bool = T
     fixed = lo, measured.joint_model.inertia, measured.timestep
     ends = float(np.sqrt(stiffness_of(measured.joint_model.solref, measured.timestep)))
     nearby = partial(linearized, measured.profile, measured.joint_model)
-    return segments_of(measured.runs, measured.sigma, hi - lo, *fixed, length, fine, nearby, ends)
+    runs = measured.runs, measured.sigma, hi - lo
+    return segments_of(*runs, *fixed, length, fine, nearby, ends, cut_at_ends=cut_at_ends)
 
 
 def posed(

@@ -82,7 +82,8 @@ def segments_of(
             pressed as deep as the noise hides, may throw it back.
         thinned: whether of many samples, or where the joint rests, only some count.
         cut_at_ends: whether segments begin where the joint comes to an end of its range and where
-            it leaves that, so that the others tell of the joint alone, whatever the end does.
+            it leaves that, so that the others tell of the joint alone, whatever the end does; else
+            all are alike.
     """
     usual = _length(runs, sigmas, span)
     length = length or usual
@@ -166,8 +167,8 @@ def segments_of(
         rows=rows,
         sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
         shared=_shared(rows, time, spread, push / inertia, nearby(position).rate),
-        impacts=_knocks(rows, place, noise, hits),
-        rests=_rests(rows, place, noise),
+        impacts=_knocks(rows, place, noise, hits) if cut_at_ends else np.zeros(count, bool),
+        rests=_rests(rows, place, noise) if cut_at_ends else np.zeros(count, bool),
         stays=_stays(rows, place, noise) * np.array([run.forced for run in runs])[run_of[window]],
         command=command if driven else None,
     )
