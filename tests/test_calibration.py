@@ -9,6 +9,7 @@ import joda
 from joda import JodaError
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibrator
+from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.verdict import diagnosed
 from joda.estimation.nuisance import nuisances_of
 from joda.hidden import draw
@@ -133,9 +134,27 @@ def test_an_offset_of_the_force_is_told(tmp_path, rng):
     said = diagnosed(measured).diagnosis
     assert said.verdict == "adequate"
     if "force_offset" in {one.parameter for one in said.corrections}:  # an effect would do the same
-        assert "A constant force that the model lacks would do the same" in said.summary
+        assert "A constant force that the model lacks would do the same, and so" in said.summary
         assert "No effect is missing" not in said.summary
         assert not said.summary.startswith("The model is adequate")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("time_delay", -0.018, "The recorded force acts 18 ± 1e+02 ms earlier."),
+        ("time_delay", 0.018, "The recorded force acts 18 ± 1e+02 ms later."),
+        ("position_offset", -0.05, "The recorded position is 0.05 ± 0.1 rad too small."),
+        ("force_offset", -0.1, "The force is 0.1 ± 0.1 N·m less than what was recorded."),
+        ("force_offset", -0.1, " the same, and so would more friction in one direction than in"),
+        ("force_offset", 0.2, "A constant force that the model lacks would do the same."),
+    ],
+)
+def test_a_number_is_told_by_its_sign_and_with_what_is_the_same(tmp_path, rng, name, value, told):
+    """An offset that is less than the friction, of 0.15 N·m, may be a friction of one direction."""
+    (tmp_path / "arm.xml").write_text(arm())
+    measured = read_measured(tmp_path / "arm.xml", "arm", logged(tmp_path, rng)[:1])
+    assert told in correction_of(measured, name, value, 0.1, []).explanation
 
 
 @pytest.mark.parametrize(("pushed", "share"), [(1.0, 0.1), (4.0, 0.04), (20.0, 0.2)])

@@ -17,10 +17,18 @@ WHAT: dict[NuisanceName, str] = {
     "position_offset": "the recorded position is {:.3g}{} {} too large",
 }
 """With the number, its error and its unit."""
+LESS: dict[NuisanceName, tuple[str, str]] = {
+    "force_offset": ("more", "less"),
+    "time_delay": ("later", "earlier"),
+    "position_offset": ("large", "small"),
+}
+"""The word of a number, and in its place that of one below zero."""
 SAME_EFFECT: dict[NuisanceName, str] = {
-    "force_offset": " A constant force that the model lacks would do the same.",
+    "force_offset": " A constant force that the model lacks would do the same{}.",
 }
 """What no data tell from a number."""
+ONE_WAY = ", and so would more friction in one direction than in the other"
+"""The same of an offset that is less than a friction."""
 
 
 def correction_of(
@@ -53,14 +61,23 @@ def correction_of(
         value=whole * value,
         error=whole * error,
         unit=unit,
-        explanation=f"{words[0].upper()}{words[1:]}.{more}{SAME_EFFECT.get(name, '')}",
+        explanation=f"{words[0].upper()}{words[1:]}.{more}{_same(measured, name, value)}",
     )
+
+
+def _same(measured: Measured, name: NuisanceName, value: float) -> str:
+    """What no data tell from the number, a further sentence; nothing of most."""
+    rubs = sum(max(part.y) for part in measured.profile.channels.friction.components)
+    return SAME_EFFECT.get(name, "").format(ONE_WAY if abs(value) < rubs else "")
 
 
 def _clause(measured: Measured, name: NuisanceName, value: float, error: str = "") -> str:
     """A clause."""
     unit = "ms" if name == "time_delay" else _unit(measured, name)
-    return WHAT[name].format(_size(name, value), error, unit)
+    size, words = _size(name, value), WHAT[name]
+    if name in LESS and value < 0:
+        size, words = -size, words.replace(*LESS[name])
+    return words.format(size, error, unit)
 
 
 def _size(name: NuisanceName, value: float) -> float:

@@ -29,8 +29,8 @@ class GravityOffset(Effect):
     LAW = "force sin sin(q) + cos cos(q) on a hinge, force on a slide"
     SOURCE = "torque of a weight on an arm"
     SHOWS = (
-        "A force over position like a sine, the same in both directions and at rest; the joint "
-        "drifts to another place than the model does. On a slide it is a constant force."
+        "A force, over a hinge's position like a sine and of a slide constant, the same in both "
+        "directions and at rest; the joint drifts to another place than the model does."
     )
 
     effect: Literal["gravity_offset"] = "gravity_offset"
