@@ -13,6 +13,7 @@ from joda._core import JointSimulator
 from joda.diagnosis.force_balance import balanced
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypotheses.base import FREE_CURVE
+from joda.diagnosis.selection import SETTINGS
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import (
     CAUCHY_SCALE,
@@ -48,7 +49,8 @@ APART = 0.06
 OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
 MORE = 20.0
-"""Loss beyond noise from which it may be that a size differs along the way."""
+"""Loss beyond noise from which it may be that a size differs along the way; more of many samples,
+whose noise may be more than it was taken for."""
 MUCH_LESS, FINEST = 0.5, 3
 """Part of the loss beyond noise, at most, that a size which differs along the way leaves; and how
 many times the places at which it does become more."""
@@ -255,10 +257,11 @@ def uneven(
         steps: how many times the places at which the size differs may become more.
     """
     samples, tried = estimator.samples, [found]
+    more = max(MORE, SETTINGS.chance * float(np.sqrt(2 * samples)))  # noise is not known better
     for _ in range(steps):
         last = tried[-1]
         finer = last.hypothesis.uneven
-        if finer is None or samples * excess(last.fit.loss, samples) < MORE:
+        if finer is None or samples * excess(last.fit.loss, samples) < more:
             break
         own, factors = np.split(last.fit.x, [len(last.fit.x) - last.hypothesis.factors])
         x = np.append(own, np.zeros(finer.factors))
