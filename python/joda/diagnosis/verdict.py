@@ -530,7 +530,8 @@ def _hurled(measured: Measured) -> bool:
     """Whether the force is such that no model could follow it from sample to sample."""
     span, inertia = float(np.ptp(measured.profile.joint.range)), measured.joint_model.inertia
     return any(
-        np.nanmax(np.abs(run.force)) * float(np.median(np.diff(run.time))) ** 2 > inertia * span
+        np.abs(np.nan_to_num(run.force)).max() * float(np.median(np.diff(run.time))) ** 2
+        > inertia * span
         for run in measured.runs
         if run.forced
     )

@@ -56,8 +56,8 @@ def in_whole_runs(measured: Measured, ranking: Ranking, stops: Stops | None) -> 
     """
     there = measured.stopped(stops) if stops else measured
     whole = fit_segments(there, partial(_whole, there), ranking.baseline.fit.x)
-    fits = sorted([whole.fit, *_fits(whole, ranking.baseline)], key=_loss)
-    best = searched(whole.estimator, whole.base, fits[0])
+    fits = _fits(whole, ranking.baseline)
+    best = searched(whole.estimator, whole.base, min(fits, key=_loss))
     narrow = searched_on(narrowed(replace(whole, fit=best), ranking))
     found = narrow.baseline
     most = found.fit.loss + ALIKE + max(found.excess, 0.0) * found.estimator.samples
