@@ -1,7 +1,5 @@
 """Numbers of a joint and of its measurement that are off are found, and are no effects."""
 
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 import pytest
@@ -16,7 +14,7 @@ from joda.diagnosis.verdict import diagnosed
 from joda.estimation.nuisance import nuisances_of
 from joda.hidden import draw
 from joda.measured.reading import read_measured
-from joda.measured.run_files import read_run, write_run
+from joda.measured.run_files import write_run
 from joda.measured.runs import Run
 from joda.measured.trust import read_trust, trusting
 
@@ -139,16 +137,6 @@ def test_an_offset_of_the_force_is_told(tmp_path, rng):
         assert "A constant force that the model lacks would do the same, and so" in said.summary
         assert "No effect is missing" not in said.summary
         assert not said.summary.startswith("The model is adequate")
-
-
-def test_a_force_that_no_joint_could_follow_is_said_to_be_one(tmp_path, rng):
-    (runs,) = logged(tmp_path, rng)[:1]
-    run = read_run(runs)
-    write_run(runs, replace(run, force=1e7 * run.force))
-    (tmp_path / "arm.xml").write_text(arm())
-    said = diagnosed(read_measured(tmp_path / "arm.xml", "arm", [runs])).diagnosis
-    assert said.verdict == "insufficient_data"
-    assert said.summary.endswith("between two samples: see to its unit.")
 
 
 @pytest.mark.parametrize(

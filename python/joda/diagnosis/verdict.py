@@ -64,10 +64,9 @@ from joda.profile import Profile
 from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
 
-TOO_SHORT = "The measurements are too short to tell anything."
-TOO_STRONG = (
-    "The recorded force would throw the joint through its whole range between two samples: see to "
-    "its unit."
+TOO_SHORT = (
+    "The measurements are too short, or their force is far too strong for the joint (see to its "
+    "unit), to tell anything."
 )
 RECORD_MORE = (
     "Record more: move the joint through its whole range in both directions, slowly and fast, with "
@@ -187,8 +186,7 @@ def diagnosed(
         calibrate: whether numbers of the joint's body and of the measurement may be off.
     """
     if not segments_for(measured).usable.any():
-        why = TOO_STRONG if _hurled(measured) else TOO_SHORT
-        return Diagnosed(_report(measured, "insufficient_data", why, (), None))
+        return Diagnosed(_report(measured, "insufficient_data", TOO_SHORT, (), None))
     if why := at_rest(measured):
         why = f"{why[0].upper()}{why[1:]}."
         return Diagnosed(_report(measured, "insufficient_data", why, (), None))
@@ -524,17 +522,6 @@ def _by_other_numbers(
     report = _report(measured, "adequate", summary, (), None)
     report = replace(report, corrections=corrections(own, measured.profile.joint, OFF))
     return Diagnosed(report, corrected=corrected(fitted, own, OFF, fitted.fit.x))
-
-
-def _hurled(measured: Measured) -> bool:
-    """Whether the force is such that no model could follow it from sample to sample."""
-    span, inertia = float(np.ptp(measured.profile.joint.range)), measured.joint_model.inertia
-    return any(
-        np.abs(np.nan_to_num(run.force)).max() * float(np.median(np.diff(run.time))) ** 2
-        > inertia * span
-        for run in measured.runs
-        if run.forced
-    )
 
 
 def _forced(measured: Measured) -> bool:
