@@ -13,7 +13,7 @@ from joda.commands.improve import _departures as told_by_improve
 from joda.component import Component
 from joda.diagnosis import adding
 from joda.diagnosis.adding import OWN, Error, add_effect
-from joda.diagnosis.departures import DOUBT, Departures, departures, moved, restored
+from joda.diagnosis.departures import DOUBT, Departures, departures, given_parts, moved, restored
 from joda.diagnosis.improvement import Step
 from joda.diagnosis.shape_refinement import Trials
 from joda.diagnosis.split import parted
@@ -61,6 +61,11 @@ def test_what_moved_by_more_than_its_doubt_is_told_and_can_be_put_back(rng, way)
             line = f"native {name} {before:.3g} → {after:.3g} {unit}"
             assert (line in told) == far[number], told
         assert ("stribeck friction" in told) == far[2]
+        whole = restored(fitted, given, given_parts(given, "detent_internal"))
+        assert whole.channels.friction == given.channels.friction
+        assert whole.channels.damping == given.channels.damping
+        assert whole.effects == given.effects
+        assert whole.channels.conservative == fitted.channels.conservative
         back = restored(fitted, given, parts)
         assert moved(given, back, "detent_internal") == ()
         assert back.channels.conservative == fitted.channels.conservative
@@ -138,6 +143,22 @@ def test_a_number_that_need_not_vanish_stays(rubbing, monkeypatch):
     # the noise of two throws leaves about 2 %
     assert own + added == pytest.approx(FRICTION + RUBS, rel=0.2)
     assert added_effect.departs.sentences == ()
+
+
+def test_where_no_fit_is_better_its_own_numbers_are_held_as_given(rubbing, monkeypatch):
+    """Fits of all numbers end where what was held out is missed by more."""
+    (own,) = rubbing.profile.channels.friction.components
+    wrong = own.model_copy(update={"y": (FRICTION + 3 * RUBS,) * 2})
+    friction = rubbing.profile.channels.friction.model_copy(update={"components": (wrong,)})
+    channels = rubbing.profile.channels.model_copy(update={"friction": friction})
+    worse = rubbing.profile.model_copy(update={"channels": channels})
+    worse = worse.with_component("friction", level(ADDED, RUBS))
+    monkeypatch.setattr(Trials, "reshaped", lambda self, *_: [self.tried(worse)])
+    added_effect = add_effect(*parted(rubbing), ADDED)
+    assert added_effect.effect == ADDED, added_effect.reason
+    own, added = (part.y for part in added_effect.profile.channels.friction.components)
+    assert own == pytest.approx((FRICTION, FRICTION), rel=0.01)
+    assert np.mean(added) == pytest.approx(RUBS, rel=0.2)
 
 
 def test_what_is_held_stays_while_all_else_is_fitted(rubbing):

@@ -12,7 +12,14 @@ import numpy as np
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.coverage import at_rest
-from joda.diagnosis.departures import FAITHFUL, SHARED, Departures, departures, restored
+from joda.diagnosis.departures import (
+    FAITHFUL,
+    SHARED,
+    Departures,
+    departures,
+    given_parts,
+    restored,
+)
 from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.overlap import overlap
@@ -166,6 +173,12 @@ def add_effect(
         return None, before, reasons[0] if reasons else "these data can tell nothing of it"
 
     first, after, reason = best(tried)
+    if not first and tried and (parts := given_parts(given, effect)):
+        # its own numbers as they were given may be better than these runs tell them
+        as_given = restored(likeliest(tried).profile, given, parts)
+        held_fast = trials.holding(as_given, parts, progress)
+        first, after, _ = best(held_fast)
+        tried += held_fast
     if not first:
         silent = reason == NO_LESS and before.window < NO_MORE * held.floor
         return AddedEffect(train.profile, None, before, before, NOTHING_LEFT if silent else reason)

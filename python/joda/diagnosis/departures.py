@@ -110,6 +110,19 @@ def moved(given: Profile, profile: Profile, effect: str) -> tuple[Moved, ...]:
     return tuple(out)
 
 
+def given_parts(given: Profile, effect: str) -> tuple[Moved, ...]:
+    """All that a model gave, but what has an effect's name."""
+    channels = [(name, getattr(given.channels, name).components) for name in CHANNELS]
+    curves = [
+        Moved(name, number, one.label)
+        for name, components in channels
+        for number, one in enumerate(components)
+        if one.label != effect
+    ]
+    others = [Moved(EFFECTS, one.key, one.key) for one in given.effects if one.effect != effect]
+    return (*curves, *others)
+
+
 def restored(profile: Profile, given: Profile, parts: Collection[Moved]) -> Profile:
     """The profile with some parts as the model gave them."""
     back = {(part.where, part.what) for part in parts}
