@@ -103,17 +103,19 @@ def test_how_far_an_end_yields_to_a_force_is_found(tmp_path, rng, impedance):
 
 
 def test_until_an_end_another_stop_does_not_count(tmp_path, rng):
-    """Whole runs with ends of the range that are not the model's are missed by little more than the
-    noise until they come there, by much after."""
+    """Nor does how far a whole run is off after it came to an end that is not the model's."""
     model, files = pushed(tmp_path, rng, 'solreflimit="0.1 0.3"', smoothly=True)
     measured = read_measured(model, "slide", files)
     found = errors(measured, windows=False)
     assert max(one.multiple for one in found.missed) > 100
-    assert np.all(until_an_end(measured, found) < 10)  # the start is fitted to what follows
-    for run in measured.runs:
-        there = arrival(run, (0, 0.5), 3 * SIGMA)
+    paths = []
+    for run, sigma in zip(measured.runs, measured.sigma, strict=True):
+        there = arrival(run, (0, 0.5), 3 * sigma)
+        paths.append(run.position + np.where(np.arange(len(run.time)) < there, 2 * sigma, 0.1))
         assert np.all(np.abs(run.position[:there] - 0.25) < 0.25 - 2 * SIGMA)
         assert abs(run.position[there] - 0.25) > 0.25 - 4 * SIGMA
+    off = until_an_end(measured, replace(found, paths=tuple(paths)))
+    assert off == pytest.approx(np.full(len(files), 2.0))
 
 
 @pytest.mark.parametrize(
