@@ -103,6 +103,8 @@ TOGETHER = (
     "numbers it would not."
 )
 WITH_THESE = "as it stands the model {}.{} With these there is {} that an effect would explain."
+BEYOND_NOISE = "nothing beyond the noise ({:.2g} {})"
+NUMBERS_OFF = " Its own numbers are off: {}.{}"
 NONE_MISSING = "No effect is missing, but "
 WHOLE = "misses whole runs by up to {:.0f} times the noise"
 FREELY = "leaves more of whole free runs than noise makes"
@@ -436,9 +438,9 @@ def _adequate(
         return found
     all_alike = by_one_factor(own, forced) if numbers_off else ""
     if numbers_off:
-        numbers_off = f" Its own numbers are off: {numbers_off}.{all_alike}"
+        numbers_off = NUMBERS_OFF.format(numbers_off, all_alike)
     missed = worst_run.multiple if worst_run else 0.0
-    noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
+    noise = BEYOND_NOISE.format(measured.floor, measured.unit)
     ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
     verdict: Verdict = "unexplained" if ends and ends.times > BEYOND else "adequate"
     if verdict == "unexplained":
@@ -516,8 +518,8 @@ def _by_other_numbers(
         return None
     missed = worst_missed(measured)
     misses = WHOLE.format(missed.multiple if missed else 0.0)
-    noise = f"nothing beyond the noise ({measured.floor:.2g} {measured.unit})"
-    told = f" Its own numbers are off: {off(own)}.{by_one_factor(own, _forced(measured))}"
+    noise = BEYOND_NOISE.format(measured.floor, measured.unit)
+    told = NUMBERS_OFF.format(off(own), by_one_factor(own, _forced(measured)))
     summary = NONE_MISSING + WITH_THESE.format(misses, told, noise)
     report = _report(measured, "adequate", summary, (), None)
     report = replace(report, corrections=corrections(own, measured.profile.joint, OFF))

@@ -161,13 +161,10 @@ def until_end(run: Run, span: tuple[float, float], clear: float) -> Run:
         span: the range, rad or m.
         clear: how far off an end the joint must be, rad or m, not to be at it.
     """
-    inside = np.minimum(run.position - span[0], span[1] - run.position)
-    away = inside > clear
+    away = _away(run, span, clear)
     if not away.any():
         return run
-    left = int(np.argmax(away))
-    back = np.flatnonzero(~away[left:])
-    return run.part(slice(max(left - 1, 0), left + int(back[0]) if len(back) else None))
+    return run.part(slice(max(int(np.argmax(away)) - 1, 0), arrival(run, span, clear)))
 
 
 def arrival(run: Run, span: tuple[float, float], clear: float) -> int:
@@ -178,9 +175,14 @@ def arrival(run: Run, span: tuple[float, float], clear: float) -> int:
         span: the range, rad or m.
         clear: how far off an end the joint must be, rad or m, not to be at it.
     """
-    off = np.minimum(run.position - span[0], span[1] - run.position) > clear
-    comes = np.flatnonzero(off[:-1] & ~off[1:])
-    return int(comes[0]) + 1 if len(comes) else len(off)
+    away = _away(run, span, clear)
+    comes = np.flatnonzero(away[:-1] & ~away[1:])
+    return int(comes[0]) + 1 if len(comes) else len(away)
+
+
+def _away(run: Run, span: tuple[float, float], clear: float) -> NDArray[np.bool_]:
+    """Whether the joint is off both ends, shape (n,)."""
+    return np.asarray(np.minimum(run.position - span[0], span[1] - run.position) > clear)
 
 
 def visits(
