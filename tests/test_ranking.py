@@ -10,7 +10,7 @@ from joda.commands.templates import templates
 from joda.diagnosis import baseline as fits
 from joda.diagnosis import search
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.hypotheses import Units, hypotheses
+from joda.diagnosis.hypotheses import hypotheses
 from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
 from joda.diagnosis.hypotheses.effects import KNOTS, from_effects
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
@@ -20,6 +20,7 @@ from joda.diagnosis.search import NARROWED, WELLS, _shown_without_impacts, narro
 from joda.diagnosis.selection import Evidence, Selection, closer_counts, decide, doubted
 from joda.diagnosis.verdict import diagnosed
 from joda.effects import EndStopRestitution, QuadraticDamping
+from joda.effects.guesses import Units
 from joda.estimation.estimator import CAUCHY_SCALE
 from joda.field import evaluate
 from joda.hidden import EFFECTS, draw

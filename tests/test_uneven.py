@@ -7,9 +7,10 @@ from hidden_cases import read
 from joda import templates
 from joda.diagnosis.adding import starts
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.hypotheses import Units, hypotheses
+from joda.diagnosis.hypotheses import hypotheses
 from joda.diagnosis.search import rank
 from joda.diagnosis.uncertainty import uncertainty
+from joda.effects.guesses import Units
 from joda.hidden import draw
 from joda.profile import Joint, Profile
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from joda.diagnosis.hypotheses.base import Units
 from joda.diagnosis.hypotheses.effects import KNOTS, free_curves
+from joda.effects.guesses import Units
 from joda.estimation.unknowns import Unknowns
 
 

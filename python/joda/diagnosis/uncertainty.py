@@ -20,13 +20,12 @@ from joda.diagnosis.hypotheses.base import (
     FREE_CURVE,
     KNOWN_LAW,
     KNOWN_SHAPE,
-    STRENGTH,
-    TRIAL,
     everywhere,
 )
 from joda.diagnosis.hypotheses.intervals import GRID
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.diagnosis.impacts import Rebound, best_ratio, ends_of
+from joda.effects.guesses import STRENGTH, TRIAL
 from joda.estimation.estimator import Make, SegmentEstimator
 from joda.estimation.segments import Simulator
 from joda.estimation.unknowns import Unknowns

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.diagnosis.hypotheses import Units
+from joda.effects.guesses import Units
 from joda.estimation.segments import Segments
 from joda.measured.measured_joint import Measured
 

@@ -1,13 +1,16 @@
 """What every effect has: a name, a law, parameters with units, a text for the plugin."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from joda.component import Curve, Frozen, Points, numbers
+from joda.effects.guesses import STRENGTH, TRIAL, InitialGuess, Number, Trial, Units
 
 Direction = Literal["positive", "negative"]
+DIRECTIONS: tuple[Direction, ...] = "positive", "negative"
 
 PLACES = ("direction", "end")
 """Parameters that say where an effect acts."""
@@ -68,6 +71,12 @@ class Effect(Frozen):
         """Names of its parameters but for the curve."""
         return tuple(k for k in cls.model_fields if k not in ("effect", *Curve.model_fields))
 
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """Where its fits begin, each way in which it may act in such a joint; none of an effect
+        that has no numbers to be fitted, or cannot show there."""
+        yield from ()
+
     def text(self) -> str:
         """The effect as in the plugin's attribute; defaults but for the place are left out."""
         words = [self.effect]
@@ -104,7 +113,13 @@ class Effect(Frozen):
 
 
 class CurveEffect(Curve, Effect):
-    """An effect whose size is a curve over the joint's position; by default all over the range."""
+    """An effect whose size is a curve over the joint's position; by default all over the range.
+
+    Attributes:
+        POWER: of the speed by which its size is a force.
+    """
+
+    POWER: ClassVar[Literal[0, 1, 2]] = 0
 
     interval: tuple[float, float] = (0.0, 1.0)
     x: Points = (0.0, 1.0)
@@ -122,3 +137,32 @@ class CurveEffect(Curve, Effect):
     def described(self) -> str:
         """Name and numbers for a person."""
         return f"{super().described()}, up to {max(self.y):.4g}"
+
+    @classmethod
+    def guess(
+        cls,
+        joint: Units,
+        others: Sequence[tuple[Number, Trial]] = (),
+        parameters: Callable[[Trial], Mapping[str, Any]] = lambda x: {},
+        direction: Literal["both", "positive", "negative"] = "both",
+        exact: bool = True,
+    ) -> InitialGuess:
+        """Of the same size everywhere.
+
+        Args:
+            joint: its units.
+            others: what is known of its numbers after the size, and values to begin with.
+            parameters: what these numbers make of its parameters.
+            direction, exact: see `InitialGuess`.
+        """
+        size = joint.force / joint.speed**cls.POWER
+        one_way = {} if direction == "both" else {"direction": direction}
+        return InitialGuess(
+            [STRENGTH, *(number for number, _ in others)],
+            list(product((TRIAL,), *(trials for _, trials in others))),
+            lambda x: cls(y=(size * x[0],) * 2, **one_way, **parameters(x)),  # type: ignore[arg-type]
+            lambda x: size * x[0],
+            joint.of_force(cls.POWER),
+            direction,
+            exact,
+        )

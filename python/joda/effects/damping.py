@@ -1,11 +1,13 @@
 """Effects that change the joint's damping."""
 
+from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
 from joda.component import Points
-from joda.effects.base import CurveEffect, Direction, parameter
+from joda.effects.base import DIRECTIONS, CurveEffect, Direction, parameter
+from joda.effects.guesses import InitialGuess, Units
 
 
 class DirectionDependentDamping(CurveEffect):
@@ -17,10 +19,17 @@ class DirectionDependentDamping(CurveEffect):
     LAW = "force -y(s) v while v has the direction, 0 otherwise"
     SOURCE = "Janot, Young and Gautier, Control Eng. Practice 73 (2018) on the EMPS drive"
     SHOWS = "A force that grows with speed in one direction more than in the other."
+    POWER = 1
 
     effect: Literal["direction_dependent_damping"] = "direction_dependent_damping"
     direction: Direction = Field(description="in which damping is larger; positive: q grows")
     y: Points = parameter("additional damping", "N·m·s/rad", "N·s/m", (0.1, 50))
+
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """In each direction."""
+        for direction in DIRECTIONS:
+            yield cls.guess(joint, direction=direction)
 
 
 class QuadraticDamping(CurveEffect):
@@ -32,9 +41,15 @@ class QuadraticDamping(CurveEffect):
     LAW = "force -y(s) v |v|"
     SOURCE = "Newton's drag; Blevins, Applied Fluid Dynamics Handbook (1984)"
     SHOWS = "Fast motions lose more than in proportion; slow ones hardly anything."
+    POWER = 2
 
     effect: Literal["quadratic_damping"] = "quadratic_damping"
     direction: Literal["both", "positive", "negative"] = Field(
         default="both", description="in which it acts; positive: q grows"
     )
     y: Points = parameter("drag", "N·m·s²/rad²", "N·s²/m²", (0.01, 50))
+
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """In both directions."""
+        yield cls.guess(joint)

@@ -1,11 +1,19 @@
 """Effects that change the joint's dry friction."""
 
+from collections.abc import Iterator
+from itertools import product
+from math import exp, log, nan
 from typing import Literal
 
 from pydantic import Field
 
 from joda.component import Points
-from joda.effects.base import CurveEffect, Direction, Effect, parameter
+from joda.effects.base import DIRECTIONS, CurveEffect, Direction, Effect, parameter
+from joda.effects.guesses import InitialGuess, Trial, Units
+
+JAMMED, MOVED = 1.0, 0.9
+"""Friction per load that no force moves; and the part of it from which no force is felt to move the
+joint: something else does."""
 
 
 class AsymmetricFriction(CurveEffect):
@@ -24,6 +32,12 @@ class AsymmetricFriction(CurveEffect):
     effect: Literal["asymmetric_friction"] = "asymmetric_friction"
     direction: Direction = Field(description="in which friction is larger; positive: q grows")
     y: Points = parameter("additional friction", "N·m", "N", (0.05, 5))
+
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """In each direction."""
+        for direction in DIRECTIONS:
+            yield cls.guess(joint, direction=direction)
 
 
 class StribeckFriction(CurveEffect):
@@ -50,6 +64,18 @@ class StribeckFriction(CurveEffect):
     exponent: float = parameter("form of the fall", "1", "1", (0.5, 2), default=2.0, gt=0)
     y: Points = parameter("additional friction at rest", "N·m", "N", (0.05, 5))
 
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """With speeds at which it falls off from far below the usual one."""
+        speeds = [log(v) for v in (0.02, 0.06, 0.2, 0.6)]
+        speed = (log(1e-3), log(3.0), 0.05, nan, log(6.0))
+        yield cls.guess(
+            joint,
+            [(speed, speeds)],
+            lambda x: {"velocity": joint.speed * exp(x[1])},
+            exact=False,
+        )
+
 
 class LoadDependentFriction(Effect):
     """Dry friction that grows with the load on the joint."""
@@ -66,6 +92,20 @@ class LoadDependentFriction(Effect):
 
     effect: Literal["load_dependent_friction"] = "load_dependent_friction"
     coefficient: float = parameter("friction per load", "1", "1", (0.02, 0.5), ge=0)
+
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """Where there is a load. A contact's friction grows less than it, a bearing's later."""
+        if joint.forced or joint.weight:
+            yield InitialGuess(
+                [(0.0, 0.7, 0.002, nan, JAMMED)],
+                [[0.05]],
+                lambda x: cls(coefficient=x[0]),
+                lambda x: x[0],
+                "1",
+                exact=False,
+                itself=lambda x: x[0] < MOVED * JAMMED,
+            )
 
 
 class PreslidingFriction(Effect):
@@ -97,3 +137,29 @@ class PreslidingFriction(Effect):
         "share of the friction at which they begin to slide", "1", "1", (0, 1), default=1.0, ge=0,
         le=1,
     )  # fmt: skip
+
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """By how far the bristles give way, and when they begin to slide."""
+        if not joint.friction:
+            return
+        soft = joint.friction / joint.span
+
+        def stiffness(x: Trial) -> float:
+            return soft * exp(x[0])
+
+        def effect(x: Trial) -> PreslidingFriction:
+            damping = x[1] * (stiffness(x) * joint.inertia) ** 0.5
+            return cls(stiffness=stiffness(x), damping=damping, breakaway=x[2])
+
+        yield InitialGuess(
+            [(log(20.0), log(5e3), 0.05, log(4.0), log(5e3)), (0.0, 1.5, 0.02), (0.0, 0.95, 0.03)],
+            [
+                (log(1 / part), 0.0, begin)
+                for part, begin in product((0.001, 0.003, 0.01, 0.03), (0.0, 0.6))
+            ],
+            effect,
+            stiffness,
+            "N·m/rad" if joint.hinge else "N/m",
+            exact=False,
+        )

@@ -1,10 +1,24 @@
 """Effects of what the joint is part of: masses, tilt, play, end stops."""
 
+from collections.abc import Iterator
+from itertools import product
+from math import exp, hypot, log, nan
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from joda.effects.base import Effect, parameter
+from joda.effects.guesses import TRIAL, InitialGuess, Trial, Units
+
+HEAVY, MOVED = 300.0, 0.9
+"""Added inertia, in units of the joint's, up to which is looked; and the part of it from which no
+force is felt to move the joint: something else does."""
+TINY = 1e-12
+"""As good as no force."""
+PULL = (-300.0, 300.0, 0.005)
+"""Bounds and step of a pull of gravity, in usual forces."""
+KEPT = 3
+"""Rough fits of a load behind a play that are fitted to the end: each impact may be or not."""
 
 
 class AddedInertia(Effect):
@@ -18,6 +32,18 @@ class AddedInertia(Effect):
 
     effect: Literal["added_inertia"] = "added_inertia"
     inertia: float = parameter("additional inertia", "kg·m²", "kg", (0.001, 5), gt=0)
+
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """From a tenth of the joint's own."""
+        yield InitialGuess(
+            [(1e-4, 5.0, 0.002, nan, HEAVY)],
+            [[0.1]],
+            lambda x: cls(inertia=joint.inertia * x[0]),
+            lambda x: joint.inertia * x[0],
+            "kg·m²" if joint.hinge else "kg",
+            itself=lambda x: x[0] < MOVED * HEAVY,
+        )
 
 
 class GravityOffset(Effect):
@@ -43,6 +69,27 @@ class GravityOffset(Effect):
         if not (self.sin or self.cos or self.force):
             raise ValueError("give sin or cos for a hinge, force for a slide")
         return self
+
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """A sine or a cosine of a hinge, a constant of a slide."""
+        force, unit = joint.force, joint.of_force()
+        if joint.hinge:
+            yield InitialGuess(
+                [PULL] * 2,
+                [(TRIAL, 0.0), (0.0, TRIAL)],
+                lambda x: cls(sin=force * x[0] or TINY, cos=force * x[1]),
+                lambda x: force * hypot(*x),
+                unit,
+            )
+        else:
+            yield InitialGuess(
+                [PULL],
+                [[TRIAL]],
+                lambda x: cls(force=force * x[0] or TINY),
+                lambda x: force * abs(x[0]),
+                unit,
+            )
 
     def fits(self, kind: Literal["hinge", "slide"]) -> bool:
         """Whether only those numbers are set that such a joint has."""
@@ -93,6 +140,44 @@ class Backlash(Effect):
         le=1,
     )
 
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """A play before the joint, where something pushes it through that, and behind it; how its
+        contact yields and knocks is not known."""
+        M, unit = joint.inertia, "rad" if joint.hinge else "m"
+
+        def play(x: Trial) -> float:
+            return joint.span * x[0]
+
+        def before(x: Trial) -> Backlash:
+            return cls(play=play(x), inertia=M * exp(x[1]))
+
+        def behind(x: Trial) -> Backlash:
+            return cls(play=play(x), inertia=M * exp(x[1]), side="motor", share=x[2])
+
+        if joint.forced:
+            yield InitialGuess(
+                [(3e-3, 0.2, 0.002, nan, 0.5), (log(3e-3), log(HEAVIEST["load"]), 0.05)],
+                list(product((0.01, 0.03), (log(0.03), log(0.15)))),
+                before,
+                play,
+                unit,
+                exact=False,
+            )
+        yield InitialGuess(
+            [
+                (3e-3, 0.2, 0.003, nan, 0.5),
+                (log(0.01), log(HEAVIEST["motor"]), 0.1),
+                (0.0, 0.98, 0.04),
+            ],
+            list(product((0.015, 0.05), (log(0.12), log(0.5)), (0.85,))),
+            behind,
+            play,
+            unit,
+            exact=False,
+            kept=KEPT,
+        )
+
     @property
     def handle(self) -> float:
         """Inertia of a handle before the joint, kg·m² or kg; 0 for none."""
@@ -136,3 +221,19 @@ class EndStopRestitution(Effect):
     def interval(self) -> tuple[float, float]:
         """Where it acts, in normalised position; all of the range stands for both ends."""
         return ENDS[self.end]
+
+    @classmethod
+    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
+        """Of both ends, and of each."""
+        return map(cls._of_end, ENDS)
+
+    @classmethod
+    def _of_end(cls, end: End) -> InitialGuess:
+        return InitialGuess(
+            [(0.05, 0.95, 0.02)],
+            [[0.3], [0.6]],
+            lambda x: cls(restitution=x[0], end=end),
+            lambda x: x[0],
+            "1",
+            interval=ENDS[end],
+        )

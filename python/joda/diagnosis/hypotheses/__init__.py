@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 
-from joda.diagnosis.hypotheses.base import Hypothesis, Units
+from joda.diagnosis.hypotheses.base import Hypothesis
 from joda.diagnosis.hypotheses.effects import free_curves, from_effects
 from joda.diagnosis.hypotheses.templates import from_templates
+from joda.effects.guesses import Units
 from joda.profile import Profile
 from joda.template import Template
 
-__all__ = ["Hypothesis", "Units", "hypotheses"]
+__all__ = ["Hypothesis", "hypotheses"]
 
 
 def hypotheses(

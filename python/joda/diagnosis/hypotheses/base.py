@@ -11,50 +11,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.effects.guesses import Number
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
 
 Array = NDArray[np.float64]
 Write = Callable[[Profile, Array], Profile]
 Direction = Literal["both", "positive", "negative"]
-Number = tuple[float, float, float] | tuple[float, float, float, float, float]
-"""Low, high and step; and where low and high are only usual, how far they may be widened."""
 Bounds = list[Number]
 """Of each number."""
 
-TRIAL = 0.1
-"""Strength with which an effect is tried, in usual forces."""
-STRENGTH = (0.0, 300.0, 0.005)
-"""Bounds and step of a strength, in usual forces: where it is strong, few joints left alone go."""
 KNOWN_LAW, FREE_CURVE, KNOWN_SHAPE = 0.01, 0.12, 0.2
 """Part of the excess misfit that a true effect may leave, by what is known of it."""
-
-
-@dataclass(frozen=True)
-class Units:
-    """A joint's own units.
-
-    Attributes:
-        force: usual force, N·m or N.
-        speed: usual speed, rad/s or m/s.
-        inertia: kg·m² or kg.
-        span: of the range, rad or m.
-        visited: part of the range that was measured, normalised.
-        friction: usual dry friction of the model, N·m or N; 0 for none.
-        forced: whether a force was recorded.
-        weight: largest force of gravity, N·m or N.
-        hinge: whether it is a hinge.
-    """
-
-    force: float
-    speed: float
-    inertia: float
-    span: float
-    visited: tuple[float, float]
-    friction: float
-    forced: bool
-    weight: float
-    hinge: bool
 
 
 @dataclass(frozen=True)
@@ -106,12 +74,6 @@ class Hypothesis:
         trials[:, 0] *= np.tile(strengths, len(places))
         trials[:, -self.ends :] = np.repeat(places, len(strengths), axis=0)
         return replace(self, trials=trials)
-
-
-def unit_of(units: Units, power: int = 0) -> str:
-    """Of a force, or of one per speed to that power."""
-    force, length = ("N·m", "rad") if units.hinge else ("N", "m")
-    return force + ("", f"·s/{length}", f"·s²/{length}²")[power]
 
 
 def everywhere(x: Array) -> tuple[float, float]:

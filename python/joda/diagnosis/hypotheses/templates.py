@@ -9,18 +9,15 @@ from joda.component import Component
 from joda.diagnosis.hypotheses.base import (
     FREE_CURVE,
     KNOWN_SHAPE,
-    STRENGTH,
-    TRIAL,
     Array,
     Bounds,
     Hypothesis,
-    Units,
     everywhere,
     known,
-    unit_of,
     unknowns_of,
 )
 from joda.diagnosis.hypotheses.intervals import FELT, WHOLE, ends, felt, places
+from joda.effects.guesses import STRENGTH, TRIAL, Units
 from joda.profile import CHANNELS, Profile
 from joda.template import Template
 
@@ -154,7 +151,7 @@ def _wells(units: Units, name: str, wells: int) -> Hypothesis:
         write,
         reach,
         lambda x: units.force * float(x[0] * np.exp(0.5 * np.abs(x[3 : 3 + wells]).sum())),
-        unit_of(units),
+        units.of_force(),
         len(bounds),
         neg_log_prior=RARE,
         misfit_tolerance=KNOWN_SHAPE,
@@ -197,7 +194,7 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         write,
         near,
         lambda x: units.force * float(x[0]),
-        unit_of(units),
+        units.of_force(),
         neg_log_prior=RARE,
         misfit_tolerance=KNOWN_SHAPE,
     )
@@ -231,7 +228,7 @@ def _spring(units: Units, name: str) -> Iterator[Hypothesis]:
             write,
             lambda x: ends(reach, x),
             lambda x: units.force * float(x[0]),
-            unit_of(units),
+            units.of_force(),
             len(bounds),
             misfit_tolerance=FREE_CURVE,
         )
@@ -277,7 +274,7 @@ def _snap(units: Units, name: str) -> Hypothesis:
         write,
         reach,
         lambda x: units.force * float(x[0]) * max(1.0, float(x[1])),
-        unit_of(units),
+        units.of_force(),
         len(bounds),
         neg_log_prior=RARE,
         misfit_tolerance=KNOWN_SHAPE,
@@ -308,7 +305,7 @@ def _bistable(units: Units, name: str) -> Hypothesis:
         write,
         everywhere,
         lambda x: units.force * float(x[0] * np.exp(0.5 * abs(x[6])) * max(1.0, *x[4:6])),
-        unit_of(units),
+        units.of_force(),
         misfit_tolerance=KNOWN_SHAPE,
     )
 
@@ -345,7 +342,7 @@ def _drawn(units: Units, name: str, template: Template) -> Hypothesis:
         write,
         lambda x: ends("anywhere", x),
         lambda x: unit(first) * float(x[0]) * max(map(abs, curves[first].y)),
-        unit_of(units, int(first == "damping")),
+        units.of_force(int(first == "damping")),
         len(bounds),
         neg_log_prior=RARE,
         misfit_tolerance=KNOWN_SHAPE,
@@ -399,7 +396,7 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
             write,
             between,
             lambda x: abs(float(unit)) * float(x[0]),
-            unit_of(units, int(channel == "damping")),
+            units.of_force(int(channel == "damping")),
             len(bounds),
             RARE if same else 0.0,
             itself=itself,
