@@ -34,12 +34,12 @@ def curve(hypothesis, x):
 
 def test_friction_and_drag_of_one_way_of_rest_and_of_speed_may_be_uneven():
     assert [(one.effect, one.direction) for one in EFFECTS] == [
-        ("asymmetric_friction", "positive"),
-        ("asymmetric_friction", "negative"),
         ("direction_dependent_damping", "positive"),
         ("direction_dependent_damping", "negative"),
-        ("quadratic_damping", "both"),
+        ("asymmetric_friction", "positive"),
+        ("asymmetric_friction", "negative"),
         ("stribeck_friction", "both"),
+        ("quadratic_damping", "both"),
     ]
 
 
