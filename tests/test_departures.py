@@ -79,7 +79,7 @@ def test_a_curve_that_changes_at_one_place_is_told_there():
     given = LID.with_component("friction", level("native friction", 1.0))
     bent = Component(label="native friction", interval=(0, 1), x=(0, 0.5, 1), y=(1, 1, 2))
     (part,) = moved(given, LID.with_component("friction", bent), "backlash")
-    assert part.told == "native friction 1 → 2 N·m at s = 1.00"
+    assert part.described == "native friction 1 → 2 N·m at s = 1.00"
 
 
 def test_a_number_of_either_sign_counts_too():

@@ -37,7 +37,7 @@ def test_an_interruption_keeps_the_best_so_far():
         if number == 2:
             raise KeyboardInterrupt
 
-    result = problem.fit(9, told=stop)
+    result = problem.fit(9, report=stop)
     assert result.interrupted
     assert len(result.history) == 2
     assert not np.array_equal(result.theta, problem.parameters.start)

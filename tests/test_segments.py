@@ -139,7 +139,7 @@ def test_ends_that_somebody_chose_or_that_yield_are_as_they_are(tmp_path, more, 
 
 # --- starts that are stuck
 def test_where_only_knocks_have_been_nothing_was_measured(tmp_path):
-    """No segment with a impact counts, and so nothing tells of a curve there."""
+    """No segment with an impact counts, and so nothing tells of a curve there."""
     swing = 0.5 + 0.2 * np.sin(2 * STEP * np.arange(2000))
     thrown = np.abs(1 - swing[-1] - 3 * STEP * np.arange(220))  # 3 m/s, thrown back at the end
     found = measured(tmp_path, np.append(swing, 1 - thrown))

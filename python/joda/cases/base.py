@@ -112,7 +112,7 @@ class LetGo:
     def number(self, subject: Subject, motions: Sequence[Motion]) -> float:
         """The largest distance between an end and where it belongs, in degrees, mm or m."""
         ends = np.array([subject.share(motion)[-1] for motion in motions])
-        return subject.told(float(np.abs(ends - np.array(self.ends)).max()))
+        return subject.shown(float(np.abs(ends - np.array(self.ends)).max()))
 
 
 @dataclass(frozen=True)
@@ -178,6 +178,6 @@ class Latch:
         return float(subject.take(begin, (begin + self.pulled,)).force.max())
 
 
-def told_unit(case: Case, subject: Subject) -> str:
+def unit_shown(case: Case, subject: Subject) -> str:
     """The unit of a case's number."""
     return shown(subject.context.joint)[1] if case.unit == "angle" else case.unit

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from joda.cases import CASES, Case
-from joda.cases.base import bundled, told_unit
+from joda.cases.base import bundled, unit_shown
 from joda.cases.gallery import Shown, command, gallery
 from joda.cases.picture import draw_case
 from joda.cases.tried import Tried, try_case, write_baselines
@@ -76,10 +76,10 @@ def experiments(
     for k, case in enumerate(chosen):
         make_folder(inside / case.name)
 
-        def told(seed: int, k: int = k, name: str = case.name) -> None:
+        def report(seed: int, k: int = k, name: str = case.name) -> None:
             progress(k * seeds + seed, len(chosen) * seeds, f"{name}, seed {seed}")
 
-        done.append(_case(case, inside, seeds, told))
+        done.append(_case(case, inside, seeds, report))
     write_text(numbers, json.dumps({one.case.name: one.as_json() for one in done}, indent=1) + "\n")
     write_text(page, gallery(done, FOLDER))
     return Experiments(page, numbers, tuple(done))
@@ -93,11 +93,11 @@ def _chosen(names: Sequence[str]) -> list[Case]:
     return [known[name] for name in names] or list(CASES)
 
 
-def _case(case: Case, folder: Path, seeds: int, told: Callable[[int], None]) -> Shown:
+def _case(case: Case, folder: Path, seeds: int, report: Callable[[int], None]) -> Shown:
     """All seeds; the first one's files stay, with the picture."""
     own, tries = folder / case.name, []
     for seed in range(seeds):
-        told(seed)
+        report(seed)
         if seed == 0:
             tries.append(try_case(case, "0", own))
             continue
@@ -110,7 +110,7 @@ def _case(case: Case, folder: Path, seeds: int, told: Callable[[int], None]) -> 
     run, film = _show(case, tries[0], folder)
     return Shown(
         case=case,
-        unit=told_unit(case, tries[0].subjects["joda"]),
+        unit=unit_shown(case, tries[0].subjects["joda"]),
         numbers=numbers,
         first=[one.first for one in tries],
         rounds=[one.rounds for one in tries],

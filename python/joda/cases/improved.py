@@ -88,7 +88,7 @@ class Predicted:
         """Root mean square of the difference in position, in degrees, mm or m."""
         pairs = zip(motions, self.reference(), strict=True)
         apart = np.concatenate([subject.share(one) - subject.share(other) for one, other in pairs])
-        return subject.told(float(np.sqrt(np.mean(apart**2))))
+        return subject.shown(float(np.sqrt(np.mean(apart**2))))
 
     def reference(self) -> list[Motion]:
         """What the object does from the same places."""

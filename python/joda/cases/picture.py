@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from joda.cases.base import Case, Press, told_unit
+from joda.cases.base import Case, Press, unit_shown
 from joda.cases.tried import WAYS, Tried
 from joda.field import evaluate
 from joda.interaction.traces import draw_force, draw_position, shade, shown
@@ -132,7 +132,7 @@ def _numbers(
         axes.set_xscale("log")
     else:
         axes.set_xlim(left=0)
-    axes.set_xlabel(f"{told_unit(case, tried.subjects['joda'])}: {case.better} is better")
+    axes.set_xlabel(f"{unit_shown(case, tried.subjects['joda'])}: {case.better} is better")
     seeds = len(next(iter(numbers.values())))
     axes.set_title(f"the number, {seeds} compile seed{'s' * (seeds > 1)}", loc="left", fontsize=10)
     axes.spines[["top", "right", "left"]].set_visible(False)

@@ -51,7 +51,7 @@ class Subject:
         lo, hi = self.context.joint.range
         return (motion.position - lo) / (hi - lo)
 
-    def told(self, s: float) -> float:
+    def shown(self, s: float) -> float:
         """A difference of normalised positions in degrees, mm or m (`interaction.traces.shown`)."""
         return s * self.span * shown(self.context.joint)[0]
 

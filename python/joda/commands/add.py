@@ -8,8 +8,8 @@ from typing import Any
 
 from joda.commands.diagnose import check_effect
 from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error, with_stop
-from joda.diagnosis.applied_corrections import as_told
-from joda.diagnosis.end_stops import stops_told
+from joda.diagnosis.applied_corrections import from_report
+from joda.diagnosis.end_stops import stops_described
 from joda.diagnosis.findings import read_diagnosis
 from joda.diagnosis.learning.account import Account, account, learned_picture
 from joda.diagnosis.learning.account import sentences as law_sentences
@@ -19,12 +19,12 @@ from joda.diagnosis.learning.law import LABEL
 from joda.diagnosis.outcome import (
     NO_TRUST,
     beside,
-    mended_picture,
+    errors_described,
     nearby,
     parting,
     read_runs,
+    repaired_picture,
     scene_files,
-    told_errors,
 )
 from joda.diagnosis.overlap import places
 from joda.diagnosis.phrases import extrapolated, named
@@ -138,7 +138,7 @@ def add(
     measured = read_runs(model, joint, runs, passive, trust, templates)
     check_effect(name, measured.templates)
     driven = measured.joint_model.servo is not None
-    if right := as_told(told.get("corrections", ()), driven):
+    if right := from_report(told.get("corrections", ()), driven):
         measured = right.of(measured)
     own = measured.profile.joint
     if told.get("joint", own.name) != own.name:
@@ -165,7 +165,7 @@ def add(
     told_law = account(train, held, law, added_effect.after.window, nearest) if law else None
     notes: list[str] = []
     stops = added_effect.stops
-    moved = stops_told(measured.joint_model, stops)
+    moved = stops_described(measured.joint_model, stops)
     corrections: Path | None = corrections_beside(target)
     if added_effect.effect:
         if not told_law:  # of a learned law nothing is where no run was
@@ -180,7 +180,7 @@ def add(
         drawn = (
             learned_picture(held, added_effect.profile, told_law)
             if told_law
-            else mended_picture(held, added_effect.profile)
+            else repaired_picture(held, added_effect.profile)
         )
         write_together(files | {picture: png(drawn)})
     added = added_effect.effect is not None
@@ -208,7 +208,9 @@ def add(
 def sentences(added: Added) -> list[str]:
     """What came of it, for a person."""
     what = named(added.effect)
-    errors = told_errors(added.before, added.after, added.noise_floor, added.unit, added.blocks)
+    errors = errors_described(
+        added.before, added.after, added.noise_floor, added.unit, added.blocks
+    )
     if added.added:
         out = [f"Added {what}. On what was held out of the fit ({added.held_out}): {errors}."]
     else:

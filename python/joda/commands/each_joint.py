@@ -129,7 +129,9 @@ def diagnose_all(
     found: dict[str, Diagnosis] = {}
     for number, name in enumerate(names):
 
-        def told(done: int, total: int, what: str, number: int = number, name: str = name) -> None:
+        def report(
+            done: int, total: int, what: str, number: int = number, name: str = name
+        ) -> None:
             progress(number * total + done, len(names) * total, f"{name}: {what}")
 
         found[name] = diagnose(
@@ -140,7 +142,7 @@ def diagnose_all(
             passive=passive,
             trust=trust,
             templates=templates,
-            progress=told,
+            progress=report,
         )
         if json:  # what is done stays, whatever ends the rest
             own = {joint: loads(one.to_json()) for joint, one in found.items()}
@@ -188,12 +190,12 @@ def improve_all(
     current = Path(model)
     for name in names:
 
-        def told(what: str, name: str = name) -> None:
+        def report(what: str, name: str = name) -> None:
             progress(f"{name}: {what}")
 
         done = improve(
             current, name, runs, target, passive=passive, trust=trust, templates=templates,
-            force=force or bool(found), progress=told,
+            force=force or bool(found), progress=report,
         )  # fmt: skip
         if done.scene and done.composed and done.picture:
             current = done.scene

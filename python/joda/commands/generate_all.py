@@ -189,11 +189,11 @@ def _run_many(
             return
         closed = len(sessions) - len(left)
 
-        def told(done: int, total: int, closed: int = closed) -> None:
+        def report(done: int, total: int, closed: int = closed) -> None:
             progress(closed, len(sessions), f"asking {proposer.name}, {done} of {total} answered")
 
         asks = [Ask(label, session.task, session.turns) for label, session in left.items()]
-        for label, answer in proposer.propose_many(asks, store, told):
+        for label, answer in proposer.propose_many(asks, store, report):
             progress(closed, len(sessions), f"simulating {label}")
             try:
                 left[label].take(answer, proposer.name)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from joda.diagnosis.end_stops import stops_told
+from joda.diagnosis.end_stops import stops_described
 from joda.diagnosis.improvement import Step, improved
 from joda.diagnosis.outcome import (
     NO_TRUST,
     beside,
-    draw_mended,
+    draw_repaired,
     nearby,
     read_runs,
     scene_files,
@@ -118,7 +118,7 @@ def improve(
     there = len(steps) > 1
     files: dict[Path, bytes | str] = {}
     notes: list[str] = []
-    moved = stops_told(measured.joint_model, steps[-1].stops)
+    moved = stops_described(measured.joint_model, steps[-1].stops)
     if there:
         files, notes = scene_files(
             Path(model), last, target, composed, steps[-1].servo, right, steps[-1].stops
@@ -266,7 +266,7 @@ def _picture(result: Improved, measured: Measured, held: Measured) -> "Figure":
             right.suptitle(what, x=0.02, ha="left", fontsize=10)
         else:
             draw_models(right, measured, models)
-        draw_mended(below, held, last)
+        draw_repaired(below, held, last)
     return figure
 
 

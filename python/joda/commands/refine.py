@@ -252,14 +252,17 @@ def refine(
         others["composed.json"]: after.to_json(),
         others["png"]: png(figure),
         others["history.json"]: history(
-            result, _told(errors), problem.sigma, _told(apart) if apart else None, hidden
+            result, _reported(errors), problem.sigma, _reported(apart) if apart else None, hidden
         ),
     }
     if corrections:
         files[others["corrections"]] = corrections_text({name: sensing})
     write_together(files)
     notes += parting(errors[1], problem.sigma, blocks=False)
-    if apart and (times := _told(apart)[1] / max(_told(errors)[1], problem.sigma)) > ELSEWHERE:
+    if (
+        apart
+        and (times := _reported(apart)[1] / max(_reported(errors)[1], problem.sigma)) > ELSEWHERE
+    ):
         notes.append(
             f"What was held out is missed {times:.0f} times as much as what was fitted: the fitted "
             "runs may not have been where those were, or a small difference decides there."
@@ -278,11 +281,11 @@ def refine(
         history=others["history.json"],
         corrections=others.get("corrections"),
         changes=tuple(changes(before, after)),
-        before=_told(errors)[0],
-        after=_told(errors)[1],
+        before=_reported(errors)[0],
+        after=_reported(errors)[1],
         windows=(errors[0].window, errors[1].window) if timed else None,
         noise=problem.sigma,
-        checked=_told(apart) if apart else None,
+        checked=_reported(apart) if apart else None,
         unseen=hidden,
         iterations=len(result.history),
         notes=tuple(notes),
@@ -295,7 +298,7 @@ def _both(runs: Sequence[str | Path], check: Sequence[str | Path]) -> str | None
     return next((str(run) for run in check if Path(run).resolve() in fitted), None)
 
 
-def _told(errors: tuple[Error, Error]) -> tuple[float, float]:
+def _reported(errors: tuple[Error, Error]) -> tuple[float, float]:
     """Of whole runs before and after; of curves, of the force."""
     before, after = (one.window if one.whole is None else one.whole for one in errors)
     return before, after

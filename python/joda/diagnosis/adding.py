@@ -32,9 +32,9 @@ from joda.diagnosis.shape_refinement import (
     Likelihood,
     Trials,
     Tried,
-    bouncy,
     checked,
     clearly,
+    has_restitution,
     likeliest,
     refitted,
 )
@@ -235,7 +235,7 @@ def by_all(
     more = departures(measured.profile, anew, effect, near)
     if len(more.sentences) > len(departs.sentences):
         return profile
-    return min(profile, anew, key=Likelihood(measured, bouncy(profile), profile).loss)
+    return min(profile, anew, key=Likelihood(measured, has_restitution(profile), profile).loss)
 
 
 def fallen(before: Error, after: Error) -> bool:

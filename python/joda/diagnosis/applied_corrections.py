@@ -40,7 +40,7 @@ def righted(values: Mapping[str, float]) -> AppliedCorrections:
     return AppliedCorrections(None if heavier == Heavier(1.0, 1.0) else heavier, sensing)
 
 
-def as_told(corrections: Sequence[Any], driven: bool) -> AppliedCorrections | None:
+def from_report(corrections: Sequence[Any], driven: bool) -> AppliedCorrections | None:
     """As a diagnosis' JSON tells; None where it tells none of these numbers.
 
     `driven`: whether an actuator acts, whose delay is the model's and is not set right here.

@@ -85,7 +85,7 @@ class Number:
         return float("nan") if self.parameter == "time_delay" else self.value / self.given
 
     @property
-    def told(self) -> str:
+    def described(self) -> str:
         """How it is off."""
         if self.parameter == "time_delay":
             late, error, given = (1e3 * x for x in (self.value, self.error, self.given))
@@ -262,12 +262,12 @@ def corrections(found: Sequence[Number], joint: Joint, least: float) -> tuple[Co
 def off(found: Sequence[Number], least: float = OFF) -> str:
     """Which numbers are off by a part at the least, and by what, with their errors; empty if none
     is."""
-    return ", ".join(one.told for one in found if one.off(least))
+    return ", ".join(one.described for one in found if one.off(least))
 
 
 def off_beside(found: Sequence[Number]) -> str:
     """Which numbers are far off beside an effect, as a further sentence; empty if none is."""
-    told = ", ".join(one.told for one in found if one.off(FAR_OFF))
+    told = ", ".join(one.described for one in found if one.off(FAR_OFF))
     return f" The model's own numbers that suit the runs best with it: {told}." if told else ""
 
 
@@ -285,7 +285,7 @@ def by_one_factor(found: Sequence[Number], forced: bool) -> str:
         found: the numbers.
         forced: whether a force was measured.
     """
-    x = np.array([one.factor for one in _told(found)])
+    x = np.array([one.factor for one in _determined(found)])
     mean = float(x.mean()) if len(x) > 1 else 1.0
     if abs(mean - 1) < FAR_OFF or np.abs(x / mean - 1).max() > ALIKE:
         return ""
@@ -305,7 +305,7 @@ def heavier(found: Sequence[Number]) -> float:
     and all strengths are less by one factor: that each is off by a factor of its own, and these are
     alike by chance, is the other way to see it. Factors are log-normal before the data; 0 where
     fewer than two are told."""
-    told = _told(found)
+    told = _determined(found)
     off = np.log([max(one.factor, ZERO) for one in told])
     if len(told) < 2 or off.mean() > 0:
         return 0.0
@@ -317,7 +317,7 @@ def heavier(found: Sequence[Number]) -> float:
     return float(expit(one - each - np.log(USUALLY)))
 
 
-def _told(found: Sequence[Number]) -> list[Number]:
+def _determined(found: Sequence[Number]) -> list[Number]:
     """Those that the data tell."""
     return [one for one in found if one.error < OFF * one.scale and np.isfinite(one.factor)]
 

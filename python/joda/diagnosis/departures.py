@@ -27,12 +27,12 @@ class Moved:
     Attributes:
         where: its channel, or `EFFECTS`.
         what: its number in the channel, or its key.
-        told: its name, and its numbers before and after.
+        described: its name, and its numbers before and after.
     """
 
     where: str
     what: int | str
-    told: str
+    described: str
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ def departures(
     if parts:
         changed = (
             f"The fit changes what the model gave by more than {100 * DOUBT:.0f} %: "
-            f"{', '.join(part.told for part in parts)}. With that as given, no fit does as well on "
-            "what was held out."
+            f"{', '.join(part.described for part in parts)}. With that as given, no fit does as "
+            "well on what was held out."
         )
     there = places(profile, effect, given)
     if near and all(overlap(one, near) < SHARED for one in there):

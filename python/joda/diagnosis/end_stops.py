@@ -19,7 +19,7 @@ from scipy.special import expit, logit
 from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.free_runs import worst
 from joda.diagnosis.impacts import some_of
-from joda.diagnosis.shape_refinement import bouncy, clearly
+from joda.diagnosis.shape_refinement import clearly, has_restitution
 from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.problem import as_it_is, segments_for
 from joda.estimation.segmentation import segments_of
@@ -59,7 +59,7 @@ def fitted_stops(train: Measured, held: Measured | None = None) -> Stops | None:
         train: the joint with a profile, and runs to fit.
         held: the same with runs held out; None where none are.
     """
-    if bouncy(train.profile):  # whose ends are its own
+    if has_restitution(train.profile):  # whose ends are its own
         return None
     fit, judge = _visits(train), _visits(held) if held else None
     if fit is None:
@@ -165,7 +165,7 @@ def suited(measured: Measured, baseline: Baseline) -> Stops | None:
     return fitted_stops(measured.changed(baseline.base.written(baseline.fit.x)))
 
 
-def stops_told(joint_model: JointModel, stops: Stops | None) -> list[str]:
+def stops_described(joint_model: JointModel, stops: Stops | None) -> list[str]:
     """What ends of the range that were fitted change, for a person; nothing where none were."""
     if stops is None:
         return []

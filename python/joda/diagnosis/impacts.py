@@ -30,11 +30,11 @@ RATIOS = np.linspace(0.2, 0.95, 11)
 FEWEST = 3
 """Restitutions between which the best one is told, at the least."""
 SHORTEST, TIMES = 6, 8
-"""Steps that a impact lasts at the least without damping, and how many durations are tried."""
+"""Steps that an impact lasts at the least without damping, and how many durations are tried."""
 AROUND = 5
-"""Samples before and after a impact that tell its speeds."""
+"""Samples before and after an impact that tell its speeds."""
 KNOCK_TIME = 0.6
-"""In which a joint goes through its range towards a impact, s."""
+"""In which a joint goes through its range towards an impact, s."""
 
 
 def best_ratio(
@@ -58,7 +58,7 @@ class Rebound:
     """How well stops of some restitutions suit the impacts at an end.
 
     Attributes:
-        ratios: of the speed after a impact to that before it, rising, shape (n,).
+        ratios: of the speed after an impact to that before it, rising, shape (n,).
         losses: of the segments with each of them, shape (n,).
         own: loss with the model's own restitution, or one that is not clearly larger.
         samples: how many there are.
@@ -120,7 +120,7 @@ class Rebound:
 class Impacts:
     """The segments with impacts at an end.
 
-    How long and how deep a impact is tells of the stop's stiffness, which is another matter: every
+    How long and how deep an impact is tells of the stop's stiffness, which is another matter: every
     restitution is tried with the stiffness that suits it best.
 
     Attributes:
@@ -161,7 +161,7 @@ def impacts_at(segments: Segments, base: BaseModel, given: JointModel) -> dict[i
     that the speeds around impacts tell to be no bouncier: what else is wrong, or falls between two
     samples, makes a bouncier end fit better all the same.
     """
-    sides, own, shortest = knocked(segments, base), rebound(base, given), SHORTEST * base.h
+    sides, own, shortest = impact_sides(segments, base), rebound(base, given), SHORTEST * base.h
     times = np.geomspace(shortest, max(2 * segments.length, 2 * shortest), TIMES)
     out = {}
     for side in (-1, 1):
@@ -188,7 +188,7 @@ def some_of(segments: Segments, numbers: NDArray[np.intp]) -> SegmentEstimator:
 
 
 def stopped(joint_model: JointModel, ratio: float, time: float) -> JointModel:
-    """The joint with ends of a restitution, at which a impact without damping lasts a time (s)."""
+    """The joint with ends of a restitution, at which an impact without damping lasts a time (s)."""
     solimp = IMPEDANCE, IMPEDANCE, *joint_model.solimp[2:]
     return joint_model.stopped(Stops(rebounding(ratio, time / KNOCK_STEPS), solimp))
 
@@ -199,8 +199,8 @@ def ends_of(hypothesis: Hypothesis) -> list[int]:
     return [side for side, there in ((-1, first <= 0.0), (1, last >= 1.0)) if there]
 
 
-def knocked(segments: Segments, base: BaseModel) -> NDArray[np.intp]:
-    """At which end each segment has a impact: -1 low, 1 high, 0 none; shape (m,)."""
+def impact_sides(segments: Segments, base: BaseModel) -> NDArray[np.intp]:
+    """At which end each segment has an impact: -1 low, 1 high, 0 none; shape (m,)."""
     middle = float(np.mean(base.profile.joint.range))
     told = segments.impacts & segments.long_enough
     out = np.zeros(len(told), np.intp)
@@ -232,7 +232,7 @@ def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Ar
     """
     lo, hi = base.profile.joint.range
     out = []
-    sides = knocked(segments, base)
+    sides = impact_sides(segments, base)
     for k in np.flatnonzero(np.isin(sides, ends)):
         row = segments.rows[k]
         own = row[row >= 0]
@@ -271,7 +271,7 @@ def _slope(t: Array, y: Array) -> tuple[float, float]:
 
 
 def rebound(base: BaseModel, given: JointModel) -> float:
-    """Speed after a impact, per speed before, of the model with its own ends."""
+    """Speed after an impact, per speed before, of the model with its own ends."""
     profile = base.profile.model_copy(update={"channels": Channels()})
     lo, hi = profile.joint.range
     steps, speed = round(KNOCK_TIME / base.h), (hi - lo) / KNOCK_TIME

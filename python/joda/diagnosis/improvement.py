@@ -121,7 +121,7 @@ def improved(
                 break
             last = steps[-1]
             steps += [replace(step, servo=last.servo, right=last.right) for step in stairs]
-            steps = _named_anew(parts, steps, progress)
+            steps = _renamed(parts, steps, progress)
         if effect := steps[-1].effect:
             progress("all numbers once more, to all runs")
             steps[-1] = _by_all(measured, steps[-1], effect)
@@ -239,7 +239,7 @@ def _added(
     return None
 
 
-def _named_anew(parts: Parts, steps: list[Step], progress: Progress) -> list[Step]:
+def _renamed(parts: Parts, steps: list[Step], progress: Progress) -> list[Step]:
     """The stairs, with another effect in the place of one that stood in for it.
 
     Each was named while others were missing, or not yet fitted beside it. Beside them as they are

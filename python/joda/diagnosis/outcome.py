@@ -142,7 +142,7 @@ def nearby(error: Error, blocks: bool) -> str:
     return "force" if error.whole is None else f"windows of {'up to ' if blocks else ''}0.4 s"
 
 
-def told_errors(before: Error, after: Error, noise: float, unit: str, blocks: bool) -> str:
+def errors_described(before: Error, after: Error, noise: float, unit: str, blocks: bool) -> str:
     """Errors before and after for a person."""
     if before.whole is None:
         return (
@@ -155,7 +155,7 @@ def told_errors(before: Error, after: Error, noise: float, unit: str, blocks: bo
     )
 
 
-def draw_mended(part: "Figure | SubFigure", held: Measured, after: Profile) -> None:
+def draw_repaired(part: "Figure | SubFigure", held: Measured, after: Profile) -> None:
     """The profile before and after, and what was held out with both models.
 
     Args:
@@ -188,11 +188,11 @@ def draw_mended(part: "Figure | SubFigure", held: Measured, after: Profile) -> N
     right.suptitle("held out of the fit", x=0.02, ha="left", fontsize=10)
 
 
-def mended_picture(held: Measured, after: Profile) -> "Figure":
-    """`draw_mended` as a figure."""
+def repaired_picture(held: Measured, after: Profile) -> "Figure":
+    """`draw_repaired` as a figure."""
     from matplotlib.figure import Figure
 
     with house_style():
         figure = Figure(figsize=(12, 7), dpi=110, layout="constrained")
-        draw_mended(figure, held, after)
+        draw_repaired(figure, held, after)
         return figure

@@ -117,7 +117,7 @@ class Trials:
     ) -> None:
         """Args: the joint and runs to fit; the same with runs held out; see `Likelihood`."""
         self.train = train
-        bounces = bounces or bouncy(train.profile)
+        bounces = bounces or has_restitution(train.profile)
         self.seen, self.unseen = (Likelihood(one, bounces, moved_by) for one in (train, held))
         longer = LONGER if train.runs else (1.0,)  # curves' segments are all alike
         usual_length = segments_for(train).length
@@ -277,7 +277,7 @@ def refitted(
             None: the profile's.
     """
     segments = segments_for(train.changed(profile), length, fine=False)  # at the scene's own step
-    estimator = SegmentEstimator(segments, _counted(segments, bouncy(profile)))
+    estimator = SegmentEstimator(segments, _counted(segments, has_restitution(profile)))
     if not estimator.counts.any():
         return profile
     kinds: tuple[Kind, ...] = ("values", "intervals", "effects")
@@ -310,7 +310,7 @@ def refitted(
     return parameters.written(estimator.refit(make, unknowns, fit, ROUNDS).x)
 
 
-def bouncy(profile: Profile) -> bool:
+def has_restitution(profile: Profile) -> bool:
     """Whether it says how bouncy an end is."""
     return any(isinstance(effect, EndStopRestitution) for effect in profile.effects)
 

@@ -77,7 +77,7 @@ def summarised(
     return f"{head} {name} ({likely}).{more}"
 
 
-def heavier_told(found: Finding, numbers_off: str) -> str:
+def heavier_summary(found: Finding, numbers_off: str) -> str:
     """That more inertia is missing, which the model's own numbers tell.
 
     Args:

@@ -118,7 +118,7 @@ class _Fitted:
         """Of these, factors along the way, near 1 by what is known of them."""
         return self.own[len(self.own) - self.found.hypothesis.factors :]
 
-    def told(self, x: Array) -> Array:
+    def described(self, x: Array) -> Array:
         """Magnitude and ends of the interval, shape (3,)."""
         numbers = np.clip(x, self.unknowns.low, self.unknowns.high)[self.own]
         hypothesis = self.found.hypothesis
@@ -137,7 +137,7 @@ def uncertainty(baseline: Baseline, found: FittedHypothesis, left: float) -> Unc
         return _restitution(baseline, found)
     fitted = _fitted(baseline, found)
     gain = max(baseline.fit.loss - found.fit.loss, 0.0)
-    best = fitted.told(fitted.x)
+    best = fitted.described(fitted.x)
     data = from_data(fitted, TOLERATED * gain * (found.hypothesis.misfit_tolerance == KNOWN_SHAPE))
     magnitude, a, b = map(float, best)
     shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.misfit_tolerance])
@@ -181,7 +181,7 @@ def from_data(fitted: _Fitted, tolerance: float = 0.0) -> Array:
     out = np.asarray(parts.max(axis=0))
     if len(factors):
         largest = factors[int(np.argmax(x[factors]))]
-        out[0] = np.hypot(out[0], fitted.told(x)[0] * covariance[largest, largest] ** 0.5)
+        out[0] = np.hypot(out[0], fitted.described(x)[0] * covariance[largest, largest] ** 0.5)
     return out
 
 
@@ -290,16 +290,16 @@ def _bootstrap(
 
 def _spread(fitted: _Fitted, draws: Array) -> Array:
     """Standard deviations of what is told, robustly, shape (3,)."""
-    told = np.stack([fitted.told(x) for x in draws])
+    told = np.stack([fitted.described(x) for x in draws])
     low, high = np.quantile(told, (0.16, 0.84), axis=0)
-    best = fitted.told(fitted.x)
+    best = fitted.described(fitted.x)
     return np.asarray(np.maximum(high - best, best - low))
 
 
 def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Array:
     """Standard deviations by the profile likelihood of each of the effect's numbers, shape (3,)."""
     estimator, unknowns, start = fitted.estimator, fitted.unknowns, fitted.found.fit.start
-    best, x = fitted.told(fitted.x), fitted.x
+    best, x = fitted.described(fitted.x), fitted.x
     least = estimator.loss(fitted.found.fit.squares) + unknowns.penalty(x)
     out = np.zeros(3)
     for k in np.setdiff1d(fitted.own, fitted.factors):
@@ -317,7 +317,7 @@ def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Arra
                 fit = estimator.fit(make, others, y, near, ITERATIONS)
                 y, near = fit.x, fit.start
                 rise = max(fit.loss - least, 0.0) / overdispersion
-                moved = np.abs(fitted.told(np.insert(y, k, value)) - best)
+                moved = np.abs(fitted.described(np.insert(y, k, value)) - best)
                 out = np.maximum(out, moved / np.sqrt(max(rise, 1.0)))
                 if rise > RISE or value in (unknowns.low[k], unknowns.high[k]):
                     break

@@ -40,7 +40,7 @@ def units_of(segments: Segments, measured: Measured) -> Units:
 
 
 def _visited(segments: Segments, measured: Measured) -> tuple[float, float]:
-    """Part of the range that was measured in segments that count: where a impact is, none does."""
+    """Part of the range that was measured in segments that count: where an impact is, none does."""
     lo, hi = measured.profile.joint.range
     if measured.runs:
         rows = segments.rows[segments.usable]

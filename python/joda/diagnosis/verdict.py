@@ -43,7 +43,7 @@ from joda.diagnosis.summary import (
     FALLEN,
     SAME,
     far_off,
-    heavier_told,
+    heavier_summary,
     helps,
     other_unit,
     summarised,
@@ -542,7 +542,7 @@ def _heavier(
             one = finding(measured, ranking, held, number, weigh(ranking))
             before = held.as_given  # without it, it is the model's numbers that are off
             one = replace(one, probability=probability, held_out_error_before=before)
-            summary = heavier_told(one, numbers_off)
+            summary = heavier_summary(one, numbers_off)
             report = _report(measured, "missing_effect", summary, (one,), None)
             return Diagnosed(report, candidate.written(ranking.baseline.base), (one,))
     return None

@@ -346,7 +346,7 @@ class SegmentEstimator:
         start: Array | None = None,
         iterations: int = 12,
         cauchy_scale: float = CAUCHY_SCALE,
-        told: Callable[[Fit], None] = lambda fit: None,
+        report: Callable[[Fit], None] = lambda fit: None,
         worth: float = np.inf,
     ) -> Fit:
         """The numbers and starts with the least loss.
@@ -361,7 +361,7 @@ class SegmentEstimator:
             start: of the segments, shape (m, d); None: as measured.
             iterations: at most so many.
             cauchy_scale: mean square residual from which a segment counts as its logarithm.
-            told: after each iteration, the best so far.
+            report: after each iteration, the best so far.
             worth: loss from which on it ends where the next step promises no less.
         """
         segments = self.segments
@@ -393,7 +393,7 @@ class SegmentEstimator:
                     damping = max(damping / 10, 1e-6)
                     break
                 damping *= 10
-            told(Fit(x, start, squares, loss, H))
+            report(Fit(x, start, squares, loss, H))
             if before - loss < LOSS_TOLERANCE:
                 if central:
                     break

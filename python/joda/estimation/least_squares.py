@@ -82,7 +82,7 @@ def levenberg_marquardt(
     start: Array,
     constraints: Inequalities,
     iterations: int,
-    told: Callable[[int, Array, float], None] = lambda number, theta, cost: None,
+    report: Callable[[int, Array, float], None] = lambda number, theta, cost: None,
 ) -> Array:
     """Minimises the sum of squared residuals.
 
@@ -92,7 +92,7 @@ def levenberg_marquardt(
         start: where to begin, feasible; shape (n,).
         constraints: that hold at every iterate.
         iterations: at most so many.
-        told: after each iteration, its number, the point and half the sum of squares there.
+        report: after each iteration, its number, the point and half the sum of squares there.
 
     Returns:
         the best point, shape (n,).
@@ -116,7 +116,7 @@ def levenberg_marquardt(
                 damping = max(damping / 10, 1e-9)
                 break
             damping *= 10
-        told(number, theta, cost)
+        report(number, theta, cost)
         if before - cost <= SETTLED * before:
             break
     return theta

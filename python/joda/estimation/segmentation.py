@@ -34,7 +34,7 @@ own steps."""
 HOP = 0.25
 """How far a joint must fall back to an end to impact there, in units of that."""
 APPROACH = 8
-"""Samples before a impact that belong to it."""
+"""Samples before an impact that belong to it."""
 SURE = 0.1
 """Of the error of a velocity at first, where the joint rests."""
 JOLTED = 0.03
@@ -113,7 +113,7 @@ def segments_of(
             place_noise = (position - lo) / span, spread / span
             hits = np.zeros(len(time), bool)
             if cut_at_ends:
-                begins, hits = _before_knocks(begins, index, *place_noise)
+                begins, hits = _before_impacts(begins, index, *place_noise)
                 begins = _after_pressing(begins, index, *place_noise)
                 if thinned and each > chunk:
                     begins = _where_it_stays(begins, index, chunk, *place_noise)
@@ -167,7 +167,7 @@ def segments_of(
         rows=rows,
         sharpness=np.where(rows >= 0, 1 / spread[rows], 0.0),
         shared=_shared(rows, time, spread, push / inertia, nearby(position).rate),
-        impacts=_knocks(rows, place, noise, hits) if cut_at_ends else np.zeros(count, bool),
+        impacts=_with_impact(rows, place, noise, hits) if cut_at_ends else np.zeros(count, bool),
         rests=_rests(rows, place, noise) if cut_at_ends else np.zeros(count, bool),
         stays=_stays(rows, place, noise) * np.array([run.forced for run in runs])[run_of[window]],
         command=command if driven else None,
@@ -381,13 +381,13 @@ def _cut_more(begins: Integers, index: Integers, after: Callable[[int, int], int
     return np.array(out)
 
 
-def _before_knocks(
+def _before_impacts(
     begins: Integers, index: Integers, s: Array, noise: Array
 ) -> tuple[Integers, NDArray[np.bool_]]:
-    """Where segments begin, also just before a impact: what is before it tells of the joint; and
+    """Where segments begin, also just before an impact: what is before it tells of the joint; and
     which samples are impacts."""
     rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
-    impacts = _each_knock(rows, s, noise)
+    impacts = _impact_of_each(rows, s, noise)
     many = (rows >= 0).sum(axis=1)
     more, fewer, hits = [], [], np.zeros(len(s), bool)
     for k, impact in enumerate(impacts):
@@ -433,7 +433,7 @@ def _where_it_stays(
     at_end = np.abs(np.minimum(s, 1 - s)) < BEYOND * noise
     rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
     more = []
-    for row, impact in zip(rows, _each_knock(rows, s, noise), strict=True):
+    for row, impact in zip(rows, _impact_of_each(rows, s, noise), strict=True):
         own = row[row >= 0]
         if impact is None:
             continue
@@ -459,10 +459,12 @@ def _leaves(begins: Integers, index: Integers, s: Array, noise: Array) -> list[s
     return found
 
 
-def _knocks(rows: Integers, s: Array, noise: Array, hits: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _with_impact(
+    rows: Integers, s: Array, noise: Array, hits: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """Whether the joint comes to an end of its range in a segment, at some speed: as segments show
-    it, or these cut anew before a impact, where what is before it is no longer in the same one."""
-    found = _each_knock(rows, s, noise)
+    it, or these cut anew before an impact, where what is before it is no longer in the same one."""
+    found = _impact_of_each(rows, s, noise)
     return np.array(
         [
             hits[row[row >= 0]].any() or impact is not None
@@ -493,19 +495,19 @@ def _stays(rows: Integers, s: Array, noise: Array) -> Integers:
     return stays
 
 
-def _each_knock(rows: Integers, s: Array, noise: Array) -> list[int | None]:
-    """Of each segment, see `_knock`."""
-    return [_knock(s[own], noise[own]) for own in (row[row >= 0] for row in rows)]
+def _impact_of_each(rows: Integers, s: Array, noise: Array) -> list[int | None]:
+    """Of each segment, see `_impact`."""
+    return [_impact(s[own], noise[own]) for own in (row[row >= 0] for row in rows)]
 
 
-def _knock(s: Array, noise: Array) -> int | None:
+def _impact(s: Array, noise: Array) -> int | None:
     """The first of a segment's samples at which the joint is at an end that it came to."""
     if len(s) < 3:
         return None
     travel = np.abs(np.diff(s))
     travel = np.maximum(np.append(travel, 0.0), np.append(0.0, travel))
     near = STOP + 3 * noise
-    reach = near + np.where(travel > near, travel, 0.0)  # a impact may be between two samples
+    reach = near + np.where(travel > near, travel, 0.0)  # an impact may be between two samples
     touches = (s < reach) | (s > 1 - reach)
     if touches[0] and 2 * travel[0] > near[0] and np.ptp(s) > STOP + 6 * noise[0]:
         return 0  # thrown back

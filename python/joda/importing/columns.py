@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from joda.errors import JodaError
 from joda.importing.log import ROLES, Log, Role, Signal, listed
 from joda.importing.model_names import Names
-from joda.importing.names import normal, told
+from joda.importing.names import normal, read_name
 from joda.scenes.model import find_joint, joint_name
 
 
@@ -86,7 +86,7 @@ def picked(
         used.add(pick.signal.name)
         if pick.role == "position" and pick.signal.of:
             names.aliases[normal(pick.signal.of)] = pick.joint
-        elif pick.role == "position" and (stem := told(pick.signal.short)[1]):
+        elif pick.role == "position" and (stem := read_name(pick.signal.short)[1]):
             names.aliases[normal(stem)] = pick.joint
     unused = []
     for signal in log.signals:
@@ -176,7 +176,7 @@ def _matched(names: Names, signal: Signal, only: int | None) -> Pick | Unused:
 
 def _hint(names: Names, signal: Signal) -> str:
     """What to say of a signal whose name does not tell what it is."""
-    joint = names.joint(signal.of or told(signal.short)[1])
+    joint = names.joint(signal.of or read_name(signal.short)[1])
     of = "JOINT" if joint is None else joint_name(names.model, joint)
     if signal.of:
         return (

@@ -7,7 +7,7 @@ import numpy as np
 
 from joda.errors import JodaError
 from joda.importing.log import Clock, Log, Recording, Signal, Track, listed
-from joda.importing.names import own, told
+from joda.importing.names import own, read_name
 from joda.importing.units import MODEL, RAW, TIMES
 from joda.measured.table import header, read_table
 
@@ -58,7 +58,7 @@ def _signal(name: str) -> Signal:
         role = name.strip().lower()  # type: ignore[assignment]
         units = (RAW,) if role == "force" else (MODEL,)
         return Signal(name, name, role, "", units, "joda's own column")
-    role, of, unit = told(name)
+    role, of, unit = read_name(name)
     return Signal(name, name, role, of if role else "", (unit,) if unit else (), "its name")
 
 

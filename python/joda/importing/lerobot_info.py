@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationError
 from joda.errors import JodaError
 from joda.files import read_json
 from joda.importing.log import Role, Signal
-from joda.importing.names import told
+from joda.importing.names import read_name
 from joda.importing.units import checked
 from joda.profile import describe
 
@@ -64,7 +64,7 @@ def signals_of(path: Path, info: Info, feature: str) -> tuple[Signal, ...]:
     units = _units(path, feature, described.units, names)
     out = []
     for name, unit in zip(names, units, strict=True):
-        role, of, by_name = told(name)
+        role, of, by_name = read_name(name)
         role = role or (FEATURES[feature] if of == name or by_name else "")
         if feature == ACTION and role != "position":
             role = "ctrl" if role == "ctrl" else ""  # a velocity's command is no position's

@@ -30,7 +30,7 @@ def own(name: str) -> tuple[Role, str] | None:
     return (match[1].lower(), match[2]) if match else None  # type: ignore[return-value]
 
 
-def told(name: str) -> tuple[Role, str, str]:
+def read_name(name: str) -> tuple[Role, str, str]:
     """Role, joint and unit that a name says, each empty where it does not.
 
     "elbow.pos" is the position of elbow, "Elbow_vel_deg" its velocity in degrees; of

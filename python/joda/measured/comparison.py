@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from json import dumps
 
 from joda.measured.adequacy import LOUD, Adequacy, Adequate
-from joda.measured.curves import CurveError, FailingForce, told
+from joda.measured.curves import CurveError, FailingForce, curves_described
 from joda.measured.errors import MULTIPLE, Missed, RunError
 from joda.measured.failing import Failing
 from joda.plain import plain
@@ -70,7 +70,9 @@ class Comparison:
 
 def sentences(comparison: Comparison) -> list[str]:
     """The comparison for a person: how far off, where most."""
-    curves = told(comparison.curves, comparison.failing_force, comparison.curves_adequacy)
+    curves = curves_described(
+        comparison.curves, comparison.failing_force, comparison.curves_adequacy
+    )
     return (_of_runs(comparison) if comparison.runs else []) + curves
 
 

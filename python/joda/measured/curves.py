@@ -178,7 +178,7 @@ def _pattern(curve: QuasiStaticComparison) -> float:
     return min(1.0, len(tests) * min(tests))
 
 
-def told(
+def curves_described(
     errors: Sequence[CurveError], failing: Sequence[FailingForce], verdict: Adequate | None
 ) -> list[str]:
     """The curves for a person: how far off the model's force is, where most."""
@@ -203,10 +203,10 @@ def told(
             "Small, but not noise: the force's error is larger than noise makes it, or its signs "
             "have a pattern that noise makes in fewer than 1 of 200 cases."
         )
-    return out + [_told(place, unit) for place in failing[:MOST]]
+    return out + [_failing_described(place, unit) for place in failing[:MOST]]
 
 
-def _told(place: FailingForce, unit: str) -> str:
+def _failing_described(place: FailingForce, unit: str) -> str:
     (a, b), friction = place.interval, place.friction or 0.0
     where = f"at s = {a:.2f} to {b:.2f}"
     if place.by == "direction":

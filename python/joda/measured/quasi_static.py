@@ -311,7 +311,7 @@ def _last_there(position: Array, first: int) -> int:
 
 
 # --- against a model
-def gauged(
+def beside_model(
     curve: QuasiStatic, profile: Profile, context: Context
 ) -> tuple[QuasiStaticComparison, list[str]]:
     """A curve beside the model's, and notes on what it cannot tell.

@@ -17,7 +17,7 @@ from joda.measured.driven import read_logs
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import missed
 from joda.measured.obstructed import Clear, clear_of_contacts
-from joda.measured.quasi_static import gauged
+from joda.measured.quasi_static import beside_model
 from joda.measured.replay import WINDOW, Replayer
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow_runs import as_curve
@@ -171,7 +171,7 @@ def taken(
         )
     curves = []
     for curve in static:
-        beside, more = gauged(curve, profile, found)
+        beside, more = beside_model(curve, profile, found)
         curves.append(beside)
         notes += more
     return Measured(

@@ -258,12 +258,12 @@ class Replayer:
         at = np.array([begun.position[0], begun.velocity[0]])
         error = np.array([begun.position_error[0], begun.velocity_error[0]])
         begins = _Beginning(time, position, force, _command(run, len(time)), sigma, at, error)
-        if not self.model.nplugin and self._knocks(position[: begins.count], sigma):
+        if not self.model.nplugin and self._at_an_end(position[: begins.count], sigma):
             begins = replace(begins, exactly=True)
         found = self._fitted_start(begins, np.zeros(2), FIRST_HORIZON)
         poor = POOR * min(len(time), begins.count)
         rests = smoothing.begins_at_rest(time, position, sigma)
-        if found.square > poor and not rests and self._knocks(position[:FIRST_HORIZON], sigma):
+        if found.square > poor and not rests and self._at_an_end(position[:FIRST_HORIZON], sigma):
             wide = replace(begins, deviation=WIDER * error)
             sought = self._fitted_start(wide, self._sought_start(wide), len(time))
             found = min(found, sought, key=lambda one: one.square)
@@ -322,7 +322,7 @@ class Replayer:
         """What tells where the joint goes from starts."""
         return self._replay if begins.exactly else self._quickly
 
-    def _knocks(self, position: Array, sigma: float) -> bool:
+    def _at_an_end(self, position: Array, sigma: float) -> bool:
         """Whether the joint is at an end of its range, which bends what is smoothed."""
         low, high = self.model.jnt_range[0]
         inside = np.minimum(position - low, high - position)

@@ -67,10 +67,10 @@ def replayed_together(model: mujoco.MjModel, paths: Sequence[Path]) -> tuple[Tog
         JodaError: a file cannot be read.
     """
     found = [course_of(model, path) for path in paths]
-    return tuple(_told(one) for one in found if one) if all(found) else ()
+    return tuple(_errors_of(one) for one in found if one) if all(found) else ()
 
 
-def _told(course: Course) -> Together:
+def _errors_of(course: Course) -> Together:
     """How far a replay is off."""
     errors: dict[str, float | None] = {}
     for name, own in course.replayed.items():

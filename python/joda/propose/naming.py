@@ -57,7 +57,9 @@ def concepts(texts: Iterable[str], group: Group) -> Concepts:
     letters = "".join(names)
     meant = _meanings(group)
     told = [one for one in meant if not one.isascii() and one in letters]
-    return frozenset(meant[one] for one in told).union(*(_told(word, group) for word in words))
+    return frozenset(meant[one] for one in told).union(
+        *(_concepts_of(word, group) for word in words)
+    )
 
 
 def said(description: str, group: Group) -> Concepts:
@@ -69,7 +71,7 @@ def said(description: str, group: Group) -> Concepts:
 
 
 @lru_cache(maxsize=10_000)  # a scene's names are asked for with each of its joints
-def _told(word: str, group: Group) -> Concepts:
+def _concepts_of(word: str, group: Group) -> Concepts:
     meant = _meanings(group)
     parts = [one for one in meant if _tells(one, word)]
     longest = [one for one in parts if not any(one != other and one in other for other in parts)]

@@ -48,20 +48,20 @@ class Between:
         """Takes what simulates the joint, and what of its profile may change."""
         self.shooting, self.parameters = shooting, shooting.parameters
 
-    def fit(self, theta: Array, iterations: int, told: Progress) -> Array:
+    def fit(self, theta: Array, iterations: int, report: Progress) -> Array:
         """The numbers with the least misfit, shape (n,).
 
         Args:
             theta: where to begin, shape (n,).
             iterations: at most so many; each fits all numbers once, or moves jumps by one size.
-            told: see `Progress`.
+            report: see `Progress`.
         """
         moves = MOVES if iterations > len(MOVES) + 1 and len(self._ends(theta)) else ()
         rest = iterations - len(moves)
-        theta = self._smooth(theta, rest - rest // 2, told)
+        theta = self._smooth(theta, rest - rest // 2, report)
         for move in moves:
-            theta = self._moved(theta, move, told)
-        return self._smooth(theta, rest // 2, told)
+            theta = self._moved(theta, move, report)
+        return self._smooth(theta, rest // 2, report)
 
     def worse(self, theta: Array, than: Array) -> bool:
         """Whether numbers miss segments between the jumps by more than others and chance do, or
@@ -73,7 +73,7 @@ class Between:
             return True
         return self._loss(every, theta) > MUCH * self._loss(every, than)
 
-    def _smooth(self, theta: Array, iterations: int, told: Progress) -> Array:
+    def _smooth(self, theta: Array, iterations: int, report: Progress) -> Array:
         """Gauss-Newton over segments between the jumps, which are held."""
         estimator = self._clear(theta)
         if not estimator.counts.any():
@@ -81,9 +81,9 @@ class Between:
         held = np.isin(np.arange(len(theta)), self._ends(theta))
         mean = np.where(held, theta, self.parameters.start)
         prior_std = np.where(held, HELD, 1.0) * self.parameters.prior_std
-        return self.shooting.fit_windows(estimator, theta, prior_std, iterations, told, mean)
+        return self.shooting.fit_windows(estimator, theta, prior_std, iterations, report, mean)
 
-    def _moved(self, theta: Array, move: float, told: Progress) -> Array:
+    def _moved(self, theta: Array, move: float, report: Progress) -> Array:
         """Each jump in turn where short segments over it are missed least, in steps of one size."""
         G, h = self.parameters.constraints.G, self.parameters.constraints.h
         segments, ends = self.shooting.engine.segments(LENGTHS[-1]), self._ends(theta)
@@ -100,7 +100,7 @@ class Between:
                 new = estimator.started(self.shooting.mover(trial))
                 if new.loss < best.loss - LESS:
                     theta, best = trial, new
-        told(theta, self.shooting.robust(estimator, best))
+        report(theta, self.shooting.robust(estimator, best))
         return theta
 
     def _jumps(self, theta: Array) -> dict[tuple[str, int, int], float]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from joda.estimation.least_squares import Fit, levenberg_marquardt
 from joda.estimation.profile_parameters import Parameters
-from joda.measured.quasi_static import gauged, static_force
+from joda.measured.quasi_static import beside_model, static_force
 from joda.measured.runs import QuasiStatic
 from joda.profile import Profile
 from joda.scenes.context import Context
@@ -55,7 +55,7 @@ class CurveProblem:
         joint = found.joint
         force = "force (N·m)" if joint.type == "hinge" else "force (N)"
         self.axes = f"position ({joint.unit})", force
-        beside = [gauged(curve, self._whole(parameters.start), found) for curve in curves]
+        beside = [beside_model(curve, self._whole(parameters.start), found) for curve in curves]
         self.notes = tuple(note for _, notes in beside for note in notes)
         known = [(one, one.direction != 0) for one, _ in beside]
         self.sigma = float(np.sqrt(np.mean([one.sigma**2 for one, _ in known])))
@@ -85,13 +85,13 @@ class CurveProblem:
     def fit(
         self,
         iterations: int,
-        told: Callable[[str, int, float], None] = lambda stage, number, rms: None,
+        report: Callable[[str, int, float], None] = lambda stage, number, rms: None,
     ) -> Fit:
         """Fits all curves together.
 
         Args:
             iterations: at most so many.
-            told: after each, "curves", its number and the RMS misfit.
+            report: after each, "curves", its number and the RMS misfit.
         """
         best = self.parameters.start
         history: list[tuple[str, float]] = []
@@ -101,7 +101,7 @@ class CurveProblem:
             nonlocal best
             best = theta
             history.append(("curves", self.rms(theta)))
-            told("curves", len(history), history[-1][1])
+            report("curves", len(history), history[-1][1])
 
         try:
             while len(history) < iterations:

@@ -106,24 +106,24 @@ class Problem:
     def fit(
         self,
         iterations: int,
-        told: Callable[[str, int, float], None] = lambda stage, number, rms: None,
+        report: Callable[[str, int, float], None] = lambda stage, number, rms: None,
     ) -> Fit:
         """Fits sizes and then all; where that gets stuck, all without the sizes before, too.
 
         Args:
             iterations: at most so many, of each; of a fit of sizes each start counts as one.
-            told: after each, the stage, its number and the stage's RMS misfit.
+            report: after each, the stage, its number and the stage's RMS misfit.
         """
         begun = self.parameters, self.shooting
         sizes = iterations >= MANY and "values" in self.parameters.kinds
-        first = self._fit(iterations, told, sizes)
+        first = self._fit(iterations, report, sizes)
         missed = self._missed(first)
         if not sizes or first.interrupted or missed < STUCK * self.sigma:
             return first
         found = self.parameters, self.shooting
         self.parameters, self.shooting = begun
         more = len(first.history)
-        again = self._fit(iterations, lambda name, k, rms: told(name, more + k, rms), sizes=False)
+        again = self._fit(iterations, lambda name, k, rms: report(name, more + k, rms), sizes=False)
         history = first.history + again.history
         if missed <= self._missed(again):
             (self.parameters, self.shooting), again = found, first
@@ -136,7 +136,7 @@ class Problem:
     def _fit(
         self,
         iterations: int,
-        told: Callable[[str, int, float], None],
+        report: Callable[[str, int, float], None],
         sizes: bool,
     ) -> Fit:
         """Fits short segments, longer ones, between the jumps, whole runs.
@@ -145,7 +145,7 @@ class Problem:
         their misfit is left then, they are fitted between the jumps too.
 
         Args:
-            iterations, told: see `fit`.
+            iterations, report: see `fit`.
             sizes: whether to fit them first.
         """
         history: list[tuple[str, float]] = []
@@ -158,7 +158,7 @@ class Problem:
         def heard(name: str, theta: Array, misfit: float) -> None:
             self._best = theta
             history.append((name, misfit))
-            told(name, len(history), misfit)
+            report(name, len(history), misfit)
 
         def run(name: str, estimator: SegmentEstimator, most: int, prior_std: Array = free) -> None:
             if count := min(most, iterations - len(history)):

@@ -48,7 +48,7 @@ class Shooting:
         theta: Array,
         prior_std: Array,
         iterations: int,
-        told: Progress = lambda theta, misfit: None,
+        report: Progress = lambda theta, misfit: None,
         held: Array | None = None,
     ) -> Array:
         """Gauss-Newton over segments and their starts, shape (n,).
@@ -58,16 +58,16 @@ class Shooting:
             theta: where to begin, shape (n,).
             prior_std: standard deviations before any data, shape (n,).
             iterations: at most so many.
-            told: see `Progress`.
+            report: see `Progress`.
             held: about which values; None: those at first.
         """
         unknowns = self.unknowns(held, prior_std)
         start = estimator.started(self.mover(theta)).start
 
         def heard(fit: Found) -> None:
-            told(fit.x, self.robust(estimator, fit))
+            report(fit.x, self.robust(estimator, fit))
 
-        return estimator.fit(self.mover, unknowns, theta, start, iterations, told=heard).x
+        return estimator.fit(self.mover, unknowns, theta, start, iterations, report=heard).x
 
     def covariance(self, estimator: SegmentEstimator, theta: Array) -> Array:
         """Of the numbers' errors, from segments and the prior, shape (n, n)."""

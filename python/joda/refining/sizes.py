@@ -34,7 +34,7 @@ def sized(
     shooting: Shooting,
     estimator: SegmentEstimator,
     iterations: int,
-    told: Callable[[Parameters, float], None],
+    report: Callable[[Parameters, float], None],
 ) -> None:
     """Fits sizes, then sizes and intervals together, each from several starts.
 
@@ -42,8 +42,8 @@ def sized(
         shooting: the joint and its runs; intervals are fitted if they are among its numbers.
         estimator: of short segments.
         iterations: at most so many from each start.
-        told: after each start, the parameters about the best profile so far, and its RMS misfit in
-            those segments, rad or m.
+        report: after each start, the parameters about the best profile so far, and its RMS misfit
+            in those segments, rad or m.
     """
     parameters, found = shooting.parameters, shooting.parameters.profile
     stages: list[tuple[Kind, ...]] = [("sizes",)]
@@ -63,7 +63,7 @@ def sized(
             if loss < least:
                 least, misfit = loss, other.rms(estimator, x)
                 found = other.parameters.written(x, exact=True)
-            told(parameters.about(found), misfit)
+            report(parameters.about(found), misfit)
             if misfit < NOISE * shooting.engine.sigma:
                 return
 

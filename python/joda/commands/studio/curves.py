@@ -10,19 +10,19 @@ from nicegui.events import GenericEventArguments
 class Curves(Element, component="curves.js", default_classes="curves"):
     """The editor of one channel, see `joda.commands.studio.charts.editor` for what it shows."""
 
-    def __init__(self, view: dict[str, Any], told: Callable[[str, dict[str, Any]], None]) -> None:
+    def __init__(self, view: dict[str, Any], report: Callable[[str, dict[str, Any]], None]) -> None:
         """Shows a view.
 
         Args:
             view: what is drawn.
-            told: told what the user does, and where: `drag` and `drop` (component, point, x, y),
+            report: told what the user does, and where: `drag` and `drop` (component, point, x, y),
                 `insert` (x, y), `remove` (component, point), `select` (component).
         """
         super().__init__()
         self._props["view"] = view
 
         def heard(event: str) -> Callable[[GenericEventArguments], None]:
-            return lambda arguments: told(event, arguments.args)
+            return lambda arguments: report(event, arguments.args)
 
         for event in ("drag", "drop", "insert", "remove", "select"):
             self.on(event, heard(event))

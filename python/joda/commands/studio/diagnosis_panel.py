@@ -4,7 +4,7 @@ from typing import Any
 
 from nicegui import ui
 
-from joda.commands.studio.shared import Shared, told
+from joda.commands.studio.shared import Shared, user_errors_shown
 from joda.diagnosis.phrases import named, percent
 
 
@@ -30,11 +30,11 @@ class DiagnosisPanel:
         for what in ("work", "diagnosis"):
             self._heard(what)
 
-    @told
+    @user_errors_shown
     async def _diagnose(self) -> None:
         await self._shared.diagnose()
 
-    @told
+    @user_errors_shown
     async def _add(self, effect: str) -> None:
         await self._shared.add(effect)
 

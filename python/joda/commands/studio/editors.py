@@ -7,7 +7,7 @@ from nicegui import ui
 
 from joda.commands.studio import charts, edits
 from joda.commands.studio.curves import Curves
-from joda.commands.studio.shared import Shared, told
+from joda.commands.studio.shared import Shared, user_errors_shown
 from joda.profile import CHANNELS, Channel, Profile
 
 
@@ -69,7 +69,7 @@ class _Editor:
                 self._chips = ui.element("div").classes("chips")
                 if self._gravity is not None and self._gravity[1].any():
                     ui.label("- - balances gravity").classes("aside balance")
-            self.curves = Curves(self._view(shared.session.profile), told(self._heard))
+            self.curves = Curves(self._view(shared.session.profile), user_errors_shown(self._heard))
 
     def _view(self, profile: Profile) -> dict[str, Any]:
         opened = self._shared.session.opened

@@ -28,9 +28,9 @@ class Live:
         failed: by stage, why there is nothing, in a sentence.
     """
 
-    def __init__(self, session: StudioSession, told: Callable[[str], None]) -> None:
-        """Args: what is worked on; told which stage has something new, in the event loop."""
-        self.session, self._told = session, told
+    def __init__(self, session: StudioSession, report: Callable[[str], None]) -> None:
+        """Args: what is worked on; report: which stage has something new, in the event loop."""
+        self.session, self._report = session, report
         lo, hi = session.opened.joint.range
         self.start = (lo + hi) / 2
         self.found: dict[str, Any] = {}
@@ -69,7 +69,7 @@ class Live:
                 if stage in ("hand", "replay") and done != self._wanted:
                     break
                 await self._compute(stage, done)
-        self._told("rest")
+        self._report("rest")
 
     async def _compute(self, stage: str, number: int) -> None:
         name = "replay" if stage == "paths" else stage
@@ -103,7 +103,7 @@ class Live:
         except JodaError as error:
             self.found.pop(name, None)
             self.failed[name] = str(error)
-        self._told(name)
+        self._report(name)
 
     def _stages(self) -> dict[str, tuple[Stage | None, Any]]:
         """What makes each stage, and what it depends on besides the profile."""

@@ -10,7 +10,7 @@ from starlette.responses import Response
 from joda.commands.studio.diagnosis_panel import DiagnosisPanel
 from joda.commands.studio.editors import Editors
 from joda.commands.studio.guard import HOST, Guard
-from joda.commands.studio.shared import Shared, say, told
+from joda.commands.studio.shared import Shared, say, user_errors_shown
 from joda.commands.studio.solids import Shape, shape
 from joda.commands.studio.trajectories import Trajectories
 from joda.commands.studio.view3d import View3D
@@ -133,7 +133,7 @@ class _SaveDialog:
         self._exists.set_text(f"{self._name.value} exists already. Replace it?")
         self._yes.set_text("Replace" if replace else "Save")
 
-    @told
+    @user_errors_shown
     def _write(self) -> None:
         name, session = self._name.value, self._shared.session
         if not self._replace and session.taken(name):

@@ -69,7 +69,12 @@ class Shared:
         self.diagnosis, self.outcome = None, []
         found = await self._working(
             lambda: self.work.diagnose(
-                session.written(profile), session.joint, runs, path, self._told, session.passive
+                session.written(profile),
+                session.joint,
+                runs,
+                path,
+                self._progressed,
+                session.passive,
             )
         )
         if found is not None and runs == session.runs:
@@ -88,7 +93,7 @@ class Shared:
                 diagnosis,
                 effect,
                 output,
-                self._told,
+                self._progressed,
                 session.passive,
             )
         )
@@ -115,12 +120,12 @@ class Shared:
             self.doing = (None, "")
             self.news.emit("work")
 
-    def _told(self, share: float | None, what: str) -> None:
+    def _progressed(self, share: float | None, what: str) -> None:
         self.doing = (share, what)
         self.news.emit("work")
 
 
-def told(handler: Callable[..., Any]) -> Callable[..., Any]:
+def user_errors_shown(handler: Callable[..., Any]) -> Callable[..., Any]:
     """A handler of the page: what the user cannot have is one sentence on it."""
     if inspect.iscoroutinefunction(handler):
 

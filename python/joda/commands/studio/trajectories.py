@@ -7,7 +7,7 @@ from nicegui import events, ui
 
 from joda.commands.studio import charts
 from joda.commands.studio.motions import Replayed
-from joda.commands.studio.shared import Shared, told
+from joda.commands.studio.shared import Shared, user_errors_shown
 from joda.plain import plain
 
 
@@ -171,7 +171,7 @@ class _RunDialog:
                     with file:
                         ui.label(plain(name)).on("click", lambda n=name: self._add(n))
 
-    @told
+    @user_errors_shown
     def _add(self, name: str) -> None:
         if name:
             self._shared.session.add_run(name)
@@ -179,7 +179,7 @@ class _RunDialog:
             self._list()
             self._shared.measured()
 
-    @told
+    @user_errors_shown
     async def _uploaded(self, event: events.UploadEventArguments) -> None:
         self._shared.session.upload(event.file.name, await event.file.read())
         self._shared.measured()

@@ -15,7 +15,7 @@ from typing import Any
 import joda
 from joda.errors import JodaError
 
-Told = Callable[[float | None, str], None]
+Report = Callable[[float | None, str], None]
 """Told what share is done (None: not known), and what is being done."""
 
 
@@ -39,11 +39,11 @@ class Work:
         joint: str,
         runs: tuple[Path, ...],
         output: Path,
-        told: Told,
+        report: Report,
         passive: bool = False,
     ) -> dict[str, Any]:
         """As `joda diagnose --json`; returns what it wrote, see `_ask` for what is raised."""
-        await self._ask(_request("diagnose", scene, joint, runs, output, passive), told)
+        await self._ask(_request("diagnose", scene, joint, runs, output, passive), report)
         return dict(json.loads(output.read_text("utf-8")))
 
     async def add(
@@ -54,12 +54,12 @@ class Work:
         diagnosis: Path,
         effect: str,
         output: Path,
-        told: Told,
+        report: Report,
         passive: bool = False,
     ) -> dict[str, Any]:
         """As `joda add`: its JSON, and its sentences; see `_ask` for what is raised."""
         request = _request("add", scene, joint, runs, output, passive)
-        return await self._ask(request | {"diagnosis": str(diagnosis), "effect": effect}, told)
+        return await self._ask(request | {"diagnosis": str(diagnosis), "effect": effect}, report)
 
     def stop(self) -> None:
         """Ends what is being done."""
@@ -67,7 +67,7 @@ class Work:
         if self._process is not None and self._process.returncode is None:
             self._process.terminate()
 
-    async def _ask(self, request: dict[str, Any], told: Told) -> dict[str, Any]:
+    async def _ask(self, request: dict[str, Any], report: Report) -> dict[str, Any]:
         """What the child answers.
 
         Raises:
@@ -79,11 +79,11 @@ class Work:
             raise JodaError("something is being computed already; wait for it or stop it.")
         self._stopped, self.busy = False, True
         try:
-            return await self._answered(request, told)
+            return await self._answered(request, report)
         finally:
             self.busy = False
 
-    async def _answered(self, request: dict[str, Any], told: Told) -> dict[str, Any]:
+    async def _answered(self, request: dict[str, Any], report: Report) -> dict[str, Any]:
         """What a child of its own answers."""
         pipe = asyncio.subprocess.PIPE
         command = (sys.executable, "-m", "joda.commands.studio.work")
@@ -110,7 +110,7 @@ class Work:
                     raise JodaError(said["error"])
                 if "answer" in said:
                     return dict(said["answer"])
-                told(said["share"], said["what"])
+                report(said["share"], said["what"])
             if self._stopped:
                 raise Stopped
             raise JodaError(f"{request['do']} failed; the terminal says why.")
@@ -129,19 +129,19 @@ def _request(
     return {"do": do, "joint": joint, "passive": passive, **files}
 
 
-def _do(request: dict[str, Any], told: Told) -> dict[str, Any]:
+def _do(request: dict[str, Any], report: Report) -> dict[str, Any]:
     """What is asked for; raises JodaError."""
     scene, joint, runs, output = (request[key] for key in ("scene", "joint", "runs", "output"))
     passive = request["passive"]
     if request["do"] == "diagnose":
         joda.diagnose(
             scene, joint, runs, json=output, passive=passive, force=True,
-            progress=lambda done, total, what: told(done / max(total, 1), what),
+            progress=lambda done, total, what: report(done / max(total, 1), what),
         )  # fmt: skip
         return {}
     added = joda.add(
         scene, joint, request["diagnosis"], runs, output, effect=request["effect"],
-        passive=passive, force=True, progress=lambda what: told(None, what),
+        passive=passive, force=True, progress=lambda what: report(None, what),
     )  # fmt: skip
     from joda.commands.add import sentences
 

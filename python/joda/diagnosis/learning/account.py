@@ -18,7 +18,7 @@ from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.formula import Formula, formula
 from joda.diagnosis.learning.law import Memory
 from joda.diagnosis.learning.nearest import Nearest, nearest
-from joda.diagnosis.outcome import draw_mended
+from joda.diagnosis.outcome import draw_repaired
 from joda.diagnosis.phrases import named
 from joda.measured.measured_joint import Measured
 from joda.pictures.style import COLOURS, EFFECTS, house_style, note
@@ -162,7 +162,7 @@ def learned_picture(held: Measured, after: Profile, told: Account) -> "Figure":
     with house_style():
         figure = Figure(figsize=(12, 10), dpi=110, layout="constrained")
         above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=[7, 3])[:, 0]
-        draw_mended(above, held, after)
+        draw_repaired(above, held, after)
         left, right = below.subplots(1, 2)
         lo, hi = joint.range
         _band(left, told.position, lo, hi - lo, COLOURS["conservative"])

@@ -63,7 +63,7 @@ class Learning:
     def tried(self, terms: Terms, near: Tried | None = None) -> Tried:
         """A law with these terms, fitted; from one that only lacks the memory, if that is near."""
         law = self.learner.law(terms)
-        self.progress(f"learning {law.told()}")
+        self.progress(f"learning {law.described()}")
         begin = None
         if near and terms == replace(near.terms, memory=terms.memory, time=terms.time):
             begin = np.append(near.learned.fit.x, law.unremembering)

@@ -40,7 +40,7 @@ FLOOR = 0.02
 
 
 @dataclass(frozen=True)
-class Told:
+class Coefficient:
     """A term with its factor in the unit said, and one standard deviation of that."""
 
     term: str
@@ -58,7 +58,7 @@ class Formula:
         unseen: its error on what was held out, in the learned law's.
     """
 
-    terms: tuple[Told, ...]
+    terms: tuple[Coefficient, ...]
     unseen: float
 
     @property
@@ -162,16 +162,16 @@ def formula(
         for found in learner.learned(terse):
             ratio = error(held, found.profile).window / unseen
             if ratio <= AS_GOOD:
-                return Formula(_told(learner, found, terse), ratio)
+                return Formula(_coefficients(learner, found, terse), ratio)
     return None
 
 
-def _told(learner: Learner, found: Learned, terse: Terse) -> tuple[Told, ...]:
+def _coefficients(learner: Learner, found: Learned, terse: Terse) -> tuple[Coefficient, ...]:
     """The terms with their factors, and the errors of these over an ensemble."""
     joint, factors = learner.train.profile.joint, terse.factors(learner.numbers(found))
     errors = np.std([terse.factors(one) for one in drawn(learner, found)], axis=0)
     return tuple(
-        Told(one.text, factor, float(sd), joint.force_unit + one.unit.format(x=joint.unit))
+        Coefficient(one.text, factor, float(sd), joint.force_unit + one.unit.format(x=joint.unit))
         for one, factor, sd in zip(terse.ordered, factors, errors, strict=True)
     )
 

@@ -119,7 +119,7 @@ class Law:
         """The memory's numbers with which it does nothing."""
         return np.zeros(self._counts[3])
 
-    def told(self) -> str:
+    def described(self) -> str:
         """What it is made of, for a person who waits."""
         terms = self.terms
         parts = [f"a force over position, smooth over {terms.position:g} of the range"] * bool(
