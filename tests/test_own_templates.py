@@ -2,10 +2,10 @@
 
 import json
 
-import mujoco
 import numpy as np
 import pytest
 from hidden_cases import read
+from wheel import SCENE, pushed
 
 from joda import JodaError, add, attach, diagnose
 from joda.component import Component
@@ -19,17 +19,6 @@ from joda.template import read_templates
 NAME = "cam_with_three_teeth"
 U = np.linspace(0, 1, 13)
 TEETH = np.round(np.sin(6 * np.pi * U), 9) + 0.0
-SCENE = """<mujoco>
-  <compiler angle="radian"/>
-  <option timestep="0.002" integrator="implicitfast" gravity="0 0 0"/>
-  <worldbody>
-    <body name="wheel">
-      <joint name="wheel" axis="0 0 1" range="-1.5 1.5" limited="true" damping="0.02"/>
-      <inertial pos="0 0 0" mass="0.5" diaginertia="0.01 0.01 0.01"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
 
 
 @pytest.fixture
@@ -44,19 +33,6 @@ def templates(tmp_path):
     }
     (folder / f"{NAME}.json").write_text(json.dumps(content))
     return folder
-
-
-def pushed(scene, rng, number, path):
-    """A run of the wheel pushed to and fro, as an encoder sees it."""
-    model = mujoco.MjModel.from_xml_path(str(scene))
-    data, rows, pace = mujoco.MjData(model), [], rng.uniform(0.6, 1.2)
-    for k in range(3000):
-        push = 0.35 * np.sin(pace * data.time + number) + 0.15 * np.sin(3.1 * pace * data.time)
-        if k % 4 == 0:
-            data.qfrc_applied[0] = push
-            rows.append((data.time, data.qpos[0] + 5e-4 * rng.normal(), push))
-        mujoco.mj_step(model, data)
-    np.savetxt(path, rows, "%.7f", ",", header="time,position,force", comments="")
 
 
 @pytest.mark.slow
