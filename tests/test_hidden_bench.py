@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hidden import said
-from hidden_cases import case_of, dice, job_of, read, spread
+from hidden_cases import case_of, dice, job_of, mixed, read, spread
 from hidden_families import by_effect
 from hidden_figures import fine, told
 from hidden_floor import true_error
@@ -114,3 +114,17 @@ def test_a_curve_gets_as_many_control_points_as_the_data_support():
     unseen = error(held_out, added_effect.profile).window
     assert unseen < max(0.3 * error(held_out).window, 1.5 * case.noise)
     assert max(len(part.x) for part in parts) > 5
+
+
+@pytest.mark.parametrize(
+    ("hides", "forced"), [("nothing", True), ("effect", False), ("outside", True)]
+)
+def test_cases_of_all_families_are_mixed(hides, forced):
+    jobs = mixed(5, hides, forced, 12)
+    assert len({job.family for job in jobs[:4]}) == 4
+    beyond = [job.effect in FAMILIES[job.family].beyond for job in jobs]
+    assert all(beyond) if hides == "outside" else not any(beyond)
+    assert all((job.effect is None) == (hides == "nothing") for job in jobs)
+    assert {job.forced for job in jobs} == ({True, False} if hides == "nothing" else {forced})
+    assert len({(job.family, job.number) for job in jobs}) == len(jobs) == 12
+    assert jobs == mixed(5, hides, forced, 12) != mixed(6, hides, forced, 12)

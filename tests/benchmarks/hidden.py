@@ -6,15 +6,17 @@ python tests/benchmarks hidden forced --cases 50      one line
 python tests/benchmarks hidden forced --seed 7 --out forced.jsonl    goes on where it was stopped
 python tests/benchmarks hidden families --family all --cases 2       every effect of every family
 python tests/benchmarks hidden families --family switches --free --no-add    named, not added
+python tests/benchmarks hidden mixed --hides effect --free --cases 60       so many of all families
 python tests/benchmarks hidden field --cases 30                      numbers that are off
 
 Lines: none, forced, free, hard, outside, confident, place, add (and rose), time, two, cover, sure,
-few, families, field, all. `few`: one to three of the runs only, and adding what is named first.
-`cover`: whether the true size and place lie within what is said, where only the true effect is
-asked for. `sure`: forced and free, the same and how sure the answers are. `families`: nothing,
+few, families, mixed, field, all. `few`: one to three of the runs only, and adding what is named
+first. `cover`: whether the true size and place lie within what is said, where only the true effect
+is asked for. `sure`: forced and free, the same and how sure the answers are. `families`: nothing,
 every effect with force and by positions only, and laws of no catalogue, so many cases of each; a
-table family by effect, and the error on unseen whole runs. `field`: the family of that name, every
-third case hides nothing. Every run draws a new master seed, from which all cases follow.
+table family by effect, and the error on unseen whole runs. `mixed`: some of these, of each family
+in turn and of any effect. `field`: the family of that name, every third case hides nothing. Every
+run draws a new master seed, from which all cases follow.
 """
 
 import argparse
@@ -30,7 +32,7 @@ import traceback
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from hidden_cases import Job, case_of, job_of, mended, missed, read, spread
+from hidden_cases import Job, case_of, job_of, mended, missed, mixed, read, spread
 from hidden_families import by_effect
 from hidden_field import by_numbers
 from hidden_figures import fine, table, told
@@ -47,9 +49,12 @@ from joda.measured.measured_joint import Measured
 CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
 CASES |= {"field": 100, "two": 10, "cover": 96, "few": 50, "families": 1}
 """Groups of cases, and how many there are unless told; of `families`, of each effect."""
+MIXED = 60
+"""Cases of `mixed` unless told."""
 APART = ("place", "cover", "few", "families", "field")
 NEEDS = {"all": [group for group in CASES if group not in APART]}
 NEEDS |= {"sure": ["forced", "free"]}
+NEEDS |= {"mixed": ["families"]}
 NEEDS |= {"confident": ["none", "forced", "free", "hard", "outside"]}
 NEEDS |= {"rose": ["add"], "time": ["add"]} | {group: [group] for group in CASES}
 """Groups of each line."""
@@ -232,6 +237,9 @@ def main() -> None:
     parser.add_argument(
         "--no-add", action="store_true", help="of `families` and `field`: nothing is added"
     )
+    parser.add_argument(
+        "--hides", default="effect", choices=["nothing", "effect", "outside"], help="of `mixed`"
+    )
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
@@ -247,11 +255,13 @@ def main() -> None:
         for group in NEEDS[args.line]
         for number in range(count(group, family, args.cases))
     ]
+    if args.line == "mixed":
+        jobs = mixed(args.seed, args.hides, not args.free, args.cases or MIXED)
     jobs = [replace(job, adds=not args.no_add) for job in jobs if not (args.free and job.forced)]
     rows = bench(jobs, args.workers, path.resolve())
     if args.line == "field":
         by_numbers(rows)
-    elif args.line == "families":
+    elif args.line in ("families", "mixed"):
         by_effect(rows)
     else:
         table(rows)

@@ -126,6 +126,31 @@ def job_of(master: int, group: str, number: int, family: str = FAMILY) -> Job:
     return replace(one, effect=effect)
 
 
+def mixed(master: int, hides: str, forced: bool, most: int) -> list[Job]:
+    """Cases of group `families`, of each family in turn, in an order drawn by the master seed.
+
+    Args:
+        master: seed.
+        hides: nothing, of which force is recorded of every other joint; effect; or outside.
+        forced: whether of the others a force is recorded.
+        most: how many there are at most.
+    """
+    each = []
+    for family in sorted(set(FAMILIES) - {"field"}):
+        every, beyond = spread(family), FAMILIES[family].beyond
+        kinds = ["outside" if e in beyond else "effect" if e else "nothing" for e, _ in every]
+        places = [
+            k
+            for k, kind in enumerate(kinds)
+            if kind == hides and (hides == "nothing" or every[k][1] == forced)
+        ]
+        rng = np.random.default_rng([master, len(family)])
+        rounds = range(most if hides == "nothing" else 0)
+        numbers = [r * len(every) + k for r in rounds for k in places] or rng.permutation(places)
+        each.append([job_of(master, "families", int(number), family) for number in numbers])
+    return [job for turn in zip(*each, strict=False) for job in turn][:most]
+
+
 def case_of(job: Job) -> Case:
     """Draws again, with the next seed, where the effect hardly shows."""
     for seed in range(job.seed, job.seed + AGAIN):
