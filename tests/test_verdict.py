@@ -21,6 +21,7 @@ from joda.diagnosis.phrases import explained
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.summary import summarised
 from joda.diagnosis.verdict import diagnosed
+from joda.effects import Backlash
 from joda.hidden.cases import draw, write
 from joda.measured.comparison import Comparison
 from joda.measured.reading import read_measured
@@ -184,6 +185,17 @@ def test_the_size_of_what_is_uneven_is_said_to_be_the_largest(uneven):
     )
     assert ("1 ± 0.1 N·m where it is largest: " in told) == uneven
     assert ("1 ± 0.1 N·m: " in told) != uneven
+
+
+@pytest.mark.parametrize("side", ["load", "motor"])
+def test_of_play_it_is_said_how_it_shows_on_its_side(side):
+    joint = Joint(name="lid", type="hinge", range=(0.0, 2.0), unit="rad")
+    size, errors = (0.03, 0.001, "rad"), (0.1, 0.01, 0.01)
+    shown = Backlash(play=0.03, inertia=0.01, side=side).shown
+    told = explained("backlash", "both", (0, 1), (), size, errors, "rad", joint, shown=shown)
+    assert f"rad: side {side}: after each reversal" in told
+    assert ("the joint is light for a moment" in told) == (side == "motor")
+    assert ("nothing happens for a moment" in told) == (side == "load")
 
 
 @pytest.mark.long

@@ -79,6 +79,7 @@ def explained(
     error_unit: str,
     joint: Joint,
     uneven: bool = False,
+    shown: str | None = None,
 ) -> str:
     """An effect as a sentence for a person.
 
@@ -92,12 +93,13 @@ def explained(
         error_unit: of these.
         joint: of which it is.
         uneven: whether its size differs along the way.
+        shown: how it shows with its other numbers, a sentence; None: as it does with any.
     """
     value, doubt, unit = size
     largest = " where it is largest" if uneven else ""
     way = f", {WAYS[direction]}" if direction in WAYS else ""
     of = "" if unit == "1" else f" {unit}"
-    shows = _words(effect)[1]
+    shows = _lower(shown) if shown else _words(effect)[1]
     before, after, noise = errors
     name = named(effect)
     return (

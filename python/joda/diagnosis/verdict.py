@@ -109,8 +109,9 @@ NONE_MISSING = "No effect is missing, but "
 WHOLE = "misses whole runs by up to {:.0f} times the noise"
 FREELY = "leaves more of whole free runs than noise makes"
 WITHOUT = (
-    " Whole runs are missed by up to {:.0f} times the noise all the same, which is up to {:.1f} "
-    "times what noise, start and force explain; joda compare says where."
+    " As it stands it misses whole runs by up to {:.0f} times the noise all the same, and with its "
+    "numbers fitted by up to {:.1f} times what noise, start and force explain; joda compare says "
+    "where."
 )
 SOME = 2.0
 """How many times what errors explain a whole run is missed by, where segments alone are adequate.
@@ -614,6 +615,7 @@ def finding(
     doubt = uncertainty(ranking.baseline, candidate, left[number] / max(own, LITTLE))
     interval = hypothesis.interval(x)
     joint = measured.profile.joint
+    alone = hypothesis.write(Profile(joint=joint), x).effects
     return Finding(
         effect=hypothesis.effect,
         interval=interval,
@@ -633,6 +635,7 @@ def finding(
             measured.unit,
             joint,
             uneven=hypothesis.factors > 0,
+            shown=next((one.shown for one in alone if one.effect == hypothesis.effect), None),
         ),
         held_out_error_before=before,
         held_out_error_after=after,

@@ -66,6 +66,11 @@ class Effect(Frozen):
         side = getattr(self, "direction", None) or getattr(self, "end", None)
         return f"{self.effect} {side}" if side else self.effect
 
+    @property
+    def shown(self) -> str:
+        """How it shows in measurements, with its parameters; a sentence."""
+        return self.SHOWS
+
     @classmethod
     def parameters(cls) -> tuple[str, ...]:
         """Names of its parameters but for the curve."""

@@ -1,9 +1,9 @@
 """Effects of what the joint is part of: masses, tilt, play, end stops."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import product
 from math import exp, hypot, log, nan
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -115,10 +115,11 @@ class Backlash(Effect):
         "load along; both without bounce"
     )
     SOURCE = "Nordin and Gutman, Automatica 38 (2002) 1633"
-    SHOWS = (
-        "Side load: after each reversal of the force nothing happens for a moment, then a knock. "
-        "Side motor: after each reversal the joint is light for a moment, then a knock slows it."
-    )
+    SIDES: ClassVar[Mapping[str, str]] = {
+        "load": "after each reversal of the force nothing happens for a moment, then a knock",
+        "motor": "after each reversal the joint is light for a moment, then a knock slows it",
+    }
+    SHOWS = f"Side load: {SIDES['load']}. Side motor: {SIDES['motor']}."
 
     effect: Literal["backlash"] = "backlash"
     play: float = parameter("whole width of the play", "rad", "m", (0.001, 0.1), gt=0)
@@ -177,6 +178,11 @@ class Backlash(Effect):
             exact=False,
             kept=KEPT,
         )
+
+    @property
+    def shown(self) -> str:
+        """How play on its side of the joint shows."""
+        return f"Side {self.side}: {self.SIDES[self.side]}."
 
     @property
     def handle(self) -> float:
