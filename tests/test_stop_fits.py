@@ -9,8 +9,10 @@ import pytest
 from scenes import write
 
 from joda import diagnose, improve
+from joda.diagnosis import verdict
 from joda.diagnosis.adding import error
-from joda.diagnosis.end_stops import _visits, fitted_stops
+from joda.diagnosis.end_stops import OtherEnds, _visits, fitted_stops
+from joda.diagnosis.free_runs import Worst
 from joda.diagnosis.split import parted
 from joda.measured.errors import errors, until_an_end
 from joda.measured.reading import read_measured
@@ -158,6 +160,20 @@ def test_whole_runs_that_another_stop_explains_leave_the_model_adequate(tmp_path
     assert found.verdict == "adequate"
     assert "with other ends: solreflimit 0.02 1 → 0.0" in found.summary
     assert "solimplimit 0.9 0.95 0.001 0.5 2 → 0" in found.summary
+
+
+@pytest.mark.parametrize(("times", "said"), [(4.0, "adequate"), (8.0, "unexplained")])
+def test_where_other_ends_explain_whole_runs_nothing_else_is_asked(
+    tmp_path, rng, monkeypatch, times, said
+):
+    model, runs = pushed(tmp_path, rng, "", count=4)
+    monkeypatch.setattr(verdict, "worst", lambda *_: Worst(free=8.0, whole=12.0))
+    ends = OtherEnds(None, "solreflimit 0.02 1 → 0.01 1", times)
+    monkeypatch.setattr(verdict, "with_other_ends", lambda *_: ends)
+    monkeypatch.setattr(verdict, "_by_whole_runs", lambda measured, ranking, stops, plain: plain)
+    found = diagnose(model, "slide", runs)
+    assert found.verdict == said
+    assert ("and by 4.0 times with other ends: solreflimit" in found.summary) == (times == 4.0)
 
 
 def test_whole_runs_that_no_stop_explains_do_not(tmp_path, rng):

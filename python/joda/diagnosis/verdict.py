@@ -396,7 +396,7 @@ def _adequate(
         return Diagnosed(_report(measured, "unexplained", summary, (), experiment))
 
     def whole_runs_tell(summary: str) -> Diagnosed:
-        stops = suited(measured, baseline)
+        stops = ends.stops if ends else suited(measured, baseline)
         return _by_whole_runs(measured, ranking, stops, unexplained(summary, AGAIN))
 
     def with_these(how: str) -> str:
@@ -407,7 +407,8 @@ def _adequate(
     if not measured.runs and _uneven(measured, baseline):
         return unexplained(_report_uneven(measured), GAUGE_AGAIN)
     left = worst(measured, baseline, others)
-    if left.free > BEYOND:
+    ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
+    if left.free > BEYOND and not (ends and ends.times <= BEYOND):
         return whole_runs_tell(DRIFTING.format(left.free))
     if free and free.drifting:
         return whole_runs_tell(SLOWLY)
@@ -442,7 +443,6 @@ def _adequate(
         numbers_off = NUMBERS_OFF.format(numbers_off, all_alike)
     missed = worst_run.multiple if worst_run else 0.0
     noise = BEYOND_NOISE.format(measured.floor, measured.unit)
-    ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
     verdict: Verdict = "unexplained" if ends and ends.times > BEYOND else "adequate"
     if verdict == "unexplained":
         summary = BEYOND_ENDS.format(noise, left.whole, numbers_off)
