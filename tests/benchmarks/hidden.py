@@ -47,14 +47,11 @@ from joda.hidden.cases import FAMILY
 from joda.measured.measured_joint import Measured
 
 CASES = {"none": 40, "forced": 75, "free": 48, "hard": 24, "outside": 48, "place": 36, "add": 25}
-CASES |= {"field": 100, "two": 10, "cover": 96, "few": 50, "families": 1}
+CASES |= {"field": 100, "two": 10, "cover": 96, "few": 50, "families": 1, "mixed": 60}
 """Groups of cases, and how many there are unless told; of `families`, of each effect."""
-MIXED = 60
-"""Cases of `mixed` unless told."""
-APART = ("place", "cover", "few", "families", "field")
+APART = ("place", "cover", "few", "families", "mixed", "field")
 NEEDS = {"all": [group for group in CASES if group not in APART]}
 NEEDS |= {"sure": ["forced", "free"]}
-NEEDS |= {"mixed": ["families"]}
 NEEDS |= {"confident": ["none", "forced", "free", "hard", "outside"]}
 NEEDS |= {"rose": ["add"], "time": ["add"]} | {group: [group] for group in CASES}
 """Groups of each line."""
@@ -249,14 +246,15 @@ def main() -> None:
         args.family = "field"
     path = args.out or Path(tempfile.gettempdir()) / f"hidden_bench_{args.seed}.jsonl"
     print(f"master seed {args.seed}, rows in {path}\n", flush=True)
-    jobs = [
-        job_of(args.seed, group, number, family)
-        for family in (FAMILIES if args.family == "all" else [args.family])
-        for group in NEEDS[args.line]
-        for number in range(count(group, family, args.cases))
-    ]
     if args.line == "mixed":
-        jobs = mixed(args.seed, args.hides, not args.free, args.cases or MIXED)
+        jobs = mixed(args.seed, args.hides, not args.free, args.cases or CASES["mixed"])
+    else:
+        jobs = [
+            job_of(args.seed, group, number, family)
+            for family in (FAMILIES if args.family == "all" else [args.family])
+            for group in NEEDS[args.line]
+            for number in range(count(group, family, args.cases))
+        ]
     jobs = [replace(job, adds=not args.no_add) for job in jobs if not (args.free and job.forced)]
     rows = bench(jobs, args.workers, path.resolve())
     if args.line == "field":

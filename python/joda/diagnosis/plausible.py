@@ -9,11 +9,9 @@ from joda.diagnosis.overlap import divided
 from joda.effects import (
     AddedInertia,
     AnyEffect,
-    DirectionDependentDamping,
     GravityOffset,
     LearnedForce,
     LoadDependentFriction,
-    QuadraticDamping,
 )
 from joda.effects.base import CurveEffect
 from joda.estimation.problem import segments_for
@@ -188,8 +186,7 @@ class Needs:
         total = 0.0
         for one in effects:
             if isinstance(one, CurveEffect):
-                power = {DirectionDependentDamping: 1, QuadraticDamping: 2}.get(type(one), 0)
-                total += max(one.y) * self.speed**power
+                total += max(one.y) * self.speed**one.POWER
             elif isinstance(one, LearnedForce):
                 total += max(abs(y) for row in one.y for y in row)
             elif isinstance(one, AddedInertia):

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from joda.component import Curve, Frozen, Points, numbers
-from joda.effects.guesses import STRENGTH, TRIAL, InitialGuess, Number, Trial, Units
+from joda.effects.guesses import STRENGTH, TRIAL, AnyDirection, InitialGuess, Number, Trial, Units
 
 Direction = Literal["positive", "negative"]
 DIRECTIONS: tuple[Direction, ...] = "positive", "negative"
@@ -149,7 +149,7 @@ class CurveEffect(Curve, Effect):
         joint: Units,
         others: Sequence[tuple[Number, Trial]] = (),
         parameters: Callable[[Trial], Mapping[str, Any]] = lambda x: {},
-        direction: Literal["both", "positive", "negative"] = "both",
+        direction: AnyDirection = "both",
         exact: bool = True,
     ) -> InitialGuess:
         """Of the same size everywhere.

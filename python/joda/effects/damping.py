@@ -7,7 +7,7 @@ from pydantic import Field
 
 from joda.component import Points
 from joda.effects.base import DIRECTIONS, CurveEffect, Direction, parameter
-from joda.effects.guesses import InitialGuess, Units
+from joda.effects.guesses import AnyDirection, InitialGuess, Units
 
 
 class DirectionDependentDamping(CurveEffect):
@@ -44,7 +44,7 @@ class QuadraticDamping(CurveEffect):
     POWER = 2
 
     effect: Literal["quadratic_damping"] = "quadratic_damping"
-    direction: Literal["both", "positive", "negative"] = Field(
+    direction: AnyDirection = Field(
         default="both", description="in which it acts; positive: q grows"
     )
     y: Points = parameter("drag", "N·m·s²/rad²", "N·s²/m²", (0.01, 50))

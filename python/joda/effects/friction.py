@@ -9,11 +9,10 @@ from pydantic import Field
 
 from joda.component import Points
 from joda.effects.base import DIRECTIONS, CurveEffect, Direction, Effect, parameter
-from joda.effects.guesses import InitialGuess, Trial, Units
+from joda.effects.guesses import MOVED, InitialGuess, Trial, Units
 
-JAMMED, MOVED = 1.0, 0.9
-"""Friction per load that no force moves; and the part of it from which no force is felt to move the
-joint: something else does."""
+JAMMED = 1.0
+"""Friction per load that no force moves."""
 
 
 class AsymmetricFriction(CurveEffect):

@@ -9,10 +9,17 @@ Number = tuple[float, float, float] | tuple[float, float, float, float, float]
 Trial = Sequence[float]
 """Of each number, a value to begin with."""
 
+AnyDirection = Literal["both", "positive", "negative"]
+
 TRIAL = 0.1
 """Strength with which an effect is tried, in usual forces."""
 STRENGTH = (0.0, 300.0, 0.005)
 """Bounds and step of a strength, in usual forces: where it is strong, few joints left alone go."""
+TINY = 1e-12
+"""As good as no force."""
+MOVED = 0.9
+"""Part of the largest friction per load, or added inertia, from which no force is felt to move the
+joint: something else does."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,7 @@ class InitialGuess:
     effect: Callable[[Trial], Any]
     magnitude: Callable[[Trial], float]
     unit: str
-    direction: Literal["both", "positive", "negative"] = "both"
+    direction: AnyDirection = "both"
     exact: bool = True
     itself: Callable[[Trial], bool] = lambda x: True
     interval: tuple[float, float] | None = None

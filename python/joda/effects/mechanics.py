@@ -8,13 +8,10 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from joda.effects.base import Effect, parameter
-from joda.effects.guesses import TRIAL, InitialGuess, Trial, Units
+from joda.effects.guesses import MOVED, TINY, TRIAL, InitialGuess, Trial, Units
 
-HEAVY, MOVED = 300.0, 0.9
-"""Added inertia, in units of the joint's, up to which is looked; and the part of it from which no
-force is felt to move the joint: something else does."""
-TINY = 1e-12
-"""As good as no force."""
+HEAVY = 300.0
+"""Added inertia, in units of the joint's, up to which is looked."""
 PULL = (-300.0, 300.0, 0.005)
 """Bounds and step of a pull of gravity, in usual forces."""
 KEPT = 3

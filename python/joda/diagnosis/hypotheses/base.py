@@ -6,18 +6,16 @@ its usual speed.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.effects.guesses import Number
+from joda.effects.guesses import AnyDirection, Number
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
 
 Array = NDArray[np.float64]
 Write = Callable[[Profile, Array], Profile]
-Direction = Literal["both", "positive", "negative"]
 Bounds = list[Number]
 """Of each number."""
 
@@ -51,7 +49,7 @@ class Hypothesis:
     """
 
     effect: str
-    direction: Direction
+    direction: AnyDirection
     unknowns: Unknowns
     trials: Array
     write: Write

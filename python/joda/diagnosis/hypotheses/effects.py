@@ -17,7 +17,7 @@ from joda.diagnosis.hypotheses.base import (
 )
 from joda.diagnosis.hypotheses.intervals import GRID, WHOLE, felt
 from joda.effects import CHANNEL_EFFECTS, EFFECTS, CurveEffect
-from joda.effects.guesses import STRENGTH, TRIAL, InitialGuess, Units
+from joda.effects.guesses import STRENGTH, TINY, TRIAL, InitialGuess, Units
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
 
@@ -41,8 +41,6 @@ FINER = (KNOTS, 17, 33)
 """Control points of such a size: where it leaves more than noise, more."""
 ONE_OF_TWO = 2 * float(np.log(2))
 """How much rarer each direction of an effect is than the effect, see `neg_log_prior`."""
-TINY = 1e-12
-"""As good as no force."""
 
 
 def free_curves(units: Units) -> Iterator[Hypothesis]:
