@@ -12,7 +12,7 @@ from test_compare import door, runs_of, scene_of
 
 from joda import JodaError, add, compare, diagnose
 from joda.commands.hidden_effect import _judged
-from joda.diagnosis import verdict
+from joda.diagnosis import report
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.corrections import errors_beside_a_force, numbers, off
 from joda.diagnosis.coverage import moved_one_way
@@ -104,14 +104,14 @@ def test_what_has_no_size_is_not_named(none, tmp_path, monkeypatch):
     case = draw(11, "constant_damping_hinge")
     write(case, tmp_path)
     runs = [tmp_path / run.name for run in case.train[:3]]
-    found, names = verdict.finding, []
+    found, names = report.finding, []
 
     def emptied(*args):
         one = found(*args)
         names.append(one.effect)
         return replace(one, magnitude=0.0) if len(names) <= (none or 100) else one
 
-    monkeypatch.setattr(verdict, "finding", emptied)
+    monkeypatch.setattr(report, "finding", emptied)
     told = diagnose(tmp_path / "model.xml", case.joint, runs)
     assert names[0] == case.seal["effect"]
     assert names[0] not in [one.effect for one in told.effects]

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 from joda import context, templates
+from joda.commands.refine import ITERATIONS
 from joda.component import Component
 from joda.estimation.profile_parameters import Parameters, gravity_scale
 from joda.field import evaluate
@@ -265,7 +266,7 @@ def robust(seed: int) -> tuple[str, list[float], float]:
     held = [measured(hand, span, rng, True) for hand in hands]
     begun = time.time()
     problem = problem_of(case.found, case.start, case.runs)
-    theta = problem.fit(60).theta
+    theta = problem.fit(ITERATIONS).theta
     spent, after = time.time() - begun, problem.parameters.written(theta)
     profiles = case.start, after, case.true
     first, last, least = (missed(case.found, one, held, windows=True) for one in profiles)
@@ -294,7 +295,7 @@ def robust_table(count: int = 200, *seed: str) -> None:
         print(f"| {name} | {numbers} | {good} | {np.median(whole):.2f} | {all_good} |")
 
 
-def recovery(case: Planted, iterations: int = 60):
+def recovery(case: Planted, iterations: int = ITERATIONS):
     """`errors` of what a fit makes of the start."""
     problem = problem_of(case.found, case.start, case.runs)
     theta = problem.fit(iterations).theta

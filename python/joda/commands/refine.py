@@ -44,7 +44,7 @@ from joda.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
-ITERATIONS = 60
+ITERATIONS = 120
 ELSEWHERE = 5.0
 """How many times as much as what was fitted is what was held out missed at most."""
 STILL: tuple[Kind, ...] = ("values", "intervals", "strengths")

@@ -13,13 +13,13 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 from scipy.special import expit, logit
 
 from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.free_runs import worst
 from joda.diagnosis.impacts import some_of
 from joda.diagnosis.shape_refinement import clearly, has_restitution
+from joda.estimation import simplex
 from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.problem import as_it_is, segments_for
 from joda.estimation.segmentation import segments_of
@@ -50,7 +50,7 @@ that fit the starts of one."""
 
 
 def fitted_stops(train: Measured, held: Measured | None = None) -> Stops | None:
-    """Ends of the range that suit the runs there (Nelder and Mead 1965), if they make all runs,
+    """Ends of the range that suit the runs there, if they make all runs,
     also those that were held out, clearly likelier, and each number is worth its price (Schwarz
     1978); else None. The impedance is changed only where that does so again. Where much is left,
     one end may get a stop besides the joint's limit, of which MuJoCo has one for both.
@@ -123,9 +123,7 @@ def _searched(loss: Callable[[Array], float], near: Array, numbers: int) -> Arra
     begin = np.append(near, np.zeros(numbers - len(near)))
     new = [(k, value) for k in range(len(near), numbers) for value in FIRST[k]]
     first = [begin + value * np.eye(numbers)[k] for k, value in new]
-    simplex = min(first, key=loss) + np.vstack([np.zeros(numbers), np.diag(WIDE[:numbers])])
-    options = {"maxfev": TRIED * numbers, "initial_simplex": simplex}
-    return np.asarray(minimize(loss, simplex[0], method="Nelder-Mead", options=options).x)
+    return simplex.least(loss, min(first, key=loss), WIDE[:numbers], TRIED)
 
 
 @dataclass(frozen=True)

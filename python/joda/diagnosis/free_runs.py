@@ -6,12 +6,12 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from joda.diagnosis.baseline import Baseline
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.segmentation import segments_of
+from joda.estimation.simplex import least
 from joda.measured.instability import followed
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
@@ -237,7 +237,7 @@ class _Whole:
 
 
 def searched(estimator: SegmentEstimator, base: BaseModel, found: Fit) -> Fit:
-    """A fit to whole runs after a search without derivatives (Nelder and Mead 1965) of its numbers
+    """A fit to whole runs after a search without derivatives of its numbers
     and the runs' starts, if these are not too many: where a joint sticks, the loss is jagged."""
     make, unknowns, unknown = base.simulator, base.unknowns, estimator.segments.prior_std
     k = len(found.x)
@@ -256,9 +256,7 @@ def searched(estimator: SegmentEstimator, base: BaseModel, found: Fit) -> Fit:
 
     z = np.zeros(len(scale))
     for _ in range(TIMES):
-        simplex = z + np.vstack([np.zeros(len(z)), np.eye(len(z))])
-        options = {"initial_simplex": simplex, "maxfev": EACH * len(z), "adaptive": True}
-        z = minimize(loss, z, method="Nelder-Mead", options=options).x
+        z = least(loss, z, 1.0, EACH, adaptive=True)
     fit = estimator.fit(make, unknowns, *at(z))
     return min(found, estimator.refit(make, unknowns, fit), key=lambda one: one.loss)
 

@@ -7,13 +7,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigvalsh
-from scipy.optimize import minimize
 
 from joda._core import JointSimulator
 from joda.diagnosis.force_balance import balanced
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypotheses.base import FREE_CURVE
 from joda.diagnosis.selection import SETTINGS
+from joda.estimation import simplex
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import (
     CAUCHY_SCALE,
@@ -324,8 +324,8 @@ def _free(
 def simplex_searched(
     estimator: SegmentEstimator, base: BaseModel, found: FittedHypothesis
 ) -> FittedHypothesis:
-    """The candidate after a search without derivatives (Nelder and Mead 1965), in which every
-    segment's start is fitted anew: where a joint sticks and slips, the loss is jagged."""
+    """The candidate after a search without derivatives, in which every segment's start is fitted
+    anew: where a joint sticks and slips, the loss is jagged."""
     make, unknowns = joined(base, found.hypothesis)
     scale, k = FAR * unknowns.step, len(unknowns.step)
 
@@ -335,9 +335,7 @@ def simplex_searched(
     def loss(z: Array) -> float:
         return estimator.started(make(at(z)), SETTLING).loss + unknowns.penalty(at(z))
 
-    simplex = np.vstack([np.zeros(k), WIDE * np.eye(k)])
-    options = {"maxfev": SEARCHED * k, "initial_simplex": simplex}
-    x = at(minimize(loss, np.zeros(k), method="Nelder-Mead", options=options).x)
+    x = at(simplex.least(loss, np.zeros(k), WIDE, SEARCHED))
     fit = estimator.refit(
         make, unknowns, estimator.fit(make, unknowns, x, estimator.started(make(x)).start)
     )

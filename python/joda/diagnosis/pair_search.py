@@ -8,9 +8,9 @@ from joda.diagnosis.findings import Finding
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.hypothesis_fits import FittedHypothesis
 from joda.diagnosis.ranking import Ranking, weigh
+from joda.diagnosis.report import finding
 from joda.diagnosis.search import rank
 from joda.diagnosis.shape_refinement import checked
-from joda.diagnosis.verdict import finding
 from joda.measured.measured_joint import Measured
 
 AHEAD = 4

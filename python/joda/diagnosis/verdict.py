@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from joda.diagnosis import sentences
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.calibration import HEAVIER, Calibration, Calibrator
 from joda.diagnosis.correction_report import SAME_EFFECT
@@ -12,6 +13,7 @@ from joda.diagnosis.corrections import (
     FAR_OFF,
     OFF,
     Corrected,
+    Number,
     by_one_factor,
     corrected,
     corrections,
@@ -24,20 +26,23 @@ from joda.diagnosis.corrections import (
     one_factor,
 )
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
-from joda.diagnosis.end_stops import suited, with_other_ends
-from joda.diagnosis.experiments import Model, means_of, next_experiment, there_and_back
+from joda.diagnosis.end_stops import OtherEnds, suited, with_other_ends
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.horizons import HorizonSearch, looked
-from joda.diagnosis.hypothesis_fits import joined
 from joda.diagnosis.joint_calibration import jointly, needed
-from joda.diagnosis.phrases import explained
 from joda.diagnosis.plausible import Needs, unseen_place
 from joda.diagnosis.ranking import Ranking, hopeful, weigh
-from joda.diagnosis.rivals import indistinguishable
+from joda.diagnosis.report import (
+    WORTH_NAMING,
+    experiment_for,
+    finding,
+    likeliest_findings,
+    reported,
+)
 from joda.diagnosis.search import Progress, rank
-from joda.diagnosis.selection import LITTLE, MUCH, SURE, Evidence, Selection
+from joda.diagnosis.selection import MUCH, SURE, Evidence, Selection
 from joda.diagnosis.summary import (
     BOUNCY,
     FALLEN,
@@ -48,7 +53,6 @@ from joda.diagnosis.summary import (
     other_unit,
     summarised,
 )
-from joda.diagnosis.uncertainty import uncertainty
 from joda.diagnosis.units import units_of
 from joda.diagnosis.whole_run_search import WholeRuns, in_whole_runs
 from joda.estimation.base_model import BaseModel
@@ -58,95 +62,17 @@ from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
-from joda.measured.visited import unvisited, unvisited_part, visited_share
+from joda.measured.visited import visited_share
 from joda.measured.whiteness import strays
 from joda.profile import Profile
 from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
 
-TOO_SHORT = (
-    "The measurements are too short, or their force is far too strong for the joint (see to its "
-    "unit), to tell anything."
-)
-RECORD_MORE = (
-    "Record more: move the joint through its whole range in both directions, slowly and fast, with "
-    "the force if it can be measured, for some 20 s in all."
-)
-GAUGE_MORE = "Measure more: at some 20 places of the whole range or more, in both directions."
-GAUGE_AGAIN = (
-    "Measure the same again, and at places nearer together: what comes again is the joint's, what "
-    "does not is the hand's or the gauge's."
-)
-GAUGE_BACK = "Measure the way back too, as slowly."
-AGAIN = (
-    "Repeat one slow motion three times, in both directions, then the same fast: if repeats "
-    "differ, the effect has memory or changes with time; if fast and slow differ, it is a "
-    "resistance; if neither, it is a force over position."
-)
-UNEVEN = (
-    "Something is missing that no known effect explains: the force's error, {:.2g} {} RMS beside a "
-    "noise of {:.2g}, is more than noise, or has a pattern that noise has not; a hand that "
-    "trembles makes one too."
-)
-DRIFTING = (
-    "Something is missing that no known effect explains: windows show nothing beyond the noise, "
-    "but whole runs are missed by up to {:.0f} times what noise, start and force explain."
-)
-SLOWLY = (
-    "Something is missing that no known effect explains: windows show nothing beyond the noise, "
-    "but of runs in which no force acted as a whole more is left than noise makes, whatever the "
-    "model's own strengths."
-)
-TOGETHER = (
-    "Either the model's own numbers are off, or something is missing, and these runs cannot tell "
-    "which: as it stands the model leaves more of whole free runs than noise makes, and with other "
-    "numbers it would not."
-)
-WITH_THESE = "as it stands the model {}.{} With these there is {} that an effect would explain."
-BEYOND_NOISE = "nothing beyond the noise ({:.2g} {})"
-NUMBERS_OFF = " Its own numbers are off: {}.{}"
-NONE_MISSING = "No effect is missing, but "
-WHOLE = "misses whole runs by up to {:.0f} times the noise"
-FREELY = "leaves more of whole free runs than noise makes"
-WITHOUT = (
-    " As it stands it misses whole runs by up to {:.0f} times the noise all the same, and with its "
-    "numbers fitted by up to {:.1f} times what noise, start and force explain; joda compare says "
-    "where."
-)
 SOME = 2.0
 """How many times what errors explain a whole run is missed by, where segments alone are adequate.
 """
-ADRIFT = (
-    " But more is left of whole runs than noise of position and force makes: a small fault of the "
-    "model, or what the force did between its samples."
-)
-AT_ENDS = (
-    " From where the joint comes to an end of its range, whole runs are missed by up to {:.0f} "
-    "times what noise, start and force explain, and by {:.1f} times with other ends: {}; joda "
-    "improve writes them."
-)
-BEYOND_ENDS = (
-    "Something at the ends of the range is missing that no known effect explains: within it there "
-    "is {}, but from where the joint comes to an end, whole runs are missed by up to {:.0f} times "
-    "what noise, start and force explain, whatever the stops (solreflimit, solimplimit).{}"
-)
-WHOLLY = " Windows show nothing of it; whole runs do."
 MOST_LEFT = 0.5
 """Part of what whole runs are missed by that an effect may leave to be worth a word."""
-PRESS = (
-    "Press the joint slowly against either end and let it go, and let it come there slowly and "
-    "fast, with the force: that parts the stop from a force close to it."
-)
-EITHER = "Either the model's own numbers are off ({}), or a force is missing"
-NAMED, WORTH_NAMING = 5, 0.01
-"""How many effects are named, and only those of at least some probability."""
-OUT_THERE = (
-    "Something is missing, and what explains most of it would act at s = {:.2f} to {:.2f}, of "
-    "which runs visited {:.0f} %: whether it does, these data cannot tell. It may be an obstacle, "
-    "another end of the range, a latch, or nothing of the joint, such as a push that was not "
-    "recorded."
-)
-NO_EFFECT = "Something is missing that no known effect explains."
 
 
 @dataclass(frozen=True)
@@ -189,12 +115,12 @@ def diagnosed(
         calibrate: whether numbers of the joint's body and of the measurement may be off.
     """
     if not segments_for(measured).usable.any():
-        return Diagnosed(_report(measured, "insufficient_data", TOO_SHORT, (), None))
+        return Diagnosed(reported(measured, "insufficient_data", sentences.TOO_SHORT, (), None))
     if why := at_rest(measured):
         why = f"{why[0].upper()}{why[1:]}."
-        return Diagnosed(_report(measured, "insufficient_data", why, (), None))
+        return Diagnosed(reported(measured, "insufficient_data", why, (), None))
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
-        return Diagnosed(_report(measured, "insufficient_data", why, (), None))
+        return Diagnosed(reported(measured, "insufficient_data", why, (), None))
     baseline = fit_baseline(measured)
     calibrator = Calibrator(measured)
     found = calibrator.numbers(baseline) if calibrate else None
@@ -291,19 +217,19 @@ def _concluded(
     puzzled = first_weighed.verdict == "unexplained" and bool(measured.runs)
     puzzling = first_ranking if puzzled else None
     if selection.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
-        return Diagnosed(_report(measured, "insufficient_data", why, (), None))
+        return Diagnosed(reported(measured, "insufficient_data", why, (), None))
     suffice = not selection.likely and looks.free and looks.free.suffice
     if selection.verdict == "adequate" or suffice:
         return _adequate(measured, ranking, looks.free, others, same)
-    every = _findings(measured, ranking, selection)
+    every = likeliest_findings(measured, ranking, selection)
     sized = [k for k, one in every.items() if one.sized]
-    experiment = _next(measured, ranking, selection, one_way)
+    experiment = experiment_for(measured, ranking, selection, one_way)
     if not sized or unseen_place(measured, every[sized[0]].interval):
-        why = BOUNCY if ranking.restitution else NO_EFFECT
+        why = BOUNCY if ranking.restitution else sentences.NO_EFFECT
         if sized:
             there = every[sized[0]].interval
-            why = OUT_THERE.format(*there, 100 * visited_share(measured, there))
-        report = _report(measured, "unexplained", why, (), experiment)
+            why = sentences.OUT_THERE.format(*there, 100 * visited_share(measured, there))
+        report = reported(measured, "unexplained", why, (), experiment)
         return _driven(Diagnosed(report, puzzling=puzzling), ranking.baseline)
     first = every[sized[0]]
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
@@ -315,18 +241,6 @@ def _concluded(
         return _adequate(measured, ranking, looks.free, others, same)
     findings = {k: every[k] for k in sized}
     return _missing(measured, ranking, selection, findings, experiment, puzzling)
-
-
-def _findings(measured: Measured, ranking: Ranking, selection: Selection) -> dict[int, Finding]:
-    """The first few effects of a ranking that are worth a word, by their place there."""
-    held, one_way = Holdout(ranking.baseline, measured), moved_one_way(measured)
-    return {
-        k: finding(
-            measured, ranking, held, k, selection, indistinguishable(ranking, selection, k, one_way)
-        )
-        for k in range(min(NAMED, len(ranking.candidates)))
-        if k == 0 or selection.probabilities[k] > WORTH_NAMING
-    }
 
 
 def _missing(
@@ -351,7 +265,7 @@ def _missing(
     told = tuple(findings.values())
     worth = tuple(one for one in told if one.probability >= WORTH_NAMING)
     report = replace(
-        _report(measured, verdict, summary, worth, experiment),
+        reported(measured, verdict, summary, worth, experiment),
         corrections=corrections(own, measured.profile.joint, FAR_OFF),
         doubt=doubt,
         unexplained_probability=selection.unknown if verdict == selection.verdict else None,
@@ -391,85 +305,126 @@ def _adequate(
     same: bool,
 ) -> Diagnosed:
     """No effect shows in segments: the model is adequate, unless whole runs or curves deny it."""
-
-    def unexplained(summary: str, experiment: str | None) -> Diagnosed:
-        return Diagnosed(_report(measured, "unexplained", summary, (), experiment))
-
-    def whole_runs_tell(summary: str) -> Diagnosed:
-        stops = ends.stops if ends else suited(measured, baseline)
-        return _by_whole_runs(measured, ranking, stops, unexplained(summary, AGAIN))
-
-    def with_these(how: str) -> str:
-        told = WITH_THESE.format(how, numbers_off, noise)
-        return f"{told[0].upper()}{told[1:]}" if same else f"{NONE_MISSING}{told}"
-
     baseline = ranking.baseline
     if not measured.runs and _uneven(measured, baseline):
-        return unexplained(_report_uneven(measured), GAUGE_AGAIN)
+        return _unexplained(measured, _report_uneven(measured), sentences.GAUGE_AGAIN)
     left = worst(measured, baseline, others)
     ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
-    if left.free > BEYOND and not (ends and ends.times <= BEYOND):
-        return whole_runs_tell(DRIFTING.format(left.free))
-    if free and free.drifting:
-        return whole_runs_tell(SLOWLY)
+    by_ends = bool(ends and ends.times <= BEYOND)
+    if why := _drifting(free, left.free if not by_ends else 0.0):
+        return _denied(measured, ranking, ends, why)
     denying = free if free and free.denied else None
     told, least = (denying, 0.0) if denying else (baseline, OFF)
-    by_runs = (denying.fit.x, denying.errors) if denying else None
-    own, worst_run = numbers(baseline, found=by_runs), worst_missed(measured)
-    numbers_off = off(own, least)
-    if denying and not numbers_off:
-        by_whole = whole_runs_tell(TOGETHER)
-        guessed = by_whole.diagnosis.verdict == "unexplained"  # where other numbers do as well
-        return unexplained(TOGETHER, AGAIN) if guessed else by_whole
-    if numbers_off and moved_one_way(measured):
-        usual = units_of(baseline.estimator.segments, measured).force
-        errors = errors_beside_a_force(told.estimator, told.base, told.fit, usual)
-        if denying:
-            errors = np.maximum(errors, denying.errors)
-        surely = numbers(baseline, found=(told.fit.x, errors))
+    own = numbers(baseline, found=(denying.fit.x, denying.errors) if denying else None)
+    if denying and not off(own, least):
+        by_whole = _denied(measured, ranking, ends, sentences.TOGETHER)
+        if by_whole.diagnosis.verdict != "unexplained":  # else other numbers do as well
+            return by_whole
+        return _unexplained(measured, sentences.TOGETHER, sentences.AGAIN)
+    if off(own, least) and moved_one_way(measured):
+        surely = _beside_a_force(measured, baseline, denying)
         pairs = zip(own, surely, strict=True)
         if not all(sure.off(least) for one, sure in pairs if one.off(least)):
-            experiment = _next(measured, ranking, weigh(ranking), one_way=True)
-            summary = EITHER.format(numbers_off) + SAME + "."
-            summary += f" But {doubt}." if (doubt := other_unit(measured)) else ""
-            return unexplained(summary, experiment)
-        own, numbers_off = surely, off(surely, least)
-    forced = _forced(measured)
+            experiment = experiment_for(measured, ranking, weigh(ranking), one_way=True)
+            summary = f"{sentences.EITHER.format(off(own, least))}{SAME}."
+            return _unexplained(measured, summary + _doubted(measured), experiment)
+        own = surely
+    numbers_off, forced = off(own, least), _forced(measured)
     sure = heavier(own) if numbers_off and not forced else 0.0
     if sure > SURE and (found := _heavier(measured, ranking, numbers_off, sure)):
         return found
     all_alike = by_one_factor(own, forced) if numbers_off else ""
     if numbers_off:
-        numbers_off = NUMBERS_OFF.format(numbers_off, all_alike)
-    missed = worst_run.multiple if worst_run else 0.0
-    noise = BEYOND_NOISE.format(measured.floor, measured.unit)
-    verdict: Verdict = "unexplained" if ends and ends.times > BEYOND else "adequate"
-    if verdict == "unexplained":
-        summary = BEYOND_ENDS.format(noise, left.whole, numbers_off)
-    elif numbers_off and worst_run and worst_run.fault:
-        summary = with_these(WHOLE.format(missed))
-    elif numbers_off and denying:
-        summary = with_these(FREELY)
+        numbers_off = sentences.NUMBERS_OFF.format(numbers_off, all_alike)
+    denied = bool(ends) and not by_ends
+    if denied:
+        noise = sentences.BEYOND_NOISE.format(measured.floor, measured.unit)
+        summary = sentences.BEYOND_ENDS.format(noise, left.whole, numbers_off)
     else:
-        loose = missed > MULTIPLE and left.whole <= BEYOND
-        adrift = not numbers_off and strays(measured) < CHANCE
-        where = "With the numbers below the model" if same else "The model"
-        where = "In windows the model" if adrift or (loose and left.whole > SOME) else where
-        summary = f"{where} is adequate: {noise} that an effect would explain.{numbers_off}"
-        summary += WITHOUT.format(missed, left.whole) if loose else ADRIFT if adrift else ""
-    if ends and verdict == "adequate":
-        summary += AT_ENDS.format(left.whole, ends.times, ends.changes)
-    if doubt := other_unit(measured):
-        summary += f" But {doubt}."
-    report = _report(measured, verdict, summary, (), PRESS if verdict == "unexplained" else None)
+        summary = _suffices(measured, numbers_off, left.whole, bool(denying), same)
+        if ends:
+            summary += sentences.AT_ENDS.format(left.whole, ends.times, ends.changes)
+    doubt = _doubted(measured)
+    verdict: Verdict = "unexplained" if denied else "adequate"
+    report = reported(measured, verdict, summary + doubt, (), sentences.PRESS if denied else None)
     report = replace(report, corrections=corrections(own, measured.profile.joint, least))
     driven = baseline.base.joint_model.servo is not None
     if doubt or (all_alike and forced and not driven):
         return Diagnosed(report)
     found = Diagnosed(report, corrected=corrected(baseline, own, least, told.fit.x))
-    if ends and verdict == "unexplained":
+    if ends and denied:
         return _by_whole_runs(measured, ranking, ends.stops, found)
     return found
+
+
+def _unexplained(measured: Measured, summary: str, experiment: str | None) -> Diagnosed:
+    return Diagnosed(reported(measured, "unexplained", summary, (), experiment))
+
+
+def _doubted(measured: Measured) -> str:
+    """That the force may be in another unit, if so."""
+    doubt = other_unit(measured)
+    return f" But {doubt}." if doubt else ""
+
+
+def _drifting(free: FreeRuns | None, missed: float) -> str:
+    """What whole runs deny whatever the model's own numbers, if they do.
+
+    Args:
+        free: what whole free runs tell.
+        missed: times what errors explain, before the joint comes to an end.
+    """
+    if missed > BEYOND:
+        return sentences.DRIFTING.format(missed)
+    return sentences.SLOWLY if free and free.drifting else ""
+
+
+def _denied(
+    measured: Measured, ranking: Ranking, ends: OtherEnds | None, summary: str
+) -> Diagnosed:
+    """What whole runs say of the effects where they deny that the model is adequate."""
+    stops = ends.stops if ends else suited(measured, ranking.baseline)
+    plain = _unexplained(measured, summary, sentences.AGAIN)
+    return _by_whole_runs(measured, ranking, stops, plain)
+
+
+def _beside_a_force(
+    measured: Measured, baseline: Baseline, denying: FreeRuns | None
+) -> tuple[Number, ...]:
+    """The model's own numbers with their errors where a force that acts one way may be missing."""
+    told = denying or baseline
+    usual = units_of(baseline.estimator.segments, measured).force
+    errors = errors_beside_a_force(told.estimator, told.base, told.fit, usual)
+    if denying:
+        errors = np.maximum(errors, denying.errors)
+    return numbers(baseline, found=(told.fit.x, errors))
+
+
+def _suffices(measured: Measured, numbers_off: str, left: float, denied: bool, same: bool) -> str:
+    """That no effect is missing, and what is left.
+
+    Args:
+        measured: the joint and its runs.
+        numbers_off: which of the model's own numbers are off, a sentence; empty if none is.
+        left: of whole runs, times what errors explain, with these fitted.
+        denied: whether whole free runs deny the model as it stands.
+        same: whether a number that was set right does what a missing effect would.
+    """
+    run = worst_missed(measured)
+    missed = run.multiple if run else 0.0
+    noise = sentences.BEYOND_NOISE.format(measured.floor, measured.unit)
+    if numbers_off and ((run and run.fault) or denied):
+        how = sentences.WHOLE.format(missed) if run and run.fault else sentences.FREELY
+        told = sentences.WITH_THESE.format(how, numbers_off, noise)
+        return f"{told[0].upper()}{told[1:]}" if same else f"{sentences.NONE_MISSING}{told}"
+    loose = missed > MULTIPLE and left <= BEYOND
+    adrift = not numbers_off and strays(measured) < CHANCE
+    where = "With the numbers below the model" if same else "The model"
+    where = "In windows the model" if adrift or (loose and left > SOME) else where
+    summary = f"{where} is adequate: {noise} that an effect would explain.{numbers_off}"
+    if loose:
+        return summary + sentences.WITHOUT.format(missed, left)
+    return f"{summary}{sentences.ADRIFT}" if adrift else summary
 
 
 def _by_whole_runs(
@@ -489,14 +444,14 @@ def _by_whole_runs(
         return _by_other_numbers(measured, whole, stops) or plain
     if selection.share > MOST_LEFT:
         return plain
-    every = _findings(measured, again, selection)
+    every = likeliest_findings(measured, again, selection)
     if not every[0].sized or unseen_place(measured, every[0].interval):
         return plain
     report, given = plain.diagnosis, plain.diagnosis.summary
     found = _missing(measured, again, selection, every, report.next_experiment, None)
     said = found.diagnosis
     if said.verdict == "missing_effect":
-        return replace(found, diagnosis=replace(said, summary=f"{said.summary}{WHOLLY}"))
+        return replace(found, diagnosis=replace(said, summary=f"{said.summary}{sentences.WHOLLY}"))
     guess = replace(said, summary=f"{given} {said.summary}", corrections=report.corrections)
     return replace(found, diagnosis=guess, corrected=plain.corrected)
 
@@ -518,11 +473,11 @@ def _by_other_numbers(
     if not off(own) or moved_one_way(measured) or worst(there, fitted).whole > BEYOND:
         return None
     missed = worst_missed(measured)
-    misses = WHOLE.format(missed.multiple if missed else 0.0)
-    noise = BEYOND_NOISE.format(measured.floor, measured.unit)
-    told = NUMBERS_OFF.format(off(own), by_one_factor(own, _forced(measured)))
-    summary = NONE_MISSING + WITH_THESE.format(misses, told, noise)
-    report = _report(measured, "adequate", summary, (), None)
+    misses = sentences.WHOLE.format(missed.multiple if missed else 0.0)
+    noise = sentences.BEYOND_NOISE.format(measured.floor, measured.unit)
+    told = sentences.NUMBERS_OFF.format(off(own), by_one_factor(own, _forced(measured)))
+    summary = sentences.NONE_MISSING + sentences.WITH_THESE.format(misses, told, noise)
+    report = reported(measured, "adequate", summary, (), None)
     report = replace(report, corrections=corrections(own, measured.profile.joint, OFF))
     return Diagnosed(report, corrected=corrected(fitted, own, OFF, fitted.fit.x))
 
@@ -544,7 +499,7 @@ def _heavier(
             before = held.as_given  # without it, it is the model's numbers that are off
             one = replace(one, probability=probability, held_out_error_before=before)
             summary = heavier_summary(one, numbers_off)
-            report = _report(measured, "missing_effect", summary, (one,), None)
+            report = reported(measured, "missing_effect", summary, (one,), None)
             return Diagnosed(report, candidate.written(ranking.baseline.base), (one,))
     return None
 
@@ -554,7 +509,7 @@ def _report_uneven(measured: Measured) -> str:
     if doubt := other_unit(measured):
         return f"{doubt[0].upper()}{doubt[1:]}."
     missed = rms(np.concatenate([curve.excess for curve in measured.curves]))
-    return UNEVEN.format(missed, measured.unit, measured.floor)
+    return sentences.UNEVEN.format(missed, measured.unit, measured.floor)
 
 
 def _uneven(measured: Measured, baseline: Baseline) -> bool:
@@ -563,98 +518,3 @@ def _uneven(measured: Measured, baseline: Baseline) -> bool:
     curves = [curve.against(fitted, measured.context) for curve in measured.curves]
     failing = failing_force(curves, measured.profile.joint)
     return curves_verdict(curves, failing) == "beyond_noise"
-
-
-def _report(
-    measured: Measured,
-    verdict: Verdict,
-    summary: str,
-    effects: tuple[Finding, ...],
-    experiment: str | None,
-) -> Diagnosis:
-    joint = measured.profile.joint
-    if verdict == "insufficient_data":
-        experiment = RECORD_MORE if measured.runs else GAUGE_MORE
-    return Diagnosis(
-        joint=joint.name,
-        verdict=verdict,
-        summary=summary,
-        effects=effects,
-        unvisited=unvisited(measured),
-        noise_floor=measured.floor,
-        unit=measured.unit,
-        next_experiment=experiment,
-        notes=measured.notes,
-        contacts=measured.contacts,
-    )
-
-
-def finding(
-    measured: Measured,
-    ranking: Ranking,
-    held: Holdout,
-    number: int,
-    selection: Selection,
-    alike: tuple[str, ...] = (),
-) -> Finding:
-    """A candidate of a ranking, told.
-
-    Args:
-        measured: the joint and its runs.
-        ranking: of what may be missing.
-        held: errors of segments held out.
-        number: of the candidate.
-        selection: the ranking's probabilities.
-        alike: effects that the data cannot tell from it.
-    """
-    candidate = ranking.candidates[number]
-    hypothesis, x = candidate.hypothesis, candidate.x
-    before, after = held.errors(candidate)
-    magnitude = hypothesis.magnitude(x)
-    own, left = selection.excess
-    doubt = uncertainty(ranking.baseline, candidate, left[number] / max(own, LITTLE))
-    interval = hypothesis.interval(x)
-    joint = measured.profile.joint
-    alone = hypothesis.write(Profile(joint=joint), x).effects
-    return Finding(
-        effect=hypothesis.effect,
-        interval=interval,
-        interval_error=doubt.ends,
-        probability=selection.probabilities[number],
-        direction=hypothesis.direction,
-        magnitude=magnitude,
-        magnitude_error=doubt.magnitude,
-        unit=hypothesis.unit,
-        explanation=explained(
-            hypothesis.effect,
-            hypothesis.direction,
-            interval,
-            unvisited_part(measured, interval),
-            (magnitude, doubt.magnitude, hypothesis.unit),
-            (before, after, measured.floor),
-            measured.unit,
-            joint,
-            uneven=hypothesis.factors > 0,
-            shown=next((one.shown for one in alone if one.effect == hypothesis.effect), None),
-        ),
-        held_out_error_before=before,
-        held_out_error_after=after,
-        indistinguishable_from=alike,
-    )
-
-
-def _next(measured: Measured, ranking: Ranking, selection: Selection, one_way: bool) -> str | None:
-    """The experiment that tells the likeliest two apart; None if the first is sure."""
-    if not measured.runs:
-        return GAUGE_BACK if one_way else None
-    means = means_of(measured, ranking.baseline.estimator.segments, ranking.baseline.base.h)
-    if one_way:
-        return there_and_back(means).sentence
-    if selection.verdict == "unexplained":
-        return AGAIN
-    if selection.probabilities[0] > SURE or len(ranking.candidates) < 2:
-        return None
-    first, second = (
-        Model(*joined(ranking.baseline.base, g.hypothesis), g.fit.x) for g in ranking.candidates[:2]
-    )
-    return next_experiment(first, second, means)

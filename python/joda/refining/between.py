@@ -3,7 +3,7 @@
 A joint crosses a jump in one step or in the next: what it does then is a staircase in every number
 and in every start, on which slopes lead nowhere. Segments that keep clear of all jumps are smooth
 in the numbers even if they are long. They are fitted with the jumps held; then each jump is moved
-to where short segments over it are missed least.
+to where short segments over it are missed least, and in the end finely by long ones.
 """
 
 import numpy as np
@@ -28,15 +28,13 @@ SIDE = 1e-6
 """How far from a place its two sides are, in normalised position."""
 HELD = 1e-4
 """How much less than otherwise a jump may move while the rest is fitted."""
-MOVES = (0.016, 0.004, 0.001)
-"""By how much jumps are moved, in normalised position."""
+MOVES, FINE = (0.016, 0.004, 0.001), (0.001, 0.0002)
+"""By how much jumps are moved by short segments, and in the end by long ones, in normalised
+position."""
 STEPS = 4
 """Moves of one size that are tried in either direction."""
 LESS = 4.0
 """By how much the loss must fall for a jump to be moved: two standard deviations."""
-MUCH = 1.2
-"""How many times as large the loss of short segments is where numbers are much worse: what crosses
-a jump is by chance missed more or less."""
 CHANCE = 3.0
 """By how much per number the loss of two good fits may differ by chance."""
 
@@ -56,40 +54,59 @@ class Between:
             iterations: at most so many; each fits all numbers once, or moves jumps by one size.
             report: see `Progress`.
         """
-        moves = MOVES if iterations > len(MOVES) + 1 and len(self._ends(theta)) else ()
-        rest = iterations - len(moves)
+        count = len(MOVES) + len(FINE)
+        moves, fine = (MOVES, FINE) if iterations > count + 1 and self._ends(theta) else ((), ())
+        rest = iterations - len(moves) - len(fine)
         theta = self._smooth(theta, rest - rest // 2, report)
         for move in moves:
-            theta = self._moved(theta, move, report)
-        return self._smooth(theta, rest // 2, report)
+            theta = self._moved(theta, move, LENGTHS[-1], report)
+        theta = self._smooth(theta, rest // 2, report)
+        return self.placed(theta, report) if fine else theta
+
+    def placed(self, theta: Array, report: Progress) -> Array:
+        """The numbers with jumps moved a little to where long segments over them are missed least;
+        see `fit`."""
+        if self._ends(theta):
+            for move in FINE:
+                theta = self._moved(theta, move, LENGTHS[0], report)
+        return theta
 
     def worse(self, theta: Array, than: Array) -> bool:
-        """Whether numbers miss segments between the jumps by more than others and chance do, or
-        short ones anywhere by much more."""
-        estimator, every = self._clear(than), self.shooting.estimator(LENGTHS[-1])
-        loss, least = self._loss(estimator, theta), self._loss(estimator, than)
-        usual = least / max(int(estimator.segments.count[estimator.counts].sum()), 1)
-        if loss > least + CHANCE * len(theta) * max(usual, 1.0):
-            return True
-        return self._loss(every, theta) > MUCH * self._loss(every, than)
+        """Whether numbers miss segments between the jumps, or short ones anywhere, by more than
+        others and chance do."""
+        for estimator in (self._clear(than), self.shooting.estimator(LENGTHS[-1])):
+            loss, least = self._loss(estimator, theta), self._loss(estimator, than)
+            usual = least / max(int(estimator.segments.count[estimator.counts].sum()), 1)
+            if loss > least + CHANCE * len(theta) * max(usual, 1.0):
+                return True
+        return False
 
     def _smooth(self, theta: Array, iterations: int, report: Progress) -> Array:
         """Gauss-Newton over segments between the jumps, which are held."""
         estimator = self._clear(theta)
         if not estimator.counts.any():
             return theta
+        return self.held(estimator, theta, iterations, report)
+
+    def held(
+        self, estimator: SegmentEstimator, theta: Array, iterations: int, report: Progress
+    ) -> Array:
+        """Gauss-Newton over segments with the jumps held, see `Shooting.fit_windows`."""
         held = np.isin(np.arange(len(theta)), self._ends(theta))
         mean = np.where(held, theta, self.parameters.start)
         prior_std = np.where(held, HELD, 1.0) * self.parameters.prior_std
         return self.shooting.fit_windows(estimator, theta, prior_std, iterations, report, mean)
 
-    def _moved(self, theta: Array, move: float, report: Progress) -> Array:
-        """Each jump in turn where short segments over it are missed least, in steps of one size."""
+    def _moved(self, theta: Array, move: float, length: float, report: Progress) -> Array:
+        """Each jump in turn where segments over it are missed least, in steps of one size."""
         G, h = self.parameters.constraints.G, self.parameters.constraints.h
-        segments, ends = self.shooting.engine.segments(LENGTHS[-1]), self._ends(theta)
+        segments, ends = self.shooting.engine.segments(length), self._ends(theta)
         over = self._meet(segments, theta[ends], CLEAR + STEPS * move)
-        estimator = self.shooting.engine.estimator(segments, over & (segments.count >= FEWEST))
-        best = estimator.started(self.shooting.mover(theta))
+        over &= segments.count >= FEWEST
+        if segments.separable:
+            segments, over = segments.only(over), np.ones(int(over.sum()), bool)
+        estimator = self.shooting.engine.estimator(segments, over)
+        best = self.shooting.started(estimator, theta)
         for end in ends:
             about = theta
             for step in (*range(-STEPS, 0), *range(1, STEPS + 1)):
@@ -97,7 +114,7 @@ class Between:
                 trial[end] += step * move
                 if np.any(G @ trial < h):
                     continue
-                new = estimator.started(self.shooting.mover(trial))
+                new = self.shooting.started(estimator, trial)
                 if new.loss < best.loss - LESS:
                     theta, best = trial, new
         report(theta, self.shooting.robust(estimator, best))

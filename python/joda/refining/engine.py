@@ -39,7 +39,11 @@ class Engine(Protocol):
         h: timestep, s.
         inertia: of the joint, kg·m² or kg.
         range: of its position, rad or m.
+        quick: whether it simulates so quickly that fits may begin from many places.
     """
+
+    @property
+    def quick(self) -> bool: ...  # noqa: D102
 
     @property
     def runs(self) -> Sequence[Run]: ...  # noqa: D102
@@ -75,7 +79,7 @@ class JointEngine:
 
     Attributes:
         joint_model: the joint.
-        range, runs, sigma, h: see `Engine`.
+        range, runs, sigma, h, quick: see `Engine`.
         whole: what makes all that acts on the joint of its profile.
     """
 
@@ -85,6 +89,7 @@ class JointEngine:
     sigma: float
     h: float
     whole: Callable[[Profile], Profile] = lambda profile: profile
+    quick: bool = field(default=True, init=False)
     _cut: dict[float, Segments] = field(default_factory=dict, init=False, repr=False)
 
     @property

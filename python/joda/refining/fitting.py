@@ -9,6 +9,8 @@ error. What the motion does not show is held by a prior at its first value, of t
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +20,17 @@ from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.least_squares import Fit
 from joda.estimation.profile_parameters import Parameters
 from joda.measured.runs import known
-from joda.refining.between import Between
+from joda.refining.between import CHANCE, Between
 from joda.refining.engine import Engine
 from joda.refining.shooting import Shooting
-from joda.refining.sizes import sized
+from joda.refining.sizes import NOISE, sized
 
 Array = NDArray[np.float64]
+Sizes = Literal["near", "none", "far"]
+"""How components' sizes are sought before all else: near the first places, not, or farther off."""
+Report = Callable[[str, int, float], None]
+"""Of an iteration: its stage, its number, the stage's RMS misfit (rad or m)."""
+Tried = tuple[Fit, Parameters, Shooting]
 
 SHORT, LONG = 0.1, 0.4
 """Lengths of segments, s."""
@@ -39,13 +46,28 @@ left for the last turn."""
 MANY = 20
 """Fewest iterations that are to be had for sizes to be fitted first."""
 STUCK = 1.5
-"""Short segments that are missed by more than so many times the noise: the fit may have stuck."""
+"""Short segments that are missed by more than so many times the noise: the fit may have stuck. Of a
+scene, whose simulation takes long, it is only then tried once more."""
 FOLLOWS = 0.01
 """Whole runs that are missed by less than this, in ranges, need no segments any more."""
 BETWEEN = 12
 """Iterations at most with segments between the jumps."""
+LONGER = 3.0
+"""How many times as long each of the longer segments is as the one before, up to whole runs."""
+WHOLE = 15
+"""Iterations at most with segments of each of these lengths."""
+LOST = 30.0
+"""Segments that are missed by more than so many times the noise: the joint parts for a tiny
+difference, and longer ones tell no more."""
+FOLLOWED = 1.05
+"""Whole runs that are missed by less than so many times the noise need no other start."""
 MISSED = 1.2
 """Whole runs that are missed by more than so many times the noise leave something to fit."""
+
+
+def later(report: Report, by: int) -> Report:
+    """One that counts on from a number."""
+    return lambda stage, number, rms: report(stage, by + number, rms)
 
 
 class Problem:
@@ -70,10 +92,12 @@ class Problem:
         self.shooting = Shooting(engine, parameters)
         durations = [float(np.ptp(time)) for time, _ in self.runs]
         least = sum(durations) / MOST
-        self.short, self.long, self.whole = (
-            self.shooting.estimator(length)
-            for length in (max(SHORT, least), max(LONG, least), max(durations) + engine.h)
-        )
+        lengths = [max(SHORT, least), max(LONG, least), max(durations) + engine.h]
+        self.short, self.long, self.whole = map(self.shooting.estimator, lengths)
+        self.longer = []
+        while (longer := LONGER * lengths[1]) < lengths[2]:
+            self.longer.append(self.shooting.estimator(longer))
+            lengths[1] = longer
 
     @property
     def between(self) -> Between:
@@ -106,9 +130,10 @@ class Problem:
     def fit(
         self,
         iterations: int,
-        report: Callable[[str, int, float], None] = lambda stage, number, rms: None,
+        report: Report = lambda stage, number, rms: None,
     ) -> Fit:
-        """Fits sizes and then all; where that gets stuck, all without the sizes before, too.
+        """Fits sizes and then all. Where runs are missed then, it is tried again from the first
+        numbers without sizes, and from sizes that are sought farther off; the best is kept.
 
         Args:
             iterations: at most so many, of each; of a fit of sizes each start counts as one.
@@ -116,37 +141,57 @@ class Problem:
         """
         begun = self.parameters, self.shooting
         sizes = iterations >= MANY and "values" in self.parameters.kinds
-        first = self._fit(iterations, report, sizes)
-        missed = self._missed(first)
-        if not sizes or first.interrupted or missed < STUCK * self.sigma:
-            return first
-        found = self.parameters, self.shooting
-        self.parameters, self.shooting = begun
-        more = len(first.history)
-        again = self._fit(iterations, lambda name, k, rms: report(name, more + k, rms), sizes=False)
-        history = first.history + again.history
-        if missed <= self._missed(again):
-            (self.parameters, self.shooting), again = found, first
-        return replace(again, history=history)
+        ways: tuple[Sizes, ...] = ("near", "none", "far") if sizes else ("none",)
+        tried: list[Tried] = []
+        history: tuple[tuple[str, float], ...] = ()
+        for way in ways:
+            self.parameters, self.shooting = begun
+            found = self._fit(iterations, later(report, len(history)), way)
+            tried.append((found, self.parameters, self.shooting))
+            history += found.history
+            if found.interrupted or self._follows(found):
+                break
+            stuck = self.shooting.rms(self.short, found.theta) > STUCK * self.sigma
+            if not self.shooting.engine.quick and not (stuck and way == "near"):
+                break
+        best = tried[0]
+        for other in tried[1:]:
+            best = self._better(best, other)
+        fit, self.parameters, self.shooting = best
+        return replace(fit, history=history, interrupted=tried[-1][0].interrupted)
 
-    def _missed(self, found: Fit) -> float:
-        """By how much short segments are missed, RMS, rad or m."""
-        return self.shooting.rms(self.short, found.theta)
+    def _follows(self, found: Fit) -> bool:
+        """Whether short segments and whole runs are missed by no more than noise."""
+        short = self.shooting.rms(self.short, found.theta)
+        return short < NOISE * self.sigma and self.rms(found.theta) < FOLLOWED * self.sigma
+
+    def _better(self, one: Tried, other: Tried) -> Tried:
+        """The one that misses short segments less, by more than chance; else long ones; else whole
+        runs."""
+        for estimator in (self.short, self.long, self.whole):
+            losses = [
+                estimator.started(shooting.mover(fit.theta)).loss
+                for fit, _, shooting in (one, other)
+            ]
+            usual = max(min(losses) / max(estimator.samples, 1.0), 1.0)
+            if abs(losses[1] - losses[0]) > CHANCE * len(one[0].theta) * usual:
+                break
+        return other if losses[1] < losses[0] else one
 
     def _fit(
         self,
         iterations: int,
-        report: Callable[[str, int, float], None],
-        sizes: bool,
+        report: Report,
+        sizes: Sizes,
     ) -> Fit:
         """Fits short segments, longer ones, between the jumps, whole runs.
 
         Whole runs that nearly follow after the first segments need no more of them; only if some of
-        their misfit is left then, they are fitted between the jumps too.
+        their misfit is left then, they are fitted like the others too.
 
         Args:
             iterations, report: see `fit`.
-            sizes: whether to fit them first.
+            sizes: how they are sought before all else.
         """
         history: list[tuple[str, float]] = []
         self._best = self.parameters.start
@@ -163,21 +208,25 @@ class Problem:
         def run(name: str, estimator: SegmentEstimator, most: int, prior_std: Array = free) -> None:
             if count := min(most, iterations - len(history)):
                 self.shooting.fit_windows(
-                    estimator,
-                    self._best,
-                    prior_std,
-                    count,
-                    lambda x, misfit: heard(name, x, misfit),
+                    estimator, self._best, prior_std, count, partial(heard, name)
                 )
 
-        def between() -> None:
+        def segments() -> None:
+            self._alternate(run, iterations)
             if count := min(BETWEEN, iterations - len(history)):
-                self.between.fit(self._best, count, lambda x, rms: heard("between jumps", x, rms))
+                self.between.fit(self._best, count, partial(heard, "between jumps"))
 
         def whole() -> bool:
             """Whether some misfit is left."""
             before = self._best
-            run("whole runs", self.whole, iterations)
+            stages = [("longer windows", one) for one in self.longer]
+            for name, estimator in (*stages, ("whole runs", self.whole)):
+                if count := min(WHOLE, iterations - len(history)):
+                    self.between.held(estimator, self._best, count, partial(heard, name))
+                if self.shooting.rms(estimator, self._best) > LOST * self.sigma:
+                    break
+            if len(history) < iterations:
+                self.between.placed(self._best, partial(heard, "jumps"))
             missed = self.rms(self._best) > MISSED * self.sigma
             if missed and self.between.worse(self._best, before):
                 self._best = before  # a run snapped to another side than it did
@@ -188,16 +237,15 @@ class Problem:
             heard("sizes", parameters.start, misfit)
 
         try:
-            if sizes:
-                sized(self.shooting, self.short, FIRST, size)
+            if sizes != "none":
+                sized(self.shooting, self.short, FIRST, size, sizes == "far")
             run("short windows, intervals held", self.short, min(FIRST, iterations // 3), held)
             follows = self.rms(self._best) < FOLLOWS * self.span
             if not follows:
-                self._alternate(run, iterations)
-                between()
+                segments()
             if whole() and follows:
                 before = self._best
-                between()
+                segments()
                 whole()
                 if not self.between.worse(before, self._best):
                     self._best = min(before, self._best, key=self.rms)

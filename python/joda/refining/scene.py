@@ -144,7 +144,7 @@ class SceneEngine:
     Attributes:
         scene: in MJX, with the joints of the runs.
         joint: id of the fitted joint.
-        range, runs, sigma, h, inertia: see `joda.refining.engine.Engine`.
+        range, runs, sigma, h, inertia, quick: see `joda.refining.engine.Engine`.
     """
 
     scene: Scene
@@ -153,6 +153,7 @@ class SceneEngine:
     runs: Sequence[SceneRun]
     sigma: float
     inertia: float
+    quick: bool = field(default=False, init=False)
     _cut: dict[float, Segments] = field(default_factory=dict, init=False, repr=False)
 
     @property

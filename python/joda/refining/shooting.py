@@ -1,6 +1,8 @@
 """Fits numbers to segments of measured runs and to their starts (multiple shooting: Bock 1983)."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,11 @@ Progress = Callable[[Array, float], None]
 
 LEAST = 4
 """Fewest samples of a segment that counts."""
+STRAY = 1.5
+"""Segments that leave so many times the squares that noise makes begin elsewhere, perhaps: where a
+force jumps, a joint crosses in one step or in the next, and slopes by its start lead nowhere."""
+AROUND = np.linspace(-2, 2, 9)
+"""Where these may begin, either state, in standard deviations of the measured one."""
 NUDGE = 0.004
 """Step of a number for differences, in its own unit."""
 
@@ -41,6 +48,31 @@ class Shooting:
         """Of segments of some length, s."""
         segments = self.engine.segments(length)
         return self.engine.estimator(segments, segments.count >= LEAST)
+
+    def started(self, estimator: SegmentEstimator, theta: Array) -> Found:
+        """Starts of segments that suit the joint with its numbers best: those that still stray are
+        tried at places around, too."""
+        mover = self.mover(theta)
+        found, segments = estimator.started(mover), estimator.segments
+        stray = estimator.counts & (found.squares > STRAY * segments.count)
+        if not (segments.separable and stray.any()):
+            return found
+        part = segments.only(stray)
+        own = SegmentEstimator(part, np.ones(len(part.at), bool))
+        begun = best = found.start[stray]
+        least = own.squares(mover, begun)[1]
+        for state in product(AROUND, AROUND):
+            trial = begun + part.prior_std * state
+            squares = own.squares(mover, trial)[1]
+            best = np.where((squares < least)[:, None], trial, best)
+            least = np.minimum(squares, least)
+        start = found.start.copy()
+        start[stray] = best
+        anew = estimator.started(mover, near=start)
+        better = anew.squares < found.squares
+        squares = np.minimum(anew.squares, found.squares)
+        start = np.where(better[:, None], anew.start, found.start)
+        return replace(found, start=start, squares=squares, loss=estimator.loss(squares))
 
     def fit_windows(
         self,

@@ -6,12 +6,14 @@ and show in short segments; from several starts the fit finds them where one sta
 """
 
 from collections.abc import Callable, Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.profile_parameters import Kind, Parameters
+from joda.profile import Profile
 from joda.refining.shooting import Shooting
 
 Array = NDArray[np.float64]
@@ -22,6 +24,10 @@ BY = 0.06
 SHIFTS = ((0, 0), (BY, BY), (-BY, -BY), (-BY, BY), (BY, -BY))
 """How far the lower and the upper ends of all intervals are moved at the starts, in normalised
 position."""
+FAR = tuple(float(by) for by in np.linspace(-0.1, 0.1, 9))
+"""How far either end is moved where it is sought from many places."""
+FEW = 3
+"""Iterations of sizes at each of these."""
 MOST = 6
 """From how many starts, those with the least loss, numbers are fitted."""
 EDGE = 0.001
@@ -30,11 +36,17 @@ NOISE = 1.1
 """Segments that are missed by less than so many times the noise leave nothing to look for."""
 
 
+SIZES: tuple[Kind, ...] = ("sizes",)
+PLACES: tuple[Kind, ...] = ("places",)
+INTERVALS: tuple[Kind, ...] = ("intervals",)
+
+
 def sized(
     shooting: Shooting,
     estimator: SegmentEstimator,
     iterations: int,
     report: Callable[[Parameters, float], None],
+    wide: bool = False,
 ) -> None:
     """Fits sizes, then sizes and intervals together, each from several starts.
 
@@ -44,22 +56,28 @@ def sized(
         iterations: at most so many from each start.
         report: after each start, the parameters about the best profile so far, and its RMS misfit
             in those segments, rad or m.
+        wide: whether intervals are sought from many places around, all components weaker at first.
     """
     parameters, found = shooting.parameters, shooting.parameters.profile
-    stages: list[tuple[Kind, ...]] = [("sizes",)]
+    stages: list[tuple[Kind, ...]] = [] if wide else [SIZES]
     if any(slot.kind == "intervals" for slot in parameters.slots):
-        stages += [("sizes", "places"), ("sizes", "intervals")]
+        stages += [SIZES + PLACES, SIZES + INTERVALS]
+    own = parameters.about(parameters.profile, SIZES)
+    begun, weak = (own.written(own.start - by, exact=True) for by in (0.0, WEAKER))
     for kinds in stages:
         bases = [found]
         if "places" in kinds:  # sizes that were fitted elsewhere may lead nowhere
-            own = parameters.about(parameters.profile, stages[0])
-            bases += [own.written(own.start - by, exact=True) for by in (0.0, WEAKER)]
-        starts = _starts(shooting, estimator, [parameters.about(base, kinds) for base in bases])
+            bases = _farther(shooting, estimator, weak) if wide else [found, begun, weak]
+        numbers = [parameters.about(base, kinds) for base in bases]
+        if wide:
+            starts = [(shooting.about(one), one.start) for one in numbers]
+        else:
+            starts = _starts(shooting, estimator, numbers)
         least = np.inf
         for other, start in starts:
             x = other.fit_windows(estimator, start, other.parameters.prior_std, iterations)
             x = _inside(other.parameters, x)
-            loss = estimator.started(other.mover(x)).loss
+            loss = _loss(estimator, other, x)
             if loss < least:
                 least, misfit = loss, other.rms(estimator, x)
                 found = other.parameters.written(x, exact=True)
@@ -74,13 +92,39 @@ def _starts(
     """Where to begin: of what `_trials` has of each, the ones with the least loss."""
     trials = [(shooting.about(one), x) for one in bases for x in _trials(one)]
     if len(trials) > MOST:
-        trials.sort(key=lambda trial: estimator.started(trial[0].mover(trial[1])).loss)
+        trials.sort(key=lambda trial: _loss(estimator, *trial))
     return trials[:MOST]
+
+
+def _farther(shooting: Shooting, estimator: SegmentEstimator, weak: Profile) -> list[Profile]:
+    """The profile with intervals elsewhere, a few iterations of its sizes at each place; those with
+    the least loss."""
+    placed = shooting.parameters.about(weak, PLACES)
+    upper = np.array([slot.index == 1 for slot in placed.slots])
+    found: list[tuple[float, Profile]] = []
+    for low, high in product(FAR, FAR):
+        place = _inside(placed, placed.start + np.where(upper, high, low))
+        if _feasible(placed, place):
+            own = placed.about(placed.written(place, exact=True), SIZES)
+            sizes = shooting.about(own)
+            x = sizes.fit_windows(estimator, own.start, own.prior_std, FEW)
+            found.append((_loss(estimator, sizes, x), own.written(x, exact=True)))
+    found.sort(key=lambda one: one[0])
+    return [profile for _, profile in found[:MOST]]
+
+
+def _loss(estimator: SegmentEstimator, shooting: Shooting, x: Array) -> float:
+    return estimator.started(shooting.mover(x)).loss
+
+
+def _feasible(parameters: Parameters, x: Array) -> bool:
+    must = parameters.constraints
+    return bool(np.all(must.G @ x >= must.h - 1e-9))
 
 
 def _trials(parameters: Parameters) -> list[Array]:
     """The numbers as they are, and with some of it weaker or with the places elsewhere."""
-    slots, must = parameters.slots, parameters.constraints
+    slots = parameters.slots
     if "intervals" in parameters.kinds:
         return [parameters.start]
     places = np.array([slot.kind == "places" for slot in slots])
@@ -94,7 +138,7 @@ def _trials(parameters: Parameters) -> list[Array]:
         return [parameters.start - WEAKER * some for some in weaker]
     moved = [parameters.start + places * np.where(upper, high, low) for low, high in SHIFTS]
     inside = [_inside(parameters, start) for start in moved]
-    return [start for start in inside if np.all(must.G @ start >= must.h - 1e-9)]
+    return [start for start in inside if _feasible(parameters, start)]
 
 
 def _inside(parameters: Parameters, x: Array) -> Array:
