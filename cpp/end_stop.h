@@ -13,9 +13,9 @@ namespace joda {
 
 // How many steps a knock lasts without damping: enough for the ratio to hardly depend on where
 // within a step the stop is met, few enough for a stop to be hard.
-inline constexpr int kKnockSteps = 16;
-inline constexpr double kStopStiffness =  // (pi / kKnockSteps)^2
-    9.869604401089358 / (kKnockSteps * kKnockSteps);
+inline constexpr int kImpactSteps = 16;
+inline constexpr double kStopStiffness =  // (pi / kImpactSteps)^2
+    9.869604401089358 / (kImpactSteps * kImpactSteps);
 inline constexpr double kStopImpedance = 0.99;
 
 // Damping of the stops that have a restitution of their own; an end without one is the scene's.
@@ -31,7 +31,7 @@ inline double Rebound(double damping) {
   double sum = 0;
   for (int k = 0; k < kPhases; ++k) {
     double x = -(k + 0.5) / kPhases, v = -1;
-    for (int step = 0; step < 20 * kKnockSteps && (x < 0 || v < 0); ++step) {
+    for (int step = 0; step < 20 * kImpactSteps && (x < 0 || v < 0); ++step) {
       if (x < 0) v += std::max(-kStopStiffness * x - damping * v, 0.0);
       x += v;
     }

@@ -39,6 +39,14 @@ def quiet(theta, misfit) -> None:
     pass
 
 
+def test_a_jump_where_no_run_was_stays():
+    case = planted("constant_negative_conservative_hinge", 4)
+    joint = between(case)
+    far = joint.parameters.start.copy()
+    far[joint._ends(far)] = 0.995, 0.9995
+    assert np.array_equal(joint.placed(far, quiet), far)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
@@ -124,7 +132,8 @@ def test_every_kind_of_number_does_what_it_does_in_mujoco():
     theta = parameters.start + 0.05 * np.random.default_rng(0).uniform(size=len(parameters.start))
     force = 8 * np.sin(6 * STEP * np.arange(600))
     start = np.array([[0.3, 0.5]])
-    path = shooting.mover(theta).replay(force, np.zeros(1, int), start, np.array([True]), STEP)[1]
+    begin = np.zeros(1, int), start, np.array([True])
+    path = shooting.simulator(theta).replay(force, *begin, STEP)[1]
     body = shooting.engine.body(parameters, theta)
     model = quiet_rig(
         joint_model.weighing(found.model_copy(update={"equivalent_inertia": body.inertia}), body),
@@ -155,7 +164,7 @@ def test_the_ends_bounce_as_those_of_the_model(end):
     shooting = between_of(replace(own, solref=solref, solimp=solimp), parameters).shooting
     force = np.repeat([-40.0, 40.0, 40.0, -40.0], 150)
     begin = np.zeros(1, int), np.array([[0.3, 0.5]]), np.array([True])
-    path = shooting.mover(parameters.start).replay(force, *begin, STEP)[1]
+    path = shooting.simulator(parameters.start).replay(force, *begin, STEP)[1]
     wanted = own.simulator(profile, STEP).replay(force, *begin, STEP)[1]
     np.testing.assert_array_equal(path, wanted)
     assert path.min() < found.joint.range[0] and path.max() > found.joint.range[1]

@@ -78,9 +78,13 @@ def said(verdict, *effects):
     told = SimpleNamespace(
         verdict=verdict, effects=effects, corrections=(), summary="The end.", doubt=None
     )
-    puzzling = verdict == "unexplained"
+    unexplained_by = verdict == "unexplained"
     return SimpleNamespace(
-        diagnosis=told, candidates=effects, puzzling=puzzling, corrected=None, calibration=None
+        diagnosis=told,
+        candidates=effects,
+        unexplained_by=unexplained_by,
+        corrected=None,
+        calibration=None,
     )
 
 

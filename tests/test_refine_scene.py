@@ -134,7 +134,7 @@ def test_both_engines_move_alike_and_have_the_same_slopes(both):
     for one in (alone, scene):
         estimator = one.estimator(0.4)
         start = estimator.segments.start
-        found.append(estimator.linear(one.mover, one.unknowns(), theta, start))
+        found.append(estimator.linear(one.simulator, one.unknowns(), theta, start))
     mine, theirs = found
     for name in ("r", "J", "S"):  # differences are off where a segment sticks or snaps within them
         a, b = (getattr(one, name) for one in (mine, theirs))

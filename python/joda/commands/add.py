@@ -162,13 +162,13 @@ def add(
             known = added_effect.profile, name, added_effect.departs
             added_effect = replace(added_effect, profile=by_all(measured, *known, near))
     nearest = next((one["effect"] for one in told["effects"] if one["effect"] != LABEL), None)
-    told_law = account(train, held, law, added_effect.after.window, nearest) if law else None
+    law_account = account(train, held, law, added_effect.after.window, nearest) if law else None
     notes: list[str] = []
     stops = added_effect.stops
     moved = stops_described(measured.joint_model, stops)
     corrections: Path | None = corrections_beside(target)
     if added_effect.effect:
-        if not told_law:  # of a learned law nothing is where no run was
+        if not law_account:  # of a learned law nothing is where no run was
             there = places(added_effect.profile, name, measured.profile)[0]
             notes += filter(None, [extrapolated(unvisited_part(measured, there)).strip()])
         progress("drawing")
@@ -178,8 +178,8 @@ def add(
         corrections = corrections if corrections in files else None
         notes += more
         drawn = (
-            learned_picture(held, added_effect.profile, told_law)
-            if told_law
+            learned_picture(held, added_effect.profile, law_account)
+            if law_account
             else repaired_picture(held, added_effect.profile)
         )
         write_together(files | {picture: png(drawn)})
@@ -201,7 +201,7 @@ def add(
         departures=added_effect.departs.sentences,
         changes=(*changes(measured.profile, added_effect.profile), *moved),
         notes=(*measured.notes, *notes),
-        learned=told_law,
+        learned=law_account,
     )
 
 

@@ -220,7 +220,7 @@ def refine(
     result = problem.fit(iterations, lambda stage, k, rms: progress(stage, k, iterations, rms))
     parameters = problem.parameters
     after = parameters.written(result.theta)
-    mended = all_of(after)
+    refined = all_of(after)
     body = by_itself.body(parameters, result.theta) if set(fit) - set(STILL) else None
     if body:  # armature is all of the inertia that is written
         bodies = found.equivalent_inertia - compiled.dof_armature[compiled.jnt_dofadr[number]]
@@ -232,12 +232,12 @@ def refine(
             numbers = (first, first.start), (parameters, result.theta)
             before, after = (Problem(own, which).error(theta) for which, theta in numbers)
             return before, after
-        right = one.changed(mended, joint_model=body)
+        right = one.changed(refined, joint_model=body)
         return error(one, within=False), error(right, within=False)
 
     errors = beside(at_first)
     apart = beside(taken(compiled, number, found, whole, other, servo=servo)) if other else None
-    if reason := refused(errors, apart, problem.sigma, (whole, mended), Needs(at_first)):
+    if reason := refused(errors, apart, problem.sigma, (whole, refined), Needs(at_first)):
         noted = "".join(f" {note}" for note in clear.notes)
         raise JodaError(f"{target}: not written, as {reason}.{noted}")
     hidden = unseen(begin, parameters, result.covariance, away)

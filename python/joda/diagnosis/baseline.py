@@ -116,7 +116,7 @@ class Baseline:
     def restitution(
         self, ends: Sequence[Hypothesis], others: Sequence[Profile] = ()
     ) -> list[FittedHypothesis]:
-        """How bouncy the ends are that throw the joint back clearly faster than the model's do.
+        """The restitution of the ends that throw the joint back clearly faster than the model's do.
 
         Args:
             ends: an end that is bouncy, or both.
@@ -131,7 +131,7 @@ class Baseline:
         return [candidate for candidate in there if candidate]
 
     def _thrown_back(self, hypothesis: Hypothesis) -> FittedHypothesis | None:
-        """How bouncy an end is, or both, by the impacts there; None if there are none."""
+        """The restitution of an end, or both, by the impacts there; None if there are none."""
         ends = ends_of(hypothesis)
         if not (there := [self.rebounds[side] for side in ends if side in self.rebounds]):
             return None

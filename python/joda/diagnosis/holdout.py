@@ -51,7 +51,7 @@ class Holdout:
         """RMS misfit of the segments held out, rad or m, without the effect and with it; robust, so
         that no single one decides, in which the joint goes over a barrier or just not.
 
-        Of how bouncy the ends are, all segments with impacts tell; no other is fitted to them.
+        Of the restitution of the ends, all segments with impacts tell; no other is fitted to them.
         """
         base, segments = self.baseline.base, self.baseline.estimator.segments
         make, unknowns = joined(base, found.hypothesis)

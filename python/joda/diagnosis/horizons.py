@@ -93,8 +93,8 @@ def looked(
         drifts = bool(free and free.drifting)
         other = _shown(longer, first, drifts) if measured.runs else _noisier(measured, first)
         if other is not None:
-            puzzled = selection.verdict == "unexplained" and bool(measured.runs)
-            promising = hopeful if puzzled else always
+            unexplained = selection.verdict == "unexplained" and bool(measured.runs)
+            promising = hopeful if unexplained else always
             again = rank(other, exclude, progress, promising, possible)
             found.append(evidence(again))
             if measured.runs:

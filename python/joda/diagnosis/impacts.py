@@ -1,4 +1,4 @@
-"""How bouncy the ends of the range are, by the segments with impacts: no others tell of it."""
+"""The restitution of the ends of the range, by the segments with impacts: no others tell of it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,11 +13,11 @@ from joda.estimation.segments import Segments
 from joda.joints.joint_model import JointModel
 from joda.measured.runs import CLEAR
 from joda.profile import Channels, Profile
-from joda.scenes.limits import IMPEDANCE, KNOCK_STEPS, Stops, rebounding
+from joda.scenes.limits import IMPACT_STEPS, IMPEDANCE, Stops, rebounding
 
 Array = NDArray[np.float64]
 
-KNOCKS = 2
+IMPACTS = 2
 """Fewest impacts at an end whose speeds tell of it."""
 CLEARLY = 0.07
 """How much more of its speed an end must throw back than the model's."""
@@ -33,7 +33,7 @@ SHORTEST, TIMES = 6, 8
 """Steps that an impact lasts at the least without damping, and how many durations are tried."""
 AROUND = 5
 """Samples before and after an impact that tell its speeds."""
-KNOCK_TIME = 0.6
+IMPACT_TIME = 0.6
 """In which a joint goes through its range towards an impact, s."""
 
 
@@ -46,7 +46,7 @@ def best_ratio(
     are changed by a force: where none acted, the mean of both is nearer.
     """
     seen = speed_ratios(segments, base, ends)
-    if len(seen) < KNOCKS:
+    if len(seen) < IMPACTS:
         return whole.ratio, whole.error
     speeds = mean_of(seen)[0]
     ratio = whole.ratio if segments.pushed else (whole.ratio + speeds) / 2
@@ -190,7 +190,7 @@ def some_of(segments: Segments, numbers: NDArray[np.intp]) -> SegmentEstimator:
 def stopped(joint_model: JointModel, ratio: float, time: float) -> JointModel:
     """The joint with ends of a restitution, at which an impact without damping lasts a time (s)."""
     solimp = IMPEDANCE, IMPEDANCE, *joint_model.solimp[2:]
-    return joint_model.stopped(Stops(rebounding(ratio, time / KNOCK_STEPS), solimp))
+    return joint_model.stopped(Stops(rebounding(ratio, time / IMPACT_STEPS), solimp))
 
 
 def ends_of(hypothesis: Hypothesis) -> list[int]:
@@ -274,7 +274,7 @@ def rebound(base: BaseModel, given: JointModel) -> float:
     """Speed after an impact, per speed before, of the model with its own ends."""
     profile = base.profile.model_copy(update={"channels": Channels()})
     lo, hi = profile.joint.range
-    steps, speed = round(KNOCK_TIME / base.h), (hi - lo) / KNOCK_TIME
+    steps, speed = round(IMPACT_TIME / base.h), (hi - lo) / IMPACT_TIME
     start = np.array([[hi - 0.2 * (hi - lo), speed]])
     begin = np.zeros(1, np.int64)
     simulator = replace(given, weight=(0.0, 0.0), servo=None).simulator(profile, base.h)

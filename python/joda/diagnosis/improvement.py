@@ -212,9 +212,9 @@ def _next(parts: Parts, last: Step, latest: Diagnosed, progress: Progress) -> li
     """
     known = latest.diagnosis.verdict == "missing_effect"
     found: Sequence[Sequence[Finding]] = [[one] for one in latest.candidates]
-    if latest.puzzling and not last.added and not parts[0].joint_model.servo:
+    if latest.unexplained_by and not last.added and not parts[0].joint_model.servo:
         train = parts[0].changed(last.profile)
-        known, found = False, pairs(train, latest.puzzling, progress)
+        known, found = False, pairs(train, latest.unexplained_by, progress)
     for number, (first, *second) in enumerate(found[:TRIED]):
         if known and number and first.probability < LIKELY:
             return []

@@ -18,12 +18,12 @@ def indistinguishable(
 ) -> tuple[str, ...]:
     """Effects that the data cannot tell from a candidate."""
     own, left = selection.excess
-    untold = SETTINGS.telling / max(ranking.n_effective, 1.0)
+    undecided = SETTINGS.telling / max(ranking.n_effective, 1.0)
     names = [candidate.hypothesis.effect for candidate in ranking.candidates]
     alike = {
         name
         for k, name in enumerate(names)
-        if abs(left[k] - left[number]) < max(ALIKE * (left[number] + LITTLE), untold)
+        if abs(left[k] - left[number]) < max(ALIKE * (left[number] + LITTLE), undecided)
         and left[k] < max(RIVAL * own, LEFT)
     }
     if one_way and (mine := _kind(names[number])):

@@ -240,7 +240,7 @@ def _simplex_searched(
 
 def _shown_without_impacts(baseline: Baseline, candidates: Sequence[FittedHypothesis]) -> bool:
     """Whether segments without impacts tell of an effect, with which only noise is left of them:
-    then how bouncy the ends are is asked once that is added."""
+    then the restitution of the ends is asked once that is added."""
     samples = baseline.estimator.samples
     best = min(candidates, key=lambda one: one.score, default=None)
     if best is None or best.fit.loss > ENOUGH * samples:

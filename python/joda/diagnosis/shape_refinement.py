@@ -311,7 +311,7 @@ def refitted(
 
 
 def has_restitution(profile: Profile) -> bool:
-    """Whether it says how bouncy an end is."""
+    """Whether it says the restitution of an end."""
     return any(isinstance(effect, EndStopRestitution) for effect in profile.effects)
 
 

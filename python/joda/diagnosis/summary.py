@@ -18,7 +18,7 @@ SAME = (
     ": the joint was moved in one direction only, or nearly so, where a resistance and a force "
     "over position are the same"
 )
-BOUNCY = "The ends of the range throw the joint back more than the model's: not explained."
+ENDS_LEFT = "The ends of the range throw the joint back more than the model's: not explained."
 BLIND = (
     " With its own numbers fitted the model misses windows held out by less than what was taken "
     "for noise, part of which may be what the joint does between two samples: record faster."
@@ -114,7 +114,7 @@ def _sum(first: Finding, selection: Selection) -> float:
 
 def _unexplained(what: str, selection: Selection, one_way: bool, restitution: bool) -> str:
     if restitution and selection.excess[0] < MUCH:
-        return BOUNCY
+        return ENDS_LEFT
     share = 100 * min(selection.share, 1.0)
     same = SAME if one_way and " or " in what else ""
     if share <= 1:

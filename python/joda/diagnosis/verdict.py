@@ -44,7 +44,7 @@ from joda.diagnosis.report import (
 from joda.diagnosis.search import Progress, rank
 from joda.diagnosis.selection import MUCH, SURE, Evidence, Selection
 from joda.diagnosis.summary import (
-    BOUNCY,
+    ENDS_LEFT,
     FALLEN,
     SAME,
     far_off,
@@ -83,7 +83,7 @@ class Diagnosed:
         diagnosis: for the user.
         profile: with the likeliest effect; None if there is none.
         candidates: what may be tried, the likeliest first, also what is too unlikely to be named.
-        puzzling: the first look's ranking, where no effect explained the runs; else None.
+        unexplained_by: the first look's ranking, where no effect explained the runs; else None.
         looks: the evidence of each look.
         corrected: the joint with its own numbers as the runs show them; None if none is off.
         calibration: numbers of its body and of the measurement that were set right first; None if
@@ -93,7 +93,7 @@ class Diagnosed:
     diagnosis: Diagnosis
     profile: Profile | None = None
     candidates: tuple[Finding, ...] = ()
-    puzzling: Ranking | None = None
+    unexplained_by: Ranking | None = None
     looks: tuple[Evidence, ...] = ()
     corrected: Corrected | None = None
     calibration: Calibration | None = None
@@ -124,10 +124,10 @@ def diagnosed(
     baseline = fit_baseline(measured)
     calibrator = Calibrator(measured)
     found = calibrator.numbers(baseline) if calibrate else None
-    mended: tuple[Calibration, HorizonSearch] | None = None
+    repaired: tuple[Calibration, HorizonSearch] | None = None
     if found and found.alone:
         plain = looked(found.of(measured), exclude, progress)
-        mended = found, plain
+        repaired = found, plain
     else:
         plain = looked(measured, exclude, progress, baseline)
         ranking, beside = plain.first[0], False
@@ -137,12 +137,12 @@ def diagnosed(
         if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
             looks = looked(found.of(measured), exclude, progress)
             if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
-                mended = found, looks
-    puzzled = calibrate and (mended[1] if mended else plain).selection.verdict == "unexplained"
-    if puzzled and (both := _together(measured, baseline.base, exclude, progress)):
-        mended = both
-    if mended:
-        return _set_right(measured, *mended, exclude, progress)
+                repaired = found, looks
+    latest = (repaired[1] if repaired else plain).selection.verdict
+    if calibrate and latest == "unexplained":
+        repaired = _together(measured, baseline.base, exclude, progress) or repaired
+    if repaired:
+        return _set_right(measured, *repaired, exclude, progress)
     return replace(_concluded(measured, plain), looks=plain.evidence)
 
 
@@ -214,8 +214,8 @@ def _concluded(
     ranking, selection = looks.ranking, looks.selection
     first_ranking, first_weighed = looks.first
     one_way = moved_one_way(measured)
-    puzzled = first_weighed.verdict == "unexplained" and bool(measured.runs)
-    puzzling = first_ranking if puzzled else None
+    unexplained = first_weighed.verdict == "unexplained" and bool(measured.runs)
+    unexplained_by = first_ranking if unexplained else None
     if selection.verdict == "adequate" and (why := too_little(measured) or too_noisy(measured)):
         return Diagnosed(reported(measured, "insufficient_data", why, (), None))
     suffice = not selection.likely and looks.free and looks.free.suffice
@@ -225,12 +225,12 @@ def _concluded(
     sized = [k for k, one in every.items() if one.sized]
     experiment = experiment_for(measured, ranking, selection, one_way)
     if not sized or unseen_place(measured, every[sized[0]].interval):
-        why = BOUNCY if ranking.restitution else sentences.NO_EFFECT
+        why = ENDS_LEFT if ranking.restitution else sentences.NO_EFFECT
         if sized:
             there = every[sized[0]].interval
             why = sentences.OUT_THERE.format(*there, 100 * visited_share(measured, there))
         report = reported(measured, "unexplained", why, (), experiment)
-        return _driven(Diagnosed(report, puzzling=puzzling), ranking.baseline)
+        return _driven(Diagnosed(report, unexplained_by=unexplained_by), ranking.baseline)
     first = every[sized[0]]
     hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
     hardly |= far_off(first, measured.floor)
@@ -240,7 +240,7 @@ def _concluded(
     if not helps(first, measured.floor) and all(look.model < MUCH for look in looks.evidence):
         return _adequate(measured, ranking, looks.free, others, same)
     findings = {k: every[k] for k in sized}
-    return _missing(measured, ranking, selection, findings, experiment, puzzling)
+    return _missing(measured, ranking, selection, findings, experiment, unexplained_by)
 
 
 def _missing(
@@ -249,7 +249,7 @@ def _missing(
     selection: Selection,
     findings: Mapping[int, Finding],
     experiment: str | None,
-    puzzling: Ranking | None,
+    unexplained_by: Ranking | None,
 ) -> Diagnosed:
     """That something is missing, and what may be, the likeliest first, by the places of these in a
     ranking."""
@@ -276,7 +276,7 @@ def _missing(
         else None
     )
     profile = candidate.written(base) if worth else None
-    diagnosis = Diagnosed(report, profile, told, puzzling, corrected=servo)
+    diagnosis = Diagnosed(report, profile, told, unexplained_by, corrected=servo)
     return diagnosis if sure or doubt else _driven(diagnosis, ranking.baseline)
 
 

@@ -20,9 +20,8 @@ from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
 from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Hidden, Sampler
-from joda.hidden.truth import Joint, Truth
+from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
 
-KNOCKING = "end_stop_restitution"
 TIMED = "periodic_disturbance"
 SLOW = 0.7, 2.0
 """Least and greatest natural time, s: 30 Hz see no faster joint."""
@@ -87,7 +86,7 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
         reversals,
     )
     left: tuple[Draw, ...] = (flick(0.5), toss(0.6), drop, flick(0.9))
-    if KNOCKING in names:
+    if RESTITUTION_EFFECT in names:
         pushed, left = (shove((0.3, 0.8)), shove((0.5, 1.0), 4.0)), (toss(1.5),)
     draws = pushed if forced else left
     session = Session(

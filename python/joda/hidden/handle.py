@@ -36,7 +36,7 @@ class Handle:
         return np.asarray(push * (self.side != 0))
 
     def step(self, old: tuple[Array, Array], new: tuple[Array, Array], push: Array) -> Array:
-        """Moves the handle by a step, and returns the part's velocity after knocks.
+        """Moves the handle by a step, and returns the part's velocity after impacts.
 
         Args:
             old, new: position and velocity of the part before and after the step.
@@ -51,10 +51,10 @@ class Handle:
         offset = np.where(touches, self.offset, offset)
         self.offset = np.minimum(np.maximum(offset, -self.reach), self.reach)
         side = np.sign(offset)
-        knocks = ~touches & (self.offset != offset) & ((speed - v) * side > 0)
-        if np.count_nonzero(knocks):
+        impacts = ~touches & (self.offset != offset) & ((speed - v) * side > 0)
+        if np.count_nonzero(impacts):
             common = (self.part * v + self.inertia * speed) / (self.part + self.inertia)
-            self.side = np.where(knocks, side, self.side)
-            v, speed = np.where(knocks, common, v), np.where(knocks, common, speed)
+            self.side = np.where(impacts, side, self.side)
+            v, speed = np.where(impacts, common, v), np.where(impacts, common, speed)
         self.velocity = speed
         return v

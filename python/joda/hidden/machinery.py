@@ -19,10 +19,9 @@ from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
 from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Sampler
-from joda.hidden.truth import Joint, Truth
+from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
 
 WEIGHTY = ("load_dependent_friction",)
-KNOCKING = "end_stop_restitution"
 TIMED = "periodic_disturbance"
 
 
@@ -72,7 +71,7 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
         press((0.2, 1.0), 1.5),
     )
     left: tuple[Draw, ...] = (flick(0.8), toss(0.5), drop, flick(0.4))
-    if KNOCKING in names:
+    if RESTITUTION_EFFECT in names:
         pushed, left = (shove((0.3, 0.8)), steps(3.0, (0.5, 2.0)), shove((0.5, 1.0))), (toss(1.5),)
     draws = pushed if forced else left
     session = Session(

@@ -7,14 +7,13 @@ import numpy as np
 
 from joda.hidden.instrument import TRUE, Instrument
 from joda.hidden.laws import Array
-from joda.hidden.motions import FLICKS, FORCED, FREE, GUARD, KNOCKS, Draw, Ground, Hands, release
+from joda.hidden.motions import FLICKS, FORCED, FREE, GUARD, IMPACTS, Draw, Ground, Hands, release
 from joda.hidden.simulator import Tape, Trace, simulate
-from joda.hidden.truth import Joint, Truth
+from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
 from joda.measured.runs import Run
 
 TO_LOW = ("magnetic_return_to_low_end", "spring_loaded_snap_detent_to_low_end")
 TO_HIGH = ("magnetic_return_to_high_end", "spring_loaded_snap_detent_to_high_end")
-KNOCKING = "end_stop_restitution"
 LATE = "actuation_delay"
 TIMED = "periodic_disturbance"
 
@@ -110,12 +109,12 @@ def move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: b
 
 def _draws(names: Sequence[str], forced: bool) -> tuple[tuple[Draw, ...], tuple[Draw, ...]]:
     if forced:
-        return KNOCKS if KNOCKING in names else FORCED
-    return FLICKS if KNOCKING in names else FREE
+        return IMPACTS if RESTITUTION_EFFECT in names else FORCED
+    return FLICKS if RESTITUTION_EFFECT in names else FREE
 
 
 def _ground(names: Sequence[str], one: Draw) -> Ground:
-    if KNOCKING in names:
+    if RESTITUTION_EFFECT in names:
         return Ground((0.03, 0.97), (0.0, 0.0))
     if LATE in names:
         return Ground((0.2, 0.8), (0.1 * GUARD, 0.1 * GUARD), 0.15)
@@ -145,7 +144,7 @@ def _end(
         end = min(end, int(np.max(np.flatnonzero(v), initial=0)) + after)
     near = np.minimum(q - joint.lo, joint.hi - q) <= 1.01 * h * np.abs(v)
     drawn = any(name in TO_LOW + TO_HIGH for name in names)
-    if KNOCKING in names or (drawn and forced) or not near.any():
+    if RESTITUTION_EFFECT in names or (drawn and forced) or not near.any():
         return end
     return min(end, int(np.argmax(near)) + after * drawn)
 

@@ -128,7 +128,7 @@ FORCED: tuple[tuple[Draw, ...], tuple[Draw, ...]] = (
     (hand(1.2), hand(0.6), ramp, release),
 )
 """Of the runs to learn from, and of those held out."""
-KNOCKS: tuple[tuple[Draw, ...], tuple[Draw, ...]] = (
+IMPACTS: tuple[tuple[Draw, ...], tuple[Draw, ...]] = (
     (hand(2.5), hand(1.2), ramp, release, release, release, release, release),
     (hand(1.2), release, release, release),
 )

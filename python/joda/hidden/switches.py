@@ -19,10 +19,9 @@ from joda.hidden.motions import Draw, drop, flick, hand, ramp
 from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Sampler
-from joda.hidden.truth import Joint, Truth
+from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
 
 WEIGHTY = ("load_dependent_friction",)
-KNOCKING = "end_stop_restitution"
 TIMED = "periodic_disturbance"
 
 
@@ -71,7 +70,7 @@ def _move(rng: np.random.Generator, truth: Truth, names: Sequence[str], forced: 
         trembling(hand(1.5, (5.0, 15.0)), 0.2, (1.0, 3.0)),  # which no sampling shows if quicker
     )
     left: tuple[Draw, ...] = (toss(0.8), flick(0.5), drop, flick(1.0))
-    if KNOCKING in names:
+    if RESTITUTION_EFFECT in names:
         pushed, left = (shove((0.3, 0.8), 4.0), press((0.0, 0.5), 4.0)), (toss(1.5),)
     draws = pushed if forced else left
     session = Session(

@@ -9,6 +9,8 @@ from joda.hidden.laws import Array, Law, State
 from joda.hidden.masses import Attached, Behind
 from joda.hidden.stops import Stop
 
+RESTITUTION_EFFECT = "end_stop_restitution"
+"""Name of the effect that a joint shows only at the ends of its range."""
 RESTITUTION = 0.135
 """Of the base's ends: exp(-2), as of MuJoCo's limit, critically damped and never pulling."""
 

@@ -38,11 +38,11 @@ AGREE = 0.8
 FORCE = 8
 """Column of the rows: residual force; the next is its standard deviation."""
 COLUMNS = 13
-KNOCK = 12
+IMPACT = 12
 """Column of the rows: whether the joint is at an end of its range in the window."""
 MOSTLY = 0.8
 """Part of what is beyond the noise at ends from which speed, direction, time and load are told by
-other windows alone: a knock has all of these, but by its place."""
+other windows alone: an impact has all of these, but by its place."""
 LEFT = 0.5
 """Part of what is beyond the noise that a mean force must explain to be told."""
 
@@ -112,9 +112,9 @@ def failing(rows: Array) -> list[Failing]:
     values, found = rows[:, :5], rows[:, 5:]
     beyond = np.maximum(found[:, 2] - found[:, 1], 0.0)
     rest = np.ones(len(rows), bool)
-    knocks = rows[:, KNOCK] > 0
-    if beyond[knocks].sum() > MOSTLY * beyond.sum():
-        rest = ~knocks
+    impacts = rows[:, IMPACT] > 0
+    if beyond[impacts].sum() > MOSTLY * beyond.sum():
+        rest = ~impacts
     out = _by("position", values[:, 0], found, beyond)
     others: tuple[By, ...] = ("velocity", "direction", "time", "load")
     for column, by in enumerate(others, 1):
@@ -152,7 +152,7 @@ def _tells(window: Window, sigma: float) -> bool:
 
 def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
     """The same of pieces of whole runs, with the whole run's force, NaN if that is long, and each
-    its part of what that force explains; none is a knock, which is not what is missed there."""
+    its part of what that force explains; none is an impact, which is not what is missed there."""
     rows = []
     for run, sigma, path in zip(measured.runs, measured.sigma, paths, strict=True):
         there = np.flatnonzero(~np.isnan(path))

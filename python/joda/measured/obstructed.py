@@ -23,7 +23,7 @@ Measurement = Run | QuasiStatic
 
 ROOM = 3.0
 """How near a contact, in noises of the position, counts as within it."""
-TOLD = 3
+MANY = 3
 """How many contacts are told, those with the largest force first."""
 
 
@@ -91,14 +91,14 @@ def clear_of_contacts(
     if not left:
         refusal = (
             f"{told}; that is where {_files(read)} lie, and a replay of the joint by itself would "
-            f"be another motion; {MEND}."
+            f"be another motion; {REMEDY}."
         )
         raise JodaError(" ".join(filter(None, [barred, refusal])))
-    notes.append(f"{told}; left out there: {', '.join(lost)}. {MEND[0].upper()}{MEND[1:]}.")
+    notes.append(f"{told}; left out there: {', '.join(lost)}. {REMEDY[0].upper()}{REMEDY[1:]}.")
     return Clear(left, contacts, [*notes, *filter(None, [barred])], barred)
 
 
-MEND = (
+REMEDY = (
     "if the real joint is free there, move the geoms apart or exclude the pair "
     '(<contact><exclude body1="..." body2="..."/></contact>)'
 )
@@ -119,7 +119,7 @@ def _barred(barrier: Barrier, read: Sequence[Measurement], contacts: Sequence[Co
         return ""
     where = "; ".join(
         f"{pair} from s = {one.interval[0]:.3f} to {one.interval[1]:.3f}"
-        for pair, one in list(pairs.items())[:TOLD]
+        for pair, one in list(pairs.items())[:MANY]
     )
     return (
         f"The scene blocks joint '{barrier.joint.name}' where it was measured to move: {where}, "
@@ -166,9 +166,9 @@ def _touching(contacts: Sequence[Contact], joint: Joint) -> str:
         f"{_pair(one)} from s = {one.interval[0]:.3f} to {one.interval[1]:.3f} "
         f"({one.path[0]:.4g} to {one.path[1]:.4g} {joint.unit}), with up to {one.force:.3g} "
         f"{joint.force_unit}"
-        for one in hardest[:TOLD]
+        for one in hardest[:MANY]
     )
-    more = f"; and {len(contacts) - TOLD} contacts more" if len(contacts) > TOLD else ""
+    more = f"; and {len(contacts) - MANY} contacts more" if len(contacts) > MANY else ""
     return f"In the scene joint '{joint.name}' is not free: {told}{more}"
 
 
@@ -186,4 +186,4 @@ def _pair(one: Contact) -> str:
 
 def _files(read: Sequence[Measurement]) -> str:
     names = [one.name for one in read]
-    return ", ".join(names[:TOLD]) + (f" and {len(names) - TOLD} more" * (len(names) > TOLD))
+    return ", ".join(names[:MANY]) + (f" and {len(names) - MANY} more" * (len(names) > MANY))

@@ -70,28 +70,28 @@ class Offline:
         lacking = unmet(wanted, last.behaviour, task.context)
         if not lacking:
             return Answer(None, recognised=found)
-        mended = last.proposal
+        adjusted = last.proposal
         if slow := [limit for name, limit in _slow(wanted) if name in lacking]:
-            mended = _softer(mended, task.context, last, min(slow))
+            adjusted = _softer(adjusted, task.context, last, min(slow))
         if "free" in lacking:
-            mended = _lighter(mended, task.context, last)
+            adjusted = _lighter(adjusted, task.context, last)
         if "takes" in lacking:
-            mended = _less_damped(mended, task.context, wanted)
+            adjusted = _less_damped(adjusted, task.context, wanted)
         if lacking.keys() - {"soft", "arrives"}:
-            mended = self._mended(mended, task, wanted)
-        return Answer(None if mended == last.proposal else mended, recognised=found)
+            adjusted = self._adjusted(adjusted, task, wanted)
+        return Answer(None if adjusted == last.proposal else adjusted, recognised=found)
 
-    def _mended(self, proposal: Proposal, task: Task, wanted: Sequence[Requirement]) -> Proposal:
+    def _adjusted(self, proposal: Proposal, task: Task, wanted: Sequence[Requirement]) -> Proposal:
         """With strengths that fulfil the requirements, or further effects where none can."""
         arguments = task.context, task.templates, wanted, self.key
-        mended, hopeless = adjusted_strengths(proposal, *arguments)
+        adjusted, hopeless = adjusted_strengths(proposal, *arguments)
         added = [part for name in sorted(hopeless & WISHED.keys()) for part in WISHED[name]]
         if added:
             there = {_place(effect) for effect in proposal.effect_proposals}
             more = _effects(added, task.context, wanted, 0.3)
             more = tuple(effect for effect in more if _place(effect) not in there)
-            mended, _ = adjusted_strengths(_with(proposal, more), *arguments)
-        return mended
+            adjusted, _ = adjusted_strengths(_with(proposal, more), *arguments)
+        return adjusted
 
     def _revised(self, task: Task, last: Turn) -> Proposal:
         """What the user complains about is changed; else what the user wishes is added."""
@@ -123,7 +123,7 @@ class Offline:
             others = [e for e in stated.effect_proposals if not CLICKS.search(e.effect_name)]
             clicks = _effects(WISHED["clicks"], task.context, wanted, 0.3)
             stated = _with(stated.model_copy(update={"effect_proposals": tuple(others)}), clicks)
-        return self._mended(stated, task, wanted)
+        return self._adjusted(stated, task, wanted)
 
     def _first(self, task: Task, kind: Archetype, found: Recognition) -> Proposal:
         context = task.context

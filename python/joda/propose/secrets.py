@@ -16,7 +16,7 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 HIDDEN = "[secret]"
-UNTOLD = "[an answer that repeats a secret, not shown]"
+WITHHELD = "[an answer that repeats a secret, not shown]"
 TOO_LONG = "[an answer of more than two million characters, not shown]"
 LONGEST = 2 * 10**6
 """Characters of an answer; none of use is longer."""
@@ -58,7 +58,7 @@ def without(said: str, secrets: list[str]) -> str:
         for form in _forms(secret):
             said = said.replace(form, HIDDEN)
         said = _without_parts(said, secret)
-    return UNTOLD if any(_disguised(said, secret) for secret in secrets) else said
+    return WITHHELD if any(_disguised(said, secret) for secret in secrets) else said
 
 
 def _forms(secret: str) -> set[str]:

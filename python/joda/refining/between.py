@@ -103,6 +103,8 @@ class Between:
         segments, ends = self.shooting.engine.segments(length), self._ends(theta)
         over = self._meet(segments, theta[ends], CLEAR + STEPS * move)
         over &= segments.count >= FEWEST
+        if not over.any():
+            return theta
         if segments.separable:
             segments, over = segments.only(over), np.ones(int(over.sum()), bool)
         estimator = self.shooting.engine.estimator(segments, over)
@@ -168,4 +170,4 @@ class Between:
     def _loss(self, estimator: SegmentEstimator, theta: Array) -> float:
         """Of segments, and of being off the first numbers."""
         off = (theta - self.parameters.start) / self.parameters.prior_std
-        return estimator.started(self.shooting.mover(theta)).loss + float(off @ off)
+        return estimator.started(self.shooting.simulator(theta)).loss + float(off @ off)

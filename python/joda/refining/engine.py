@@ -60,7 +60,7 @@ class Engine(Protocol):
     @property
     def range(self) -> tuple[float, float]: ...  # noqa: D102
 
-    def mover(self, parameters: Parameters, theta: Array) -> Simulator:
+    def simulator(self, parameters: Parameters, theta: Array) -> Simulator:
         """It with numbers of the joint's profile."""
         ...
 
@@ -106,7 +106,7 @@ class JointEngine:
             solref=(old.solref[0], old.solref[1] * ratio),
         )
 
-    def mover(self, parameters: Parameters, theta: Array) -> JointSimulator:
+    def simulator(self, parameters: Parameters, theta: Array) -> JointSimulator:
         """See `Engine`."""
         profile = self.whole(parameters.written(theta, exact=True))
         # a restitution of both ends is in the solver parameters already

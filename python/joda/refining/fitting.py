@@ -170,7 +170,7 @@ class Problem:
         runs."""
         for estimator in (self.short, self.long, self.whole):
             losses = [
-                estimator.started(shooting.mover(fit.theta)).loss
+                estimator.started(shooting.simulator(fit.theta)).loss
                 for fit, _, shooting in (one, other)
             ]
             usual = max(min(losses) / max(estimator.samples, 1.0), 1.0)

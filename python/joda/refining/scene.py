@@ -30,7 +30,7 @@ are larger ones, and they lead nowhere."""
 
 
 @dataclass(frozen=True)
-class SceneMover:
+class SceneSimulator:
     """A scene with numbers of a joint's profile.
 
     Attributes:
@@ -100,7 +100,7 @@ class SceneJudge(SegmentEstimator):
         central: bool,
     ) -> tuple[Array, Array]:
         """See `SegmentEstimator.slopes`."""
-        assert isinstance(simulator, SceneMover)
+        assert isinstance(simulator, SceneSimulator)
         segments, k = self.segments, len(x)
         jumps = np.flatnonzero(simulator.jumps[:k])
         smooth = np.setdiff1d(np.arange(k), jumps)
@@ -130,7 +130,7 @@ def _way(make: Make, x: Array, number: int, step: float) -> Numbers:
     them are proportional to it."""
     off = step * np.eye(len(x))[number]
     up, down = make(x + off), make(x - off)
-    assert isinstance(up, SceneMover) and isinstance(down, SceneMover)
+    assert isinstance(up, SceneSimulator) and isinstance(down, SceneSimulator)
     way: Numbers = jax.tree.map(lambda a, b: (a - b) / (2 * step), up.numbers, down.numbers)
     return way
 
@@ -170,7 +170,7 @@ class SceneEngine:
         usual = np.maximum(np.median(noises, axis=0), FINEST * spans)
         return np.asarray(np.append(1.0, usual[1:] / self.sigma))
 
-    def mover(self, parameters: Parameters, theta: Array) -> SceneMover:
+    def simulator(self, parameters: Parameters, theta: Array) -> SceneSimulator:
         """See `Engine`."""
         profile = parameters.written(theta, exact=True)
         changed = {}
@@ -183,7 +183,7 @@ class SceneEngine:
             changed["jnt_solref"][self.joint, 1] *= np.exp(ratio)
         name = joint_name(self.scene.model, self.joint)
         numbers = self.scene.numbers({name: profile}, changed)
-        return SceneMover(self.scene, numbers, self.units, _jumps(parameters))
+        return SceneSimulator(self.scene, numbers, self.units, _jumps(parameters))
 
     def segments(self, length: float) -> Segments:
         """See `Engine`."""

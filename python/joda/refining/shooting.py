@@ -40,9 +40,9 @@ class Shooting:
         """The same joint and runs with other numbers."""
         return Shooting(self.engine, parameters)
 
-    def mover(self, theta: Array) -> Simulator:
+    def simulator(self, theta: Array) -> Simulator:
         """The joint with its numbers."""
-        return self.engine.mover(self.parameters, theta)
+        return self.engine.simulator(self.parameters, theta)
 
     def estimator(self, length: float) -> SegmentEstimator:
         """Of segments of some length, s."""
@@ -52,23 +52,23 @@ class Shooting:
     def started(self, estimator: SegmentEstimator, theta: Array) -> Found:
         """Starts of segments that suit the joint with its numbers best: those that still stray are
         tried at places around, too."""
-        mover = self.mover(theta)
-        found, segments = estimator.started(mover), estimator.segments
+        simulator = self.simulator(theta)
+        found, segments = estimator.started(simulator), estimator.segments
         stray = estimator.counts & (found.squares > STRAY * segments.count)
         if not (segments.separable and stray.any()):
             return found
         part = segments.only(stray)
         own = SegmentEstimator(part, np.ones(len(part.at), bool))
         begun = best = found.start[stray]
-        least = own.squares(mover, begun)[1]
+        least = own.squares(simulator, begun)[1]
         for state in product(AROUND, AROUND):
             trial = begun + part.prior_std * state
-            squares = own.squares(mover, trial)[1]
+            squares = own.squares(simulator, trial)[1]
             best = np.where((squares < least)[:, None], trial, best)
             least = np.minimum(squares, least)
         start = found.start.copy()
         start[stray] = best
-        anew = estimator.started(mover, near=start)
+        anew = estimator.started(simulator, near=start)
         better = anew.squares < found.squares
         squares = np.minimum(anew.squares, found.squares)
         start = np.where(better[:, None], anew.start, found.start)
@@ -94,19 +94,19 @@ class Shooting:
             held: about which values; None: those at first.
         """
         unknowns = self.unknowns(held, prior_std)
-        start = estimator.started(self.mover(theta)).start
+        start = estimator.started(self.simulator(theta)).start
 
         def heard(fit: Found) -> None:
             report(fit.x, self.robust(estimator, fit))
 
-        return estimator.fit(self.mover, unknowns, theta, start, iterations, report=heard).x
+        return estimator.fit(self.simulator, unknowns, theta, start, iterations, report=heard).x
 
     def covariance(self, estimator: SegmentEstimator, theta: Array) -> Array:
         """Of the numbers' errors, from segments and the prior, shape (n, n)."""
         prior_std, unknowns = self.parameters.prior_std, self.unknowns()
-        start = estimator.started(self.mover(theta)).start
-        H = estimator.linear(self.mover, unknowns, theta, start, cauchy_scale=np.inf).normal()[0]
-        return np.asarray(np.linalg.inv(H + np.diag(prior_std**-2.0)))
+        start = estimator.started(self.simulator(theta)).start
+        about = estimator.linear(self.simulator, unknowns, theta, start, cauchy_scale=np.inf)
+        return np.asarray(np.linalg.inv(about.normal()[0] + np.diag(prior_std**-2.0)))
 
     def rms(self, estimator: SegmentEstimator, theta: Array) -> float:
         """RMS misfit of segments, from starts that are fitted, rad or m."""
@@ -115,8 +115,8 @@ class Shooting:
 
     def misfit(self, estimator: SegmentEstimator, theta: Array) -> Array:
         """Predicted minus measured positions, from starts that are fitted, rad or m, shape (n,)."""
-        mover = self.mover(theta)
-        return estimator.segments.misfit(mover, estimator.started(mover).start)
+        simulator = self.simulator(theta)
+        return estimator.segments.misfit(simulator, estimator.started(simulator).start)
 
     def unknowns(self, mean: Array | None = None, prior_std: Array | None = None) -> Unknowns:
         """The numbers, about which values and how well they are known; None: as at first."""

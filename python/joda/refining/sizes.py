@@ -114,7 +114,7 @@ def _farther(shooting: Shooting, estimator: SegmentEstimator, weak: Profile) -> 
 
 
 def _loss(estimator: SegmentEstimator, shooting: Shooting, x: Array) -> float:
-    return estimator.started(shooting.mover(x)).loss
+    return estimator.started(shooting.simulator(x)).loss
 
 
 def _feasible(parameters: Parameters, x: Array) -> bool:

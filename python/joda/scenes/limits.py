@@ -17,10 +17,10 @@ import numpy as np
 from joda._core import stop_damping
 from joda.scenes.mjcf import quoted
 
-KNOCK_STEPS = 16
-"""How many timesteps a knock at a stop with a restitution lasts without damping: as kKnockSteps in
+IMPACT_STEPS = 16
+"""How many timesteps a knock at a stop with a restitution lasts without damping: as kImpactSteps in
 cpp/end_stop.h."""
-STIFFNESS = (np.pi / KNOCK_STEPS) ** 2
+STIFFNESS = (np.pi / IMPACT_STEPS) ** 2
 """Of such a stop, times the timestep squared: as kStopStiffness there."""
 IMPEDANCE = 0.99
 """As kStopImpedance there."""
@@ -114,7 +114,7 @@ def rebounding(restitution: float, timestep: float) -> tuple[float, float]:
 
     Args:
         restitution: speed after a knock divided by the speed before, 0 <= restitution < 1.
-        timestep: s; a knock lasts `KNOCK_STEPS` of these without damping.
+        timestep: s; a knock lasts `IMPACT_STEPS` of these without damping.
     """
     # documented: the stiffness is multiplied by d / d^2 and the damping by 1 / d; then, with the
     # impedance d, the row makes the share d of the acceleration

@@ -25,7 +25,7 @@ LINE = "path://M0,3 H30 V7 H0 Z"
 """The legend's sign for a line."""
 SHOWN = 500
 """Most points of a line in a chart."""
-KNOCK = 0.005
+IMPACT = 0.005
 """So near an end of the range, as a part of it, a force may leave the frame."""
 ROOM = 0.05
 """Above and below what is shown, as a part of its height."""
@@ -163,7 +163,7 @@ def hand(now: Motion | None, before: Motion | None, joint: Joint) -> dict[str, A
 def _off_the_stops(motion: Motion, joint: Joint) -> NDArray[np.bool_]:
     """Where the joint is off the ends of its range by more than what a stop yields in a knock."""
     lo, hi = joint.range
-    return np.abs(motion.position - (lo + hi) / 2) < (0.5 - KNOCK) * (hi - lo)
+    return np.abs(motion.position - (lo + hi) / 2) < (0.5 - IMPACT) * (hi - lo)
 
 
 def _scale(values: Array) -> dict[str, float | None]:

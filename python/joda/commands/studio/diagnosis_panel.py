@@ -58,9 +58,9 @@ class DiagnosisPanel:
         with self._body:
             for sentence in shared.outcome:
                 ui.label(sentence).classes("outcome")
-            told_before = bool(shared.outcome)
+            reported_before = bool(shared.outcome)
             if shared.diagnosis is None:
-                if not told_before:
+                if not reported_before:
                     ui.label(
                         "Diagnose compares the model with the runs and says which physical effect "
                         "it lacks."
