@@ -1,4 +1,4 @@
-"""The house as its imports have it: packages in layers, and the rooms from runs to a verdict."""
+"""The architecture as imports have it: packages in layers, and modules from runs to a verdict."""
 
 import ast
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ def page() -> str:
     way = longest("diagnosis.verdict", "measured.runs")
     return "\n\n".join(
         [
-            "# The house",
+            "# Architecture",
             "Drawn from the imports at each build. Everything imports downward only "
             "(`tests/test_layers.py`); an arrow that others already imply is left out.",
             _drawing(packages),

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from refine_table import cabinet, missed, planted, problem_of, recovery
 
+from joda.refining.fitting import ENDING
+
 
 @pytest.mark.parametrize("seed", range(3))
 def test_nine_iterations_bring_the_papers_door_down_to_the_noise(seed):
@@ -33,12 +35,15 @@ def test_an_interruption_keeps_the_best_so_far():
     found, start, train, _ = cabinet(0)
     problem = problem_of(found, start, train)
 
+    heard = []
+
     def stop(stage, number, rms):
+        heard.append(stage)
         if number == 2:
             raise KeyboardInterrupt
 
     result = problem.fit(9, report=stop)
-    assert result.interrupted
+    assert result.interrupted and heard[2:] == [ENDING]
     assert len(result.history) == 2
     assert not np.array_equal(result.theta, problem.parameters.start)
 

@@ -15,9 +15,10 @@ from scenes import attached, model_of, write
 from scipy.optimize import least_squares
 
 from joda import JodaError, Profile, attach, compare, context, refine
-from joda.commands.refine import Refined
+from joda.commands.refine import Refined, _beyond, _settled
 from joda.component import Component
 from joda.effects import GravityOffset
+from joda.estimation.profile_parameters import Parameters
 from joda.measured.quasi_static import static_force
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run
@@ -354,6 +355,22 @@ def test_a_curve_of_a_tenth_of_the_force_is_asked_about(tmp_path):
     done = command(tmp_path, "curve.csv")
     assert (done.returncode, done.stdout) == (2, "")
     assert "10 times the measured one: see to its unit first" in done.stderr
+
+
+def test_inertia_and_gravity_that_stay_are_not_written(tmp_path):
+    scene = write(tmp_path, CABINET)
+    found, model = context(scene, "door"), model_of(scene)
+    parameters = Parameters(cabinet_profile(found, 2.5, 0.4), ("inertia", "gravity"))
+    theta = np.array([0.0006, 2e-5, -1e-4])
+    as_it_was = _settled(parameters, theta)
+    assert not as_it_was.any()
+    assert not parameters.written(as_it_was).effects
+    also, said = _beyond(parameters, as_it_was, model, 0, found)
+    assert not also
+    assert said == ["Inertia: as it is, 0.1743 kg·m², within 0.1 %.", "Gravity: as it is."]
+    theta = np.array([0.002, 2e-5, 0.03])
+    assert np.array_equal(_settled(parameters, theta), theta)
+    assert "armature" in _beyond(parameters, theta, model, 0, found)[0]
 
 
 @pytest.mark.long

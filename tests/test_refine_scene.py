@@ -261,6 +261,10 @@ def test_where_the_scene_cannot_be_simulated_it_is_said(tmp_path):
     found, (note,) = together(*numbered(other), [moving], [], False, None)
     assert not found and "fitted by itself, not in its scene: " in note and "'ctrl:m'" in note
     assert together(*numbered(other), [moving], [], True, True)[0]  # --passive
+    alone = tmp_path / "alone.csv"
+    alone.write_text(moving.read_text().replace("position:elbow", "elsewhere"))
+    with pytest.raises(JodaError, match=r"alone\.csv: no column 'position:elbow' beside "):
+        together(*numbered(other), [alone], [], True, True)
     slow = '<general name="m" joint="shoulder" dyntype="filter" dynprm="0.1"/>'
     other = mujoco.MjModel.from_xml_path(str(arm(tmp_path, TRUE, motor=slow)))
     with pytest.raises(JodaError, match=r"actuators have a state \(dyntype\), which no run tells"):

@@ -20,23 +20,26 @@ def simulate(
     scene: Model,
     joint: Joint,
     release: Annotated[
-        str | None, typer.Option(help="Let it go here (rad or m); alone: half-way.")
+        str | None, typer.Option(help="Let it go here (rad or m); without a value: half-way.")
     ] = None,
     push: Annotated[
         str | None,
-        typer.Option(help="Push with this force (N·m or N), see --for; alone: 10 N at the edge."),
+        typer.Option(
+            help="Push with this force (N·m or N), see --for; without a value: 10 N at the edge."
+        ),
     ] = None,
     impulse: Annotated[
         str | None,
         typer.Option(
-            help="This impulse (N·m·s or N·s) within 20 ms; alone: through the range in 1 s."
+            help="This impulse (N·m·s or N·s) within 20 ms; without a value: through "
+            "the range in 1 s."
         ),
     ] = None,
     hand: Annotated[
         str | None,
         typer.Option(
             help="A hand takes it to these positions (rad or m, with commas) one after the other; "
-            "alone: opens it and shuts it."
+            "without a value: opens it and shuts it."
         ),
     ] = None,
     open: Annotated[
@@ -53,20 +56,24 @@ def simulate(
         float | None, typer.Option("--for", help="How long a push lasts (s) [default: all along].")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(help="Of the hand (rad/s or m/s) [default: range / 3 s].")
+        float | None, typer.Option(help="Speed of the hand (rad/s or m/s) [default: range / 3 s].")
     ] = None,
     strength: Annotated[
-        float | None, typer.Option(help="Of the hand (N·m or N) [default: 60 N at the lever arm].")
+        float | None,
+        typer.Option(help="Largest force of the hand (N·m or N) [default: 60 N at the lever arm]."),
     ] = None,
     stiffness: Annotated[
         float | None,
-        typer.Option(help="Of the hand (N·m/rad or N/m) [default: 1000 N/m at the lever arm]."),
+        typer.Option(
+            help="Stiffness of the hand (N·m/rad or N/m) [default: 1000 N/m at the lever arm]."
+        ),
     ] = None,
     pause: Annotated[
         float | None, typer.Option(help="How long the hand rests at each position (s).")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Of all (s) [default: 3, or until hand or robot is done].")
+        float | None,
+        typer.Option(help="Length of the run (s) [default: 3, or until hand or robot is done]."),
     ] = None,
     output: Annotated[
         Path | None,

@@ -44,7 +44,7 @@ def refine(
     check: Annotated[
         list[Path] | None, typer.Option(help="A run that is only compared, not fitted.")
     ] = None,
-    iterations: Annotated[int, typer.Option(min=1, help="At most so many.")] = 60,
+    iterations: Annotated[int, typer.Option(min=1, help="Most iterations of a fit.")] = 120,
     fit: Annotated[
         str,
         typer.Option(

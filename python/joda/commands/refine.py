@@ -45,6 +45,9 @@ from joda.threads import one_blas_thread
 Array = NDArray[np.float64]
 
 ITERATIONS = 120
+AS_IT_WAS = 1e-3
+"""Change of the inertia, as a part of it, and of gravity's force, in units of its largest, that is
+none."""
 ELSEWHERE = 5.0
 """How many times as much as what was fitted is what was held out missed at most."""
 STILL: tuple[Kind, ...] = ("values", "intervals", "strengths")
@@ -219,6 +222,7 @@ def refine(
     first, was = parameters, problem.paths(parameters.start)
     result = problem.fit(iterations, lambda stage, k, rms: progress(stage, k, iterations, rms))
     parameters = problem.parameters
+    result = replace(result, theta=_settled(parameters, result.theta))
     after = parameters.written(result.theta)
     refined = all_of(after)
     body = by_itself.body(parameters, result.theta) if set(fit) - set(STILL) else None
@@ -315,6 +319,16 @@ def _of_one_kind(measured: Sequence[Run | QuasiStatic]) -> bool:
     return bool(curves)
 
 
+def _settled(parameters: Parameters, theta: Array) -> Array:
+    """The numbers, inertia and gravity as they were where they are as good as that."""
+    out = theta.copy()
+    for kind in ("inertia", "gravity"):
+        own = np.array([slot.kind == kind for slot in parameters.slots])
+        if np.all(np.abs(theta[own] - parameters.start[own]) < AS_IT_WAS):
+            out[own] = parameters.start[own]
+    return out
+
+
 def _beyond(
     parameters: Parameters, theta: Array, model: mujoco.MjModel, joint: int, found: Context
 ) -> tuple[dict[str, str], list[str]]:
@@ -330,7 +344,9 @@ def _beyond(
         armature = model.dof_armature[model.jnt_dofadr[joint]] + inertia - found.equivalent_inertia
         unit = "kg·m²" if found.joint.type == "hinge" else "kg"
         said.append(f"Inertia: {found.equivalent_inertia:.4g} → {inertia:.4g} {unit}.")
-        if armature >= 0:
+        if parameters.number(theta, "inertia") == 0.0:
+            said[-1] = f"Inertia: as it is, {found.equivalent_inertia:.4g} {unit}, within 0.1 %."
+        elif armature >= 0:
             also["armature"] = f"{armature:.6g}"
         else:
             said[-1] = (
@@ -340,6 +356,8 @@ def _beyond(
             also["armature"] = "0"
     if "gravity" in parameters.kinds:
         a, b = (parameters.number(theta, "gravity", k) for k in (0, 1))
+        if not (a or b):
+            return also, [*said, "Gravity: as it is."]
         what = f"{a:.4g} cos q + {b:.4g} sin q N·m" if found.joint.type == "hinge" else f"{a:.4g} N"
         said.append(
             f"Gravity's force on the joint lacks {what}: it is in the profile as a gravity_offset; "

@@ -87,6 +87,12 @@ def read_scene_run(
     first = there[0] if joint is None and there else joint
     if first is None:
         raise JodaError(f"{path}: no column 'position:JOINT' of a hinge or slide of the model.")
+    if there and first not in there:
+        others = ", ".join(f"'position:{joint_name(model, k)}'" for k in there)
+        raise JodaError(
+            f"{path}: no column 'position:{joint_name(model, first)}' beside {others}; a log of a "
+            "scene needs the position of the joint that is fitted."
+        )
     joints = (first, *(k for k in there if k != first))
     if missing := None if passive else unknown_command(model, path, joints):
         raise JodaError(

@@ -45,6 +45,8 @@ TURNS, SETTLED = 2, 0.98
 left for the last turn."""
 MANY = 20
 """Fewest iterations that are to be had for sizes to be fitted first."""
+ENDING = "interrupted; ending with the best so far"
+"""What is reported then as a stage."""
 STUCK = 1.5
 """Short segments that are missed by more than so many times the noise: the fit may have stuck. Of a
 scene, whose simulation takes long, it is only then tried once more."""
@@ -251,6 +253,7 @@ class Problem:
                     self._best = min(before, self._best, key=self.rms)
         except KeyboardInterrupt:
             interrupted = True
+            report(ENDING, iterations, history[-1][1] if history else 0.0)
         covariance = self.shooting.covariance(self.long, self._best)
         return Fit(self._best, covariance, tuple(history), interrupted)
 
