@@ -9,7 +9,7 @@ from test_scene_contacts import pushed
 
 from joda import attach, compare, context
 from joda.measured.comparison import _places
-from joda.measured.failing import COLUMNS, KNOCK, Failing, failing
+from joda.measured.failing import COLUMNS, IMPACT, Failing, failing
 from joda.measured.reading import read_measured
 from joda.measured.run_files import read_run
 from joda.profile import Profile
@@ -116,7 +116,7 @@ def test_what_is_missed_in_knocks_is_told_by_place_alone():
     """All knocks at the high end come in one direction, at one time, fast; the rest is missed by
     friction in the other."""
     knocks = rows(-3.0, 0.02, ways=(1.0,), count=20)
-    knocks[:, 0], knocks[:, 3], knocks[:, KNOCK] = 0.99, 5.0, 1.0
+    knocks[:, 0], knocks[:, 3], knocks[:, IMPACT] = 0.99, 5.0, 1.0
     rest = rows(0.7, 0.02, ways=(-1.0,))
     rest[:, 5:8] = 1.5, 40, 90.0
     found = failing(np.concatenate([knocks, rest]))
