@@ -9,13 +9,8 @@ from test_compare import door, runs_of, scene_of
 from joda.component import Component
 from joda.diagnosis.adding import Error
 from joda.diagnosis.paired_test import improves, risen
-from joda.diagnosis.plausible import (
-    EXCESS,
-    Needs,
-    implausible,
-    unseen_place,
-    unseen_shape,
-)
+from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
+from joda.diagnosis.settings import SETTINGS
 from joda.effects import StribeckFriction
 from joda.measured.reading import read_measured
 from joda.measured.visited import unvisited, unvisited_part, visited_share
@@ -61,7 +56,7 @@ def measured(tmp_path_factory):
 def test_a_force_that_nothing_needs_is_refused(measured):
     needs = Needs(measured).force
     assert 1.0 < needs < 200.0  # pushes of some N·m
-    for force, absurd in ((2 * needs, False), (2 * EXCESS * needs, True)):
+    for force, absurd in ((2 * needs, False), (2 * SETTINGS.naming.force_times * needs, True)):
         effect = StribeckFriction(velocity=0.1, y=(force, force))
         reason = implausible(
             Needs(measured), measured.profile.with_effect(effect), "stribeck_friction"

@@ -15,9 +15,10 @@ from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
 from joda.diagnosis.hypotheses.effects import KNOTS, from_effects
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypothesis_fits import beside, joined, price
-from joda.diagnosis.ranking import WORST, evidence, hopeful, weigh
+from joda.diagnosis.ranking import evidence, hopeful, weigh
 from joda.diagnosis.search import NARROWED, WELLS, _shown_without_impacts, narrowed, rank
 from joda.diagnosis.selection import Evidence, Selection, closer_counts, decide, doubted
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.verdict import diagnosed
 from joda.effects import EndStopRestitution, QuadraticDamping
 from joda.effects.guesses import Units
@@ -226,7 +227,7 @@ def test_a_well_is_tried_where_the_other_was_found(baseline):
 
 def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
     assert weigh(ranked).verdict == weigh(ranked, wholly=True).verdict == "missing_effect"
-    more = replace(ranked, level=2 * WORST)
+    more = replace(ranked, level=2 * SETTINGS.selection.noise_square)
     strange = weigh(more, wholly=True)
     assert strange.verdict == "unexplained"
     assert strange.probabilities[0] <= 0.5  # and an unknown one is as likely

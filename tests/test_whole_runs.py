@@ -8,7 +8,8 @@ from hidden_cases import read
 from lids import RATE, SCENE, SIGMA
 
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.free_runs import BEYOND, worst
+from joda.diagnosis.free_runs import worst
+from joda.diagnosis.settings import SETTINGS
 from joda.hidden import draw
 from joda.measured.reading import read_measured
 from joda.measured.replay import Start
@@ -50,7 +51,7 @@ def test_errors_explain_the_runs_of_a_right_model_and_not_those_of_a_wrong_one(f
     print(seed)
     train, _ = read(draw(seed, None, forced))
     baseline = fit_baseline(train)
-    assert worst(train, baseline).free < BEYOND
+    assert worst(train, baseline).free < SETTINGS.whole_runs.max_multiple
     assert len(baseline.fit.x)
     wrong = replace(baseline, fit=replace(baseline.fit, x=3.0 * baseline.fit.x))
     assert worst(train, wrong).free > worst(train, baseline).free

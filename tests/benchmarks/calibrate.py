@@ -3,10 +3,10 @@
     python tests/benchmarks hidden families --family all --cases 2 --out rows.jsonl    (hours)
     python tests/benchmarks calibrate rows.jsonl                                     (seconds)
 
-Of each family in turn: `joda.diagnosis.selection.Settings` are fitted to the other families' cases
-(coordinate descent on the mean log loss of "nothing", "none of these" and every effect) and judged
-on its own, beside those in use; then they are fitted to all of them. The rows hold the evidence of
-each case, so nothing is simulated or fitted again.
+Of each family in turn: `joda.diagnosis.settings.SelectionSettings` are fitted to the cases of the
+others (coordinate descent on the mean log loss of "nothing", "none of these" and every effect) and
+judged on its own, beside those in use; then they are fitted to all of them. The rows hold the
+evidence of each case, so nothing is simulated or fitted again.
 """
 
 import json
@@ -19,16 +19,16 @@ import numpy as np
 from hidden_figures import SURE, hides
 
 from joda.diagnosis.selection import (
-    SETTINGS,
     Evidence,
     Selection,
-    Settings,
     closer_counts,
     decide,
     doubted,
     second_counts,
 )
+from joda.diagnosis.settings import SETTINGS, SelectionSettings
 
+IN_USE = SETTINGS.selection
 FACTORS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 """By which a setting is tried to be changed."""
 ROUNDS = 4
@@ -46,12 +46,12 @@ def looks(row: dict) -> list[Evidence]:
     ]
 
 
-def decided(row: dict, settings: Settings) -> Selection:
+def decided(row: dict, settings: SelectionSettings) -> Selection:
     """What these settings say of a case, by the looks that were taken."""
     first, *more = looks(row)
     said = decide(first, settings=settings)
     if said.verdict != "missing_effect" and more:
-        again = decide(more.pop(0), settings.strictly, wholly=True, settings=settings)
+        again = decide(more.pop(0), settings.second_look, wholly=True, settings=settings)
         said = again if second_counts(said, again, settings) else said
     for closer in more:
         anew = decide(closer, settings=settings)
@@ -74,7 +74,7 @@ def names(row: dict) -> set[str]:
     return {row["effect"], *row["seal"].get("also_right", ())}
 
 
-def loss(row: dict, settings: Settings) -> float:
+def loss(row: dict, settings: SelectionSettings) -> float:
     """Minus the logarithm of the probability of what is true."""
     said = decided(row, settings)
     adequate = said.verdict == "adequate"
@@ -90,7 +90,7 @@ def loss(row: dict, settings: Settings) -> float:
     return -float(np.log(min(max(likely, LEAST), 1.0)))
 
 
-def mean_loss(rows: Sequence[dict], settings: Settings) -> float:
+def mean_loss(rows: Sequence[dict], settings: SelectionSettings) -> float:
     """Of all cases, each family counting alike."""
     families = sorted({row["family"] for row in rows})
     return float(
@@ -98,15 +98,15 @@ def mean_loss(rows: Sequence[dict], settings: Settings) -> float:
     )
 
 
-def price(settings: Settings) -> float:
+def price(settings: SelectionSettings) -> float:
     """Of being other than in use."""
-    pairs = zip(asdict(settings).values(), asdict(SETTINGS).values(), strict=True)
+    pairs = zip(asdict(settings).values(), asdict(IN_USE).values(), strict=True)
     return AWAY * sum(abs(float(np.log(new / old))) for new, old in pairs)
 
 
-def fitted(rows: Sequence[dict]) -> Settings:
+def fitted(rows: Sequence[dict]) -> SelectionSettings:
     """Settings that suit these cases best."""
-    best, least = SETTINGS, mean_loss(rows, SETTINGS)
+    best, least = IN_USE, mean_loss(rows, IN_USE)
     for _ in range(ROUNDS):
         before = least
         for name, old in asdict(best).items():
@@ -119,7 +119,7 @@ def fitted(rows: Sequence[dict]) -> Settings:
     return best
 
 
-def reported(rows: Sequence[dict], settings: Settings) -> str:
+def reported(rows: Sequence[dict], settings: SelectionSettings) -> str:
     """Figures of cases, a row of the table."""
     cells = [f"{mean_loss(rows, settings):.3f}"]
     for what in ("effect", "nothing", "outside"):
@@ -131,9 +131,9 @@ def reported(rows: Sequence[dict], settings: Settings) -> str:
     return " | ".join([*cells, f"{sum(good)}/{len(good)}"])
 
 
-def changed(settings: Settings) -> str:
+def changed(settings: SelectionSettings) -> str:
     """The numbers that are not those in use."""
-    pairs = zip(asdict(settings).items(), asdict(SETTINGS).values(), strict=True)
+    pairs = zip(asdict(settings).items(), asdict(IN_USE).values(), strict=True)
     return ", ".join(f"{name} {old:g} → {new:.3g}" for (name, new), old in pairs if new != old)
 
 
@@ -146,8 +146,8 @@ def main() -> None:
         own = [row for row in rows if row["family"] == family]
         others = [row for row in rows if row["family"] != family]
         found = fitted(others)
-        print(f"| {family} | in use | {reported(own, SETTINGS)} |")
+        print(f"| {family} | in use | {reported(own, IN_USE)} |")
         print(f"| | the others | {reported(own, found)} |   {changed(found)}", flush=True)
     found = fitted(rows)
-    print(f"| all | in use | {reported(rows, SETTINGS)} |")
+    print(f"| all | in use | {reported(rows, IN_USE)} |")
     print(f"| | all | {reported(rows, found)} |   {changed(found)}")

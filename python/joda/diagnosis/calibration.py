@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from joda.diagnosis.applied_corrections import AppliedCorrections, righted
 from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.correction_report import correction_of
-from joda.diagnosis.corrections import ANYTHING
 from joda.diagnosis.findings import Correction
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of, with_numbers
 from joda.estimation.problem import posed, segments_for
@@ -26,27 +26,6 @@ from joda.measured.measured_joint import Measured
 
 Array = NDArray[np.float64]
 
-WORTH = 40.0
-"""Gain in loss, less the price of its numbers, from which numbers are worth a word."""
-NEXT = 25.0
-"""Loss that a number must spare to be free beside the others."""
-SPARED = 3.0
-"""A number is tried without that seems to spare at most so many times that and what the least
-needed one seems to spare."""
-ALIKE = 9.0
-"""Gain in loss up to which data cannot tell one number from another, nor from an effect."""
-MOST = 0.5
-"""Part of the loss that all numbers together leave at most; of what is beyond noise, where effects
-were looked for too."""
-CALM, PART = 0.05, 0.02
-"""What numbers leave that explain all there is, per sample beyond noise; or part of the model's."""
-CLEARLY = 3.0
-"""How many of its errors, by the data alone, a number is off by at the least."""
-SURPRISE = 4.0
-"""How many of its widths a number may be off where something is left: a zero that is far off looks
-like a force beside a spring."""
-UNUSUAL = 2.0
-"""The same where an effect explains as much in its place."""
 ALSO_AN_EFFECT: NuisanceName = "force_offset"
 """A number in whose place an effect always explains as much: a constant force."""
 LEAST_FACTOR = 1e-3
@@ -141,8 +120,10 @@ class Calibration:
         """Whether no effect explains as much, or each clearly less."""
 
         def least(of: FittedHypothesis) -> float:
-            alike = ALIKE * (of.hypothesis.effect != HEAVIER)
-            return of.fit.loss + of.cost + (-ALIKE if clearly else alike)
+            alike = SETTINGS.corrections.equal_numbers * (of.hypothesis.effect != HEAVIER)
+            return (
+                of.fit.loss + of.cost + (-SETTINGS.corrections.equal_numbers if clearly else alike)
+            )
 
         return self.loss < min(map(least, candidates), default=baseline.fit.loss)
 
@@ -196,7 +177,7 @@ def _longer(measured: Measured, found: Calibration) -> Calibration:
     start = estimator.started(own.make(found.fit.x)).start
     fit = estimator.fit(own.make, own.unknowns, found.fit.x, start)
     moved = np.abs(fit.x - found.fit.x)[own.base.count :]
-    if np.any(moved > CLEARLY * found.errors):
+    if np.any(moved > SETTINGS.corrections.body_errors * found.errors):
         return found
     return replace(found, numbers=own, fit=fit)
 
@@ -216,25 +197,28 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
     whole, first = found.fitted(every.names), found.fitted(()).loss
     count = max(baseline.estimator.samples, 1.0)
     all_of_it, left = (excess(x, count) * count if beside else x for x in (first, whole.loss))
-    if first - whole.loss < WORTH or left > MOST * max(all_of_it, 0.0):
+    if (
+        first - whole.loss < SETTINGS.corrections.body_gain
+        or left > SETTINGS.corrections.max_loss_share * max(all_of_it, 0.0)
+    ):
         return None
     names, best = every.names, whole
     while names:
         tried = [tuple(one for one in names if one != name) for name in _spared(names, best)]
         fits = [found.near(fewer, (names, best)) for fewer in tried]
         fit, fewer = min(zip(fits, tried, strict=True), key=lambda pair: pair[0].loss)
-        if fit.loss - best.loss > NEXT:
+        if fit.loss - best.loss > SETTINGS.corrections.number_loss:
             break
         best, names = fit, fewer
-    if first - best.loss < WORTH + found.price * len(names):
+    if first - best.loss < SETTINGS.corrections.body_gain + found.price * len(names):
         return None
     own = every.only(names)
     widths = np.abs(best.x[baseline.base.count :]) / own.prior_stds
     off = dict(zip(names, widths, strict=True))
-    unusual = {name for name in names if off[name] > UNUSUAL}
+    unusual = {name for name in names if off[name] > SETTINGS.corrections.unusual}
     far = unusual & {ALSO_AN_EFFECT}
-    if excess(best.loss, count) > CALM:
-        far |= {name for name in names if off[name] > SURPRISE}
+    if excess(best.loss, count) > SETTINGS.corrections.calm_excess:
+        far |= {name for name in names if off[name] > SETTINGS.corrections.surprising}
     if unusual - far and _effect_instead(found, best, own, unusual):
         far |= unusual
     if far:  # they stand in for what is missing
@@ -249,7 +233,7 @@ def _spared(names: tuple[NuisanceName, ...], fit: Fit) -> list[NuisanceName]:
         return list(names)
     k = len(names)
     needed = fit.x[-k:] ** 2 / np.diag(np.linalg.pinv(fit.information, hermitian=True))[-k:]
-    most = SPARED * (needed.min() + NEXT)
+    most = SETTINGS.corrections.tried_loss * (needed.min() + SETTINGS.corrections.number_loss)
     return [name for name, loss in zip(names, needed, strict=True) if loss <= most]
 
 
@@ -322,7 +306,7 @@ def _effect_instead(
     model = fit_baseline(replace(found.measured, doubtful=usual), estimator.segments.length)
     least = min((one.fit.loss + one.cost for one in _equivalent(model)), default=np.inf)
     told = estimator.fit(own.make, own.unknowns, fit.x, fit.start).loss
-    return bool(least < told + found.price * len(unusual) - ALIKE)
+    return bool(least < told + found.price * len(unusual) - SETTINGS.corrections.equal_numbers)
 
 
 def _concluded(
@@ -334,7 +318,7 @@ def _concluded(
     starts = (coarse.start, estimator.segments.start)
     fits = (estimator.fit(own.make, own.unknowns, coarse.x, start) for start in starts)
     fit = estimator.refit(own.make, own.unknowns, min(fits, key=_loss))
-    sure = np.abs(fit.x[baseline.base.count :]) > CLEARLY * np.sqrt(
+    sure = np.abs(fit.x[baseline.base.count :]) > SETTINGS.corrections.body_errors * np.sqrt(
         np.diag(covariance(estimator, own, own, fit, [()] * len(names)))
     )
     if not sure.all():  # long steps asked for more
@@ -348,13 +332,14 @@ def _concluded(
     off = np.log(np.maximum(fit.x[: base.count], LEAST_FACTOR)) / base.unknowns.prior_std
     if "force_scale" in names and len(off):  # masses and strengths may all be off by one factor
         off = off - off.mean()
-    usual = float(off @ off) < SURPRISE**2  # else something resists
-    calm = left < max(CALM, PART * before)
+    usual = float(off @ off) < SETTINGS.corrections.surprising**2  # else something resists
+    calm = left < max(SETTINGS.corrections.calm_excess, SETTINGS.corrections.calm_share * before)
     alone = (
         usual
         and calm
         and not any(
-            one.fit.loss + one.cost < loss - ALIKE * (one.hypothesis.effect != HEAVIER)
+            one.fit.loss + one.cost
+            < loss - SETTINGS.corrections.equal_numbers * (one.hypothesis.effect != HEAVIER)
             for one in _equivalent(baseline)
         )
     )
@@ -367,7 +352,7 @@ def _concluded(
                 continue
             instead = (*rest, other)
             tried = found.near(instead, (every.names, whole))
-            if tried.loss < coarse.loss + ALIKE:
+            if tried.loss < coarse.loss + SETTINGS.corrections.equal_numbers:
                 swapped.append((other, every.only(instead).values(tried.x)[other]))
         if name == "force_scale" and "mass" not in every.names:  # then all but friction is as well
             swapped.append(("mass", 1 / own.values(fit.x)["force_scale"]))
@@ -406,7 +391,7 @@ def covariance(
         make, unknowns = joined(with_numbers(wider), hypothesis)
     # an end of an interval that no run came to is within its bounds, and no more is known of it
     prior_std = np.minimum(unknowns.prior_std, unknowns.high - unknowns.low)
-    prior_std[first:last] = ANYTHING
+    prior_std[first:last] = SETTINGS.corrections.untold_width
     precision = np.linalg.inv(estimator.covariance(make, unknowns, there, prior_std))
 
     def without(names: Collection[str]) -> Array:

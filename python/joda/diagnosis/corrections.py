@@ -13,6 +13,7 @@ from joda.component import Component
 from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.findings import Correction, Parameter
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.base_model import BaseModel, shared_damping
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.unknowns import Unknowns
@@ -22,26 +23,16 @@ from joda.scenes.native import DAMPING, FRICTION, SPRING
 
 Array = NDArray[np.float64]
 
-OFF, FAR_OFF = 0.05, 0.3
-"""By how much a number must be off to be worth a word; and where something else is missing."""
-CLEARLY = 3.0
-"""And by so many of its standard errors."""
-ANYTHING = 10.0
-"""How far off a number may be of which the data tell nothing, in its own unit."""
 GAIN, DRAG, DELAY = "gain of the actuator", "damping of joint and actuator", "delay of commands"
 """What the numbers of an actuator are called."""
 STEP = 1e-3
 """Finite-difference step of a force, of how large it may be."""
-ALIKE = 0.12
-"""By how much factors may differ that are one."""
 
 SPREAD, USUALLY = 0.3, 10.0
 """How far numbers of models usually are off, the standard deviation of a factor's logarithm; and
 how many times as often they are as the inertia is, and they are not."""
 ZERO = 1e-9
 """A factor that is as good as none."""
-SLOW = 0.02
-"""A delay of commands (s) of which a part counts as the same part of another number does."""
 
 NATIVE: dict[str, Parameter] = {
     DAMPING: "damping",
@@ -77,7 +68,9 @@ class Number:
 
     def off(self, least: float) -> bool:
         """Whether it is off, by some part at the least and by several of its errors."""
-        return abs(self.value - self.given) > max(least * self.scale, CLEARLY * self.error)
+        return abs(self.value - self.given) > max(
+            least * self.scale, SETTINGS.corrections.min_errors * self.error
+        )
 
     @property
     def factor(self) -> float:
@@ -148,7 +141,7 @@ def errors_beside_a_force(
         estimator, base, fit: the model, and how it was fitted.
         force: usual, N·m or N.
     """
-    n, most = base.count, np.full(3, ANYTHING * force)
+    n, most = base.count, np.full(3, SETTINGS.corrections.untold_width * force)
     free = Unknowns(-most, most, STEP * most, np.zeros(3), most)
 
     def make(x: Array) -> JointSimulator:
@@ -159,7 +152,7 @@ def errors_beside_a_force(
         return base.with_profile(profile.with_component("conservative", bump), x)
 
     both = replace(fit, x=np.append(fit.x, np.zeros(3)))
-    prior_std = np.append(np.full(n, ANYTHING), most)
+    prior_std = np.append(np.full(n, SETTINGS.corrections.untold_width), most)
     found = estimator.covariance(make, base.unknowns.and_(free), both, prior_std)
     return np.asarray(np.sqrt(np.diag(found))[:n])
 
@@ -179,7 +172,19 @@ def _of_actuator(base: BaseModel, servo: Servo, x: Array, errors: Array) -> list
         unit, error = joint.unit_of("damping"), factor * unsure
         size = factor * given
         out.append(Number(DRAG, "damping", given, size, error * given, unit, given, n + 1))
-    return [*out, Number(DELAY, "time_delay", servo.delay, late, uneven, "s", SLOW, n + 2)]
+    return [
+        *out,
+        Number(
+            DELAY,
+            "time_delay",
+            servo.delay,
+            late,
+            uneven,
+            "s",
+            SETTINGS.corrections.slow_delay,
+            n + 2,
+        ),
+    ]
 
 
 @dataclass(frozen=True)
@@ -242,7 +247,7 @@ def _errors(baseline: Baseline, candidate: FittedHypothesis | None) -> Array:
     make, unknowns = (
         joined(base, candidate.hypothesis) if candidate else (base.simulator, base.unknowns)
     )
-    prior_std = np.full(len(fit.x), ANYTHING)
+    prior_std = np.full(len(fit.x), SETTINGS.corrections.untold_width)
     return np.asarray(
         np.sqrt(np.diag(baseline.estimator.covariance(make, unknowns, fit, prior_std)))
     )
@@ -259,7 +264,7 @@ def corrections(found: Sequence[Number], joint: Joint, least: float) -> tuple[Co
     return tuple(one.correction(joint) for one in found if one.parameter and one.off(least))
 
 
-def off(found: Sequence[Number], least: float = OFF) -> str:
+def off(found: Sequence[Number], least: float = SETTINGS.corrections.min_off) -> str:
     """Which numbers are off by a part at the least, and by what, with their errors; empty if none
     is."""
     return ", ".join(one.described for one in found if one.off(least))
@@ -267,7 +272,7 @@ def off(found: Sequence[Number], least: float = OFF) -> str:
 
 def off_beside(found: Sequence[Number]) -> str:
     """Which numbers are far off beside an effect, as a further sentence; empty if none is."""
-    told = ", ".join(one.described for one in found if one.off(FAR_OFF))
+    told = ", ".join(one.described for one in found if one.off(SETTINGS.corrections.min_off_beside))
     return f" The model's own numbers that suit the runs best with it: {told}." if told else ""
 
 
@@ -287,7 +292,10 @@ def by_one_factor(found: Sequence[Number], forced: bool) -> str:
     """
     x = np.array([one.factor for one in _determined(found)])
     mean = float(x.mean()) if len(x) > 1 else 1.0
-    if abs(mean - 1) < FAR_OFF or np.abs(x / mean - 1).max() > ALIKE:
+    if (
+        abs(mean - 1) < SETTINGS.corrections.min_off_beside
+        or np.abs(x / mean - 1).max() > SETTINGS.corrections.one_factor
+    ):
         return ""
     if not forced or any(one.parameter == "actuator_gain" for one in found):
         return (
@@ -319,7 +327,11 @@ def heavier(found: Sequence[Number]) -> float:
 
 def _determined(found: Sequence[Number]) -> list[Number]:
     """Those that the data tell."""
-    return [one for one in found if one.error < OFF * one.scale and np.isfinite(one.factor)]
+    return [
+        one
+        for one in found
+        if one.error < SETTINGS.corrections.min_off * one.scale and np.isfinite(one.factor)
+    ]
 
 
 def one_factor(base: BaseModel, candidate: FittedHypothesis) -> str | None:
@@ -330,7 +342,10 @@ def one_factor(base: BaseModel, candidate: FittedHypothesis) -> str | None:
     inertia = 1 + candidate.hypothesis.magnitude(candidate.x) / base.joint_model.inertia
     factors = np.array([inertia, *candidate.fit.x[: len(base.places)]])
     mean = float(factors.mean())
-    if mean < 1 + ALIKE or np.abs(factors / mean - 1).max() > ALIKE:
+    if (
+        mean < 1 + SETTINGS.corrections.one_factor
+        or np.abs(factors / mean - 1).max() > SETTINGS.corrections.one_factor
+    ):
         return None
     return (
         f"inertia and all of the model's own numbers are too small by one factor, about "

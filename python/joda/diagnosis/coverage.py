@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.problem import segments_for
 from joda.estimation.segments import Integers, Segments
 from joda.measured.curves import FEW, TOO_LOUD, too_loud
@@ -10,11 +11,6 @@ from joda.measured.data_checks.timing import repeats
 from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import QuasiStaticComparison
 from joda.measured.slow_runs import one_way, ways
-
-WINDOWS, MOVES = 4, 8.0
-"""Fewest segments with motion, or motions, that tell anything; and what is one, in noises."""
-VISITED = 0.02
-"""Least part of the range that must be visited."""
 
 
 def moved_one_way(measured: Measured) -> bool:
@@ -34,7 +30,9 @@ def hardly_moved(measured: Measured) -> str:
     """That hardly any of the range was visited, a sentence; nothing if that is not so."""
     logs = [*measured.runs] if measured.runs else [one.curve for one in measured.curves]
     visited = float(np.ptp(np.concatenate([log.position for log in logs])))
-    if (share := visited / float(np.ptp(measured.profile.joint.range))) < VISITED:
+    if (
+        share := visited / float(np.ptp(measured.profile.joint.range))
+    ) < SETTINGS.naming.visited_range:
         what = "runs" if measured.runs else "curves"
         return f"The {what} visit only {100 * share:.1g} % of the joint's range."
     return ""
@@ -50,7 +48,7 @@ def at_rest(measured: Measured) -> str:
 def _moving(measured: Measured, segments: Segments) -> int:
     """In how many segments the joint moves by more than noise; where a coarse encoder makes that
     large for short segments, of how many such motions its runs consist."""
-    far = MOVES * max(measured.sigma)
+    far = SETTINGS.naming.motion_noises * max(measured.sigma)
 
     def motions(rows: Integers) -> int:
         own = rows[rows >= 0]
@@ -72,9 +70,10 @@ def too_little(measured: Measured) -> str:
         return f"{told} samples are too few; record {FEW}." if told < FEW else ""
     if repeats(measured.runs):
         return "Positions repeat while the joint moves, so that what was taken for noise is motion."
-    if (moving := _moving(measured, segments)) < WINDOWS:
+    needed = SETTINGS.naming.motions
+    if (moving := _moving(measured, segments)) < needed:
         return (
-            f"The joint moves in {moving} windows of {segments.length:.2g} s; {WINDOWS} are needed."
+            f"The joint moves in {moving} windows of {segments.length:.2g} s; {needed} are needed."
         )
     return ""
 

@@ -18,6 +18,7 @@ from scipy.special import expit, logit
 from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.free_runs import worst
 from joda.diagnosis.impacts import some_of
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import clearly, has_restitution
 from joda.estimation import simplex
 from joda.estimation.estimator import SegmentEstimator
@@ -41,9 +42,6 @@ FIRST = (-2.8, -1.4, 0.0, 1.4, 2.8), (-0.7, 0.0, 0.7), (-5.0, -3.0, -1.5)
 tried first, one at a time."""
 USUAL = np.array((1.5, 0.4, 3.0))
 """How far off they are, as logarithms, before the data; one standard deviation."""
-MISSED, APART, FEWEST = 1.5, 6, 2
-"""Loss per sample of the visits to the ends from which one may have a stop of its own; numbers of
-both; and fewest visits to an end that tell of it."""
 WIDE, TRIED, SETTLING = np.array((0.4, 0.4, 1.0)), 30, 6
 """How far a search begins to look, in those; models that it tries for each number, and iterations
 that fit the starts of one."""
@@ -76,10 +74,10 @@ def fitted_stops(train: Measured, held: Measured | None = None) -> Stops | None:
         total = priced(found, numbers) + _unusual(z)
         if clearly(total, least):
             best, least = found, total
-    if own.second is None and fit.loss(best) > MISSED * fit.samples:
+    if own.second is None and fit.loss(best) > SETTINGS.whole_runs.end_loss * fit.samples:
         for end in (-1, 1):
             apart = _apart(fit, own, end)
-            total = priced(apart, APART) if apart else np.inf
+            total = priced(apart, SETTINGS.whole_runs.end_numbers) if apart else np.inf
             if apart and clearly(total, least):
                 best, least = apart, total
     return None if best is own else best
@@ -216,7 +214,7 @@ class _Visits:
         segments, middle = self.estimator.segments, float(np.mean(self.profile.joint.range))
         away = [segments.position[row[row >= 0]] - middle for row in segments.rows]
         numbers = np.flatnonzero([end * one[np.argmax(np.abs(one))] > 0 for one in away])
-        if len(numbers) < FEWEST:
+        if len(numbers) < SETTINGS.whole_runs.end_visits:
             return None
         return replace(self, estimator=some_of(segments, numbers))
 

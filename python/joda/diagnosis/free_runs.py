@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import Baseline
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.segmentation import segments_of
@@ -21,8 +22,6 @@ from joda.measured.whiteness import drifts, free_parts
 
 Array = NDArray[np.float64]
 
-BEYOND = 5.0
-"""How many times what errors explain of it a model that is adequate may miss a whole run by."""
 TRAVELLED = 0.3
 """Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
 MOST = 0.9
@@ -31,9 +30,6 @@ APART = 5e-3
 """Part of a strength by which another simulator's may differ."""
 FINER = 4
 """Steps for one of the scene's, for whole runs of a joint that an actuator drives."""
-CHANCE = 1e-4
-"""Probability, for a model that lacks nothing, of a drift of free runs as clear as one that counts:
-two simulators differ a little."""
 SEARCHED, EACH, TIMES = 16, 100, 2
 """Numbers, with those of the runs' starts, up to which they are searched without derivatives; how
 often each is tried, and how often all is begun anew."""
@@ -85,7 +81,7 @@ def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = (
 
     def times(number: int, part: Run) -> float:
         found = replayed(number, part, fitted(finest))
-        if found <= BEYOND or finest == FINER:
+        if found <= SETTINGS.whole_runs.max_multiple or finest == FINER:
             return found
         return min(found, replayed(number, part, fitted(FINER)))
 
@@ -96,7 +92,7 @@ def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = (
         path = replayer.whole(part, start)
         there = ~np.isnan(path)
         missed = rms(path[there] - part.position[there]) / sigma
-        if missed <= BEYOND:
+        if missed <= SETTINGS.whole_runs.max_multiple:
             return missed
         moved = [other.whole(part, start, True)[there] - path[there] for other in drawn()]
         for other, with_it in zip(righted(), others, strict=True):
@@ -219,7 +215,7 @@ class _Whole:
         missed = self.segments.misfit(self.base.simulator(fit.x), fit.start)
         each = np.split(missed, np.cumsum([len(run.time) for run, _ in self.parts])[:-1])
         left = [own / sigma for own, (_, sigma) in zip(each, self.parts, strict=True)]
-        return drifts(self.parts, left) < CHANCE
+        return drifts(self.parts, left) < SETTINGS.whole_runs.drift_probability
 
     def denied_as_it_is(self, fit: Fit) -> bool:
         """The same of the model with its own strengths, and with such as another simulator may ask

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.split import held_segments
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, Make, SegmentEstimator
 from joda.estimation.segments import Segments
@@ -22,8 +23,6 @@ FEW = 6
 """Of fewer segments held out, all are in turn."""
 FOLDS = 4
 """In so many parts."""
-SHOWN = 3.0
-"""How many of its standard errors a mean square is beyond noise where segments show anything."""
 
 
 class Holdout:
@@ -40,7 +39,7 @@ class Holdout:
         self.before = self._error(*own) if self.folds[0].any() else 0.0
         every = np.flatnonzero(counts)
         count = max(int(baseline.estimator.segments.count[self.folds[0]].sum()), 1)
-        noise = self.floor * np.sqrt(1 + SHOWN * np.sqrt(2 / count))
+        noise = self.floor * np.sqrt(1 + SETTINGS.naming.shown_errors * np.sqrt(2 / count))
         silent = self.before < noise or np.count_nonzero(self.folds[0]) < FEW
         if silent and len(every) > 1:
             parts = (every[k::FOLDS] for k in range(min(FOLDS, len(every))))

@@ -13,11 +13,9 @@ from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.free_runs import FreeRuns, free_runs
 from joda.diagnosis.plausible import Needs
-from joda.diagnosis.ranking import WORST, Ranking, evidence, hopeful, shows
+from joda.diagnosis.ranking import Ranking, evidence, hopeful, shows
 from joda.diagnosis.search import Progress, always, narrowed, rank
 from joda.diagnosis.selection import (
-    SETTINGS,
-    SURE,
     Evidence,
     Selection,
     closer_counts,
@@ -25,6 +23,7 @@ from joda.diagnosis.selection import (
     doubted,
     second_counts,
 )
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shorter_segments import in_shorter, runs_away
 from joda.measured.instability import longest_followed
 from joda.measured.measured_joint import Measured
@@ -35,8 +34,6 @@ LONGER, MUCH_LONGER, LONGEST = 3.0, 1.5, 1.5
 """How much longer the segments of each further look are, at the least, and at most how long, s."""
 FURTHER = 2
 """How many looks longer those are that follow where something is unexplained."""
-LOOSELY = 3.0
-"""Strictness where the joint went one way only, which tells little."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ def looked(
     """
     possible = Needs(measured).allow
     ranking = rank(baseline or fit_baseline(measured), exclude, progress, possible=possible)
-    strictness = LOOSELY if moved_one_way(measured) else 1.0
+    strictness = SETTINGS.selection.one_way if moved_one_way(measured) else 1.0
     found = [evidence(ranking)]
     selection = decide(found[0], strictness)
     first = ranking, selection
@@ -98,7 +95,7 @@ def looked(
             again = rank(other, exclude, progress, promising, possible)
             found.append(evidence(again))
             if measured.runs:
-                anew = decide(found[-1], SETTINGS.strictly, wholly=True)
+                anew = decide(found[-1], SETTINGS.selection.second_look, wholly=True)
             else:
                 anew = replace(decide(found[-1], strictness), verdict="unexplained")
             if second_counts(selection, anew):
@@ -117,8 +114,12 @@ def looked(
 def _unsure(ranking: Ranking, selection: Selection) -> bool:
     """Whether a closer look at the best effects is worth it: none is sure, and only noise is left,
     as what is wrong besides adds up in longer segments."""
-    calm = ranking.level <= WORST
-    return calm and selection.verdict == "missing_effect" and selection.probabilities[0] <= SURE
+    calm = ranking.level <= SETTINGS.selection.noise_square
+    return (
+        calm
+        and selection.verdict == "missing_effect"
+        and selection.probabilities[0] <= SETTINGS.selection.sure
+    )
 
 
 def _longer(measured: Measured, baseline: Baseline) -> Iterator[Baseline]:

@@ -12,7 +12,7 @@ from joda._core import JointSimulator
 from joda.diagnosis.force_balance import balanced
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypotheses.base import FREE_CURVE
-from joda.diagnosis.selection import SETTINGS
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation import simplex
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import (
@@ -48,9 +48,6 @@ APART = 0.06
 """How much these must differ in one of their numbers."""
 OFF = 0.1
 """How far off a factor of the model's own strengths is that may stand in for what is missing."""
-MORE = 20.0
-"""Loss beyond noise from which it may be that a size differs along the way; more of many samples,
-whose noise may be more than it was taken for."""
 MUCH_LESS, FINEST = 0.5, 3
 """Part of the loss beyond noise, at most, that a size which differs along the way leaves; and how
 many times the places at which it does become more."""
@@ -257,7 +254,9 @@ def uneven(
         steps: how many times the places at which the size differs may become more.
     """
     samples, tried = estimator.samples, [found]
-    more = max(MORE, SETTINGS.chance * float(np.sqrt(2 * samples)))  # noise is not known better
+    more = max(
+        SETTINGS.selection.uneven_loss, SETTINGS.selection.noise_stds * float(np.sqrt(2 * samples))
+    )  # noise is not known better
     for _ in range(steps):
         last = tried[-1]
         finer = last.hypothesis.uneven

@@ -7,12 +7,13 @@ from joda.diagnosis.adding import Error, add_effect, by_all, error, fallen
 from joda.diagnosis.applied_corrections import AppliedCorrections
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibration
-from joda.diagnosis.corrections import OFF, Corrected, corrected, corrections, numbers
+from joda.diagnosis.corrections import Corrected, corrected, corrections, numbers
 from joda.diagnosis.departures import FAITHFUL, Departures
 from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.findings import Correction, Diagnosis, Finding
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.pair_search import pairs
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import refitted
 from joda.diagnosis.verdict import Diagnosed, diagnosed
 from joda.estimation.problem import segments_for
@@ -155,8 +156,8 @@ def _numbers_first(parts: Parts, before: Error, progress: Progress) -> Step | No
     progress("the model's own numbers")
     baseline = fit_baseline(parts[0])
     found = numbers(baseline)
-    right = corrected(baseline, found, OFF, baseline.fit.x)
-    own = corrections(found, baseline.base.profile.joint, OFF)
+    right = corrected(baseline, found, SETTINGS.corrections.min_off, baseline.fit.x)
+    own = corrections(found, baseline.base.profile.joint, SETTINGS.corrections.min_off)
     return _set_right(parts, before, right, own, progress) if right else None
 
 

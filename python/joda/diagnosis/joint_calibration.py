@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from joda.diagnosis.baseline import Baseline, fit_baseline
-from joda.diagnosis.calibration import NEXT, Calibration, as_recorded, covariance
+from joda.diagnosis.calibration import Calibration, as_recorded, covariance
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.nuisance import nuisances_of, with_numbers
 from joda.measured.measured_joint import Measured
 
@@ -41,7 +42,7 @@ def needed(
         if not tried:
             break
         least, fewer = min(tried, key=lambda pair: pair[0])
-        if least > best + NEXT:
+        if least > best + SETTINGS.corrections.number_loss:
             break
         best, kept = min(best, least), fewer
     return kept if kept.names else None

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.overlap import divided
+from joda.diagnosis.settings import SETTINGS
 from joda.effects import (
     AddedInertia,
     AnyEffect,
@@ -26,16 +27,6 @@ from joda.profile import CHANNELS, NOUNS, Profile
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
-EXCESS = 10.0
-"""How many times what the runs can need an effect's force may be at most."""
-RESISTED = 0.2
-"""Least part of the model's resistance that is left to a joint that no recorded force moves."""
-VISITED = 0.25
-"""Least part of an effect's interval that runs must have visited."""
-UNSEEN = 3.0
-"""How many times what it is where runs were a curve may be where none was."""
-SOME = 0.1
-"""Of a curve's largest value: less is as good as nothing."""
 GRID = 201
 """Positions at which a curve's largest value is looked for."""
 
@@ -70,7 +61,9 @@ def unseen_place(measured: Measured, interval: Interval | None) -> str | None:
     What acts all over the range is a law, and no run needs to have been everywhere for it.
     """
     a, b = interval or (0.0, 1.0)
-    if (a <= 0.0 and b >= 1.0) or visited_share(measured, (a, b)) >= VISITED:
+    if (a <= 0.0 and b >= 1.0) or visited_share(
+        measured, (a, b)
+    ) >= SETTINGS.naming.visited_interval:
         return None
     return f"hardly any run visited s = {a:.2f} to {b:.2f}, where it acts"
 
@@ -101,14 +94,16 @@ def unseen_shape(
         for there in inside:
             edges = y[seen & (np.roll(there, 1) | np.roll(there, -1))]
             other = (
-                there & (np.abs(y) > SOME * np.abs(y).max()) & ~np.isin(np.sign(y), np.sign(edges))
+                there
+                & (np.abs(y) > SETTINGS.naming.no_force * np.abs(y).max())
+                & ~np.isin(np.sign(y), np.sign(edges))
             )
             if other.any():
                 return (
                     f"its {NOUNS[name]} turns or begins at s = {s[other][0]:.2f}, where no run was"
                 )
         most, beyond = (float(np.abs(y[some]).max(initial=0.0)) for some in (seen, ~seen))
-        if beyond > UNSEEN * most:
+        if beyond > SETTINGS.naming.unseen_times * most:
             at = s[~seen][np.argmax(np.abs(y[~seen]))]
             return (
                 f"its {NOUNS[name]} would be {beyond / most:.2g} times as much at s = {at:.2f}, "
@@ -165,7 +160,7 @@ class Needs:
 
     def exceeded(self, force: float) -> bool:
         """Whether a force (N·m or N) is far more than the runs can need."""
-        return force > EXCESS * self.force
+        return force > SETTINGS.naming.force_times * self.force
 
     def allow(self, profile: Profile, effect: str) -> bool:
         """Whether an effect of a profile exerts no more than the runs can need."""
@@ -173,7 +168,10 @@ class Needs:
 
     def unresisted(self, profile: Profile) -> bool:
         """Whether a fit has taken nearly all resistance from a joint that moves by itself."""
-        return not self.forced and self._resisted(profile) < RESISTED * self.resistance
+        return (
+            not self.forced
+            and self._resisted(profile) < SETTINGS.naming.resistance_left * self.resistance
+        )
 
     def _resisted(self, profile: Profile) -> float:
         """Friction and damping where runs went, at half their speed, in the mean; N·m or N."""

@@ -8,13 +8,9 @@ import numpy as np
 from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.hypotheses.base import KNOWN_LAW
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, price
-from joda.diagnosis.selection import SETTINGS, Evidence, Selection, Settings, decide
+from joda.diagnosis.selection import Evidence, Selection, decide
+from joda.diagnosis.settings import SETTINGS, SelectionSettings
 from joda.estimation.estimator import Fit, SegmentEstimator, excess
-
-QUIET = 0.3
-"""Part of the segments, the better ones, that tell the noise."""
-WORST = 1.5
-"""Mean square residual that noise may make."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +64,10 @@ def scored(
         return (), 1.0, samples
     best = min(candidates, key=lambda g: g.fit.loss + g.cost).fit.squares
     each = (best / np.maximum(estimator.segments.count, 1))[estimator.counts]
-    level = max(float(np.quantile(each, QUIET)), 1.0)
-    n_effective = float(estimator.counts.sum()) if level > WORST else samples
+    level = max(float(np.quantile(each, SETTINGS.selection.quiet_share)), 1.0)
+    n_effective = (
+        float(estimator.counts.sum()) if level > SETTINGS.selection.noise_square else samples
+    )
 
     def each_scored(one: FittedHypothesis) -> FittedHypothesis:
         count = n_effective / samples
@@ -88,11 +86,13 @@ def evidence(ranking: Ranking) -> Evidence:
     )
     samples = max(estimator.samples, 1.0)
     first = candidates[0] if candidates else None
-    tolerant = estimator.loss(fit.squares, level=min(ranking.level, WORST))
+    tolerant = estimator.loss(
+        fit.squares, level=min(ranking.level, SETTINGS.selection.noise_square)
+    )
     return Evidence(
         samples=estimator.samples,
         n_effective=ranking.n_effective,
-        noisy=ranking.level > WORST,
+        noisy=ranking.level > SETTINGS.selection.noise_square,
         restitution=ranking.restitution,
         model=ranking.baseline.excess,
         tolerant=excess(tolerant, samples),
@@ -113,7 +113,10 @@ def _gain(ranking: Ranking) -> float:
         return 0.0
     first = ranking.candidates[0]
     gain = fit.loss - first.fit.loss - first.cost
-    if ranking.baseline.excess > 0 or np.count_nonzero(estimator.counts) < SETTINGS.many:
+    if (
+        ranking.baseline.excess > 0
+        or np.count_nonzero(estimator.counts) < SETTINGS.selection.few_segments
+    ):
         return gain
     each = estimator.losses(fit.squares) - estimator.losses(first.fit.squares)
     return gain - max(float(each[estimator.counts].max()), 0.0)
@@ -126,19 +129,21 @@ def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Se
 
 def hopeful(few: Ranking) -> bool:
     """Whether, by the best effects that are fitted, some might explain the runs."""
-    return sum(weigh(few).probabilities) > SETTINGS.hope
+    return sum(weigh(few).probabilities) > SETTINGS.selection.promising
 
 
-def shows(first: Ranking, longer: Baseline, settings: Settings = SETTINGS) -> bool:
+def shows(
+    first: Ranking, longer: Baseline, settings: SelectionSettings = SETTINGS.selection
+) -> bool:
     """Whether more than noise is left of longer segments, be noise what was taken for it or what
     the best candidate left of a first ranking's segments, for each degree of freedom."""
-    if longer.excess > settings.noticed:
+    if longer.excess > settings.longer_excess:
         return True
     best = min(
         (candidate.fit.loss for candidate in first.candidates), default=first.baseline.fit.loss
     )
     own, its = _freedom(longer.estimator), _freedom(first.baseline.estimator)
-    return longer.fit.loss - best * own / its > settings.least_gain
+    return longer.fit.loss - best * own / its > settings.min_gain
 
 
 def _freedom(estimator: SegmentEstimator) -> float:

@@ -9,14 +9,12 @@ from joda.diagnosis.hypothesis_fits import joined
 from joda.diagnosis.phrases import explained
 from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.rivals import indistinguishable
-from joda.diagnosis.selection import LITTLE, SURE, Selection
+from joda.diagnosis.selection import Selection
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.uncertainty import uncertainty
 from joda.measured.measured_joint import Measured
 from joda.measured.visited import unvisited, unvisited_part
 from joda.profile import Profile
-
-NAMED, WORTH_NAMING = 5, 0.01
-"""How many effects are named, and only those of at least some probability."""
 
 
 def finding(
@@ -42,7 +40,9 @@ def finding(
     before, after = held.errors(candidate)
     magnitude = hypothesis.magnitude(x)
     own, left = selection.excess
-    doubt = uncertainty(ranking.baseline, candidate, left[number] / max(own, LITTLE))
+    doubt = uncertainty(
+        ranking.baseline, candidate, left[number] / max(own, SETTINGS.selection.negligible_excess)
+    )
     interval = hypothesis.interval(x)
     joint = measured.profile.joint
     alone = hypothesis.write(Profile(joint=joint), x).effects
@@ -82,8 +82,8 @@ def likeliest_findings(
         k: finding(
             measured, ranking, held, k, selection, indistinguishable(ranking, selection, k, one_way)
         )
-        for k in range(min(NAMED, len(ranking.candidates)))
-        if k == 0 or selection.probabilities[k] > WORTH_NAMING
+        for k in range(min(SETTINGS.naming.named, len(ranking.candidates)))
+        if k == 0 or selection.probabilities[k] > SETTINGS.naming.worth_naming
     }
 
 
@@ -129,7 +129,7 @@ def experiment_for(
         return there_and_back(means).sentence
     if selection.verdict == "unexplained":
         return sentences.AGAIN
-    if selection.probabilities[0] > SURE or len(ranking.candidates) < 2:
+    if selection.probabilities[0] > SETTINGS.selection.sure or len(ranking.candidates) < 2:
         return None
     first, second = (
         Model(*joined(ranking.baseline.base, g.hypothesis), g.fit.x) for g in ranking.candidates[:2]

@@ -3,14 +3,10 @@
 from functools import cache
 
 from joda.diagnosis.ranking import Ranking
-from joda.diagnosis.selection import LEFT, LITTLE, SETTINGS, Selection
+from joda.diagnosis.selection import Selection
+from joda.diagnosis.settings import SETTINGS
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
 from joda.template import read_templates
-
-RIVAL = 0.35
-"""Part of the excess that an effect may leave that counts as an alternative."""
-ALIKE = 0.1
-"""By how much of the misfit two effects may differ that the data cannot tell apart."""
 
 
 def indistinguishable(
@@ -18,13 +14,17 @@ def indistinguishable(
 ) -> tuple[str, ...]:
     """Effects that the data cannot tell from a candidate."""
     own, left = selection.excess
-    undecided = SETTINGS.telling / max(ranking.n_effective, 1.0)
+    undecided = SETTINGS.selection.same_loss / max(ranking.n_effective, 1.0)
     names = [candidate.hypothesis.effect for candidate in ranking.candidates]
     alike = {
         name
         for k, name in enumerate(names)
-        if abs(left[k] - left[number]) < max(ALIKE * (left[number] + LITTLE), undecided)
-        and left[k] < max(RIVAL * own, LEFT)
+        if abs(left[k] - left[number])
+        < max(
+            SETTINGS.naming.alike * (left[number] + SETTINGS.selection.negligible_excess), undecided
+        )
+        and left[k]
+        < max(SETTINGS.naming.alternative_share * own, SETTINGS.selection.unknown_excess)
     }
     if one_way and (mine := _kind(names[number])):
         alike |= set([name for name in names if _kind(name) not in (None, mine)][:1])

@@ -2,17 +2,11 @@
 
 from joda.diagnosis import phrases
 from joda.diagnosis.findings import Finding
-from joda.diagnosis.selection import EVEN, MUCH, Selection
+from joda.diagnosis.selection import Selection
+from joda.diagnosis.settings import SETTINGS
 from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import compared
 
-MOST = 50.0
-"""What of the misfit, %, an effect may leave that is said to be missing with something else."""
-FALLEN = 0.95
-"""Part of an error held out that an effect leaves at most, where that must tell of it."""
-FAR, PART = 10.0, 0.1
-"""Noises by which segments held out may be missed with what is said to be missing; or part of what
-they are missed by without it."""
 STILL = " With it windows held out of the fit are still missed by {:.0f} times the noise."
 SAME = (
     ": the joint was moved in one direction only, or nearly so, where a resistance and a force "
@@ -69,7 +63,11 @@ def summarised(
     far = far_off(first, floor)
     blind = first.held_out_error_before < floor
     probability = _sum(first, selection) if others else first.probability
-    head = "Best guess:" if blind or far or doubt or probability <= EVEN else "The model lacks"
+    head = (
+        "Best guess:"
+        if blind or far or doubt or probability <= SETTINGS.selection.likely
+        else "The model lacks"
+    )
     more = BLIND if blind else STILL.format(after / floor) if far else ""
     if others:
         why = SAME if one_way else ": these data cannot tell which"
@@ -96,14 +94,17 @@ def helps(found: Finding, floor: float) -> bool:
     the noise even without, whether not by clearly more: there its error is noise with and without.
     """
     before, after = found.held_out_error_before, found.held_out_error_after
-    return after < before or (before < floor and FALLEN * after < before)
+    return after < before or (before < floor and SETTINGS.naming.held_out_left * after < before)
 
 
 def far_off(found: Finding, floor: float) -> bool:
     """Whether what was held out is still missed by many noises with an effect, and by more than a
     small part of what it was missed by without."""
     after = found.held_out_error_after
-    return after > FAR * floor and after > PART * found.held_out_error_before
+    return (
+        after > SETTINGS.naming.held_out_noises * floor
+        and after > SETTINGS.naming.held_out_share * found.held_out_error_before
+    )
 
 
 def _sum(first: Finding, selection: Selection) -> float:
@@ -113,14 +114,14 @@ def _sum(first: Finding, selection: Selection) -> float:
 
 
 def _unexplained(what: str, selection: Selection, one_way: bool, restitution: bool) -> str:
-    if restitution and selection.excess[0] < MUCH:
+    if restitution and selection.excess[0] < SETTINGS.selection.unexplained_excess:
         return ENDS_LEFT
     share = 100 * min(selection.share, 1.0)
     same = SAME if one_way and " or " in what else ""
     if share <= 1:
         return f"Best guess: {what}{same}; others may explain as much."
     part = f"{share:.0f} %"
-    if share < MOST:
+    if share < SETTINGS.naming.something_else:
         return (
             f"Best guess: {what}, but not only that{same}; it leaves {part} of the misfit, which "
             "no known effect explains."

@@ -10,8 +10,6 @@ from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.calibration import HEAVIER, Calibration, Calibrator
 from joda.diagnosis.correction_report import SAME_EFFECT
 from joda.diagnosis.corrections import (
-    FAR_OFF,
-    OFF,
     Corrected,
     Number,
     by_one_factor,
@@ -28,24 +26,18 @@ from joda.diagnosis.corrections import (
 from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
 from joda.diagnosis.end_stops import OtherEnds, suited, with_other_ends
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
-from joda.diagnosis.free_runs import BEYOND, CHANCE, FreeRuns, worst
+from joda.diagnosis.free_runs import FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.horizons import HorizonSearch, looked
 from joda.diagnosis.joint_calibration import jointly, needed
 from joda.diagnosis.plausible import Needs, unseen_place
 from joda.diagnosis.ranking import Ranking, hopeful, weigh
-from joda.diagnosis.report import (
-    WORTH_NAMING,
-    experiment_for,
-    finding,
-    likeliest_findings,
-    reported,
-)
+from joda.diagnosis.report import experiment_for, finding, likeliest_findings, reported
 from joda.diagnosis.search import Progress, rank
-from joda.diagnosis.selection import MUCH, SURE, Evidence, Selection
+from joda.diagnosis.selection import Evidence, Selection
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.summary import (
     ENDS_LEFT,
-    FALLEN,
     SAME,
     far_off,
     heavier_summary,
@@ -67,12 +59,6 @@ from joda.measured.whiteness import strays
 from joda.profile import Profile
 from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
-
-SOME = 2.0
-"""How many times what errors explain a whole run is missed by, where segments alone are adequate.
-"""
-MOST_LEFT = 0.5
-"""Part of what whole runs are missed by that an effect may leave to be worth a word."""
 
 
 @dataclass(frozen=True)
@@ -232,12 +218,20 @@ def _concluded(
         report = reported(measured, "unexplained", why, (), experiment)
         return _driven(Diagnosed(report, unexplained_by=unexplained_by), ranking.baseline)
     first = every[sized[0]]
-    hardly = first.held_out_error_after > FALLEN * first.held_out_error_before
+    hardly = (
+        first.held_out_error_after > SETTINGS.naming.held_out_left * first.held_out_error_before
+    )
     hardly |= far_off(first, measured.floor)
-    if first_weighed.verdict == "adequate" and hardly and selection.excess[0] < MUCH:
+    if (
+        first_weighed.verdict == "adequate"
+        and hardly
+        and selection.excess[0] < SETTINGS.selection.unexplained_excess
+    ):
         # nor do segments held out know of anything
         return _adequate(measured, first_ranking, looks.free, others, same)
-    if not helps(first, measured.floor) and all(look.model < MUCH for look in looks.evidence):
+    if not helps(first, measured.floor) and all(
+        look.model < SETTINGS.selection.unexplained_excess for look in looks.evidence
+    ):
         return _adequate(measured, ranking, looks.free, others, same)
     findings = {k: every[k] for k in sized}
     return _missing(measured, ranking, selection, findings, experiment, unexplained_by)
@@ -263,15 +257,21 @@ def _missing(
     own = numbers(ranking.baseline, candidate) if sure else ()
     summary += f" But {doubt}." if doubt else off_beside(own)
     told = tuple(findings.values())
-    worth = tuple(one for one in told if one.probability >= WORTH_NAMING)
+    worth = tuple(one for one in told if one.probability >= SETTINGS.naming.worth_naming)
     report = replace(
         reported(measured, verdict, summary, worth, experiment),
-        corrections=corrections(own, measured.profile.joint, FAR_OFF),
+        corrections=corrections(own, measured.profile.joint, SETTINGS.corrections.min_off_beside),
         doubt=doubt,
         unexplained_probability=selection.unknown if verdict == selection.verdict else None,
     )
     servo = (
-        corrected(ranking.baseline, own, FAR_OFF, candidate.fit.x, driven_only=True)
+        corrected(
+            ranking.baseline,
+            own,
+            SETTINGS.corrections.min_off_beside,
+            candidate.fit.x,
+            driven_only=True,
+        )
         if sure
         else None
     )
@@ -285,14 +285,14 @@ def _driven(found: Diagnosed, baseline: Baseline) -> Diagnosed:
     actuator drives the joint: of that few models know any."""
     own = numbers(baseline)
     if baseline.base.joint_model.servo is None or not (
-        right := corrected(baseline, own, OFF, baseline.fit.x)
+        right := corrected(baseline, own, SETTINGS.corrections.min_off, baseline.fit.x)
     ):
         return found
     report = found.diagnosis
     diagnosis = replace(
         report,
         summary=f"{report.summary}{off_without(own)}",
-        corrections=corrections(own, baseline.base.profile.joint, OFF),
+        corrections=corrections(own, baseline.base.profile.joint, SETTINGS.corrections.min_off),
     )
     return replace(found, diagnosis=diagnosis, corrected=right)
 
@@ -309,12 +309,16 @@ def _adequate(
     if not measured.runs and _uneven(measured, baseline):
         return _unexplained(measured, _report_uneven(measured), sentences.GAUGE_AGAIN)
     left = worst(measured, baseline, others)
-    ends = with_other_ends(measured, baseline, others, left.whole) if left.whole > BEYOND else None
-    by_ends = bool(ends and ends.times <= BEYOND)
+    ends = (
+        with_other_ends(measured, baseline, others, left.whole)
+        if left.whole > SETTINGS.whole_runs.max_multiple
+        else None
+    )
+    by_ends = bool(ends and ends.times <= SETTINGS.whole_runs.max_multiple)
     if why := _drifting(free, left.free if not by_ends else 0.0):
         return _denied(measured, ranking, ends, why)
     denying = free if free and free.denied else None
-    told, least = (denying, 0.0) if denying else (baseline, OFF)
+    told, least = (denying, 0.0) if denying else (baseline, SETTINGS.corrections.min_off)
     own = numbers(baseline, found=(denying.fit.x, denying.errors) if denying else None)
     if denying and not off(own, least):
         by_whole = _denied(measured, ranking, ends, sentences.TOGETHER)
@@ -331,7 +335,7 @@ def _adequate(
         own = surely
     numbers_off, forced = off(own, least), _forced(measured)
     sure = heavier(own) if numbers_off and not forced else 0.0
-    if sure > SURE and (found := _heavier(measured, ranking, numbers_off, sure)):
+    if sure > SETTINGS.selection.sure and (found := _heavier(measured, ranking, numbers_off, sure)):
         return found
     all_alike = by_one_factor(own, forced) if numbers_off else ""
     if numbers_off:
@@ -374,7 +378,7 @@ def _drifting(free: FreeRuns | None, missed: float) -> str:
         free: what whole free runs tell.
         missed: times what errors explain, before the joint comes to an end.
     """
-    if missed > BEYOND:
+    if missed > SETTINGS.whole_runs.max_multiple:
         return sentences.DRIFTING.format(missed)
     return sentences.SLOWLY if free and free.drifting else ""
 
@@ -417,10 +421,14 @@ def _suffices(measured: Measured, numbers_off: str, left: float, denied: bool, s
         how = sentences.WHOLE.format(missed) if run and run.fault else sentences.FREELY
         told = sentences.WITH_THESE.format(how, numbers_off, noise)
         return f"{told[0].upper()}{told[1:]}" if same else f"{sentences.NONE_MISSING}{told}"
-    loose = missed > MULTIPLE and left <= BEYOND
-    adrift = not numbers_off and strays(measured) < CHANCE
+    loose = missed > MULTIPLE and left <= SETTINGS.whole_runs.max_multiple
+    adrift = not numbers_off and strays(measured) < SETTINGS.whole_runs.drift_probability
     where = "With the numbers below the model" if same else "The model"
-    where = "In windows the model" if adrift or (loose and left > SOME) else where
+    where = (
+        "In windows the model"
+        if adrift or (loose and left > SETTINGS.whole_runs.said_multiple)
+        else where
+    )
     summary = f"{where} is adequate: {noise} that an effect would explain.{numbers_off}"
     if loose:
         return summary + sentences.WITHOUT.format(missed, left)
@@ -442,7 +450,7 @@ def _by_whole_runs(
     again, selection = whole.ranking, weigh(whole.ranking)
     if selection.verdict == "adequate":
         return _by_other_numbers(measured, whole, stops) or plain
-    if selection.share > MOST_LEFT:
+    if selection.share > SETTINGS.whole_runs.max_share:
         return plain
     every = likeliest_findings(measured, again, selection)
     if not every[0].sized or unseen_place(measured, every[0].interval):
@@ -470,7 +478,11 @@ def _by_other_numbers(
     fitted = whole.ranking.baseline
     own = numbers(fitted, found=(fitted.fit.x, whole.errors))
     there = measured.stopped(stops) if stops else measured
-    if not off(own) or moved_one_way(measured) or worst(there, fitted).whole > BEYOND:
+    if (
+        not off(own)
+        or moved_one_way(measured)
+        or worst(there, fitted).whole > SETTINGS.whole_runs.max_multiple
+    ):
         return None
     missed = worst_missed(measured)
     misses = sentences.WHOLE.format(missed.multiple if missed else 0.0)
@@ -478,8 +490,12 @@ def _by_other_numbers(
     told = sentences.NUMBERS_OFF.format(off(own), by_one_factor(own, _forced(measured)))
     summary = sentences.NONE_MISSING + sentences.WITH_THESE.format(misses, told, noise)
     report = reported(measured, "adequate", summary, (), None)
-    report = replace(report, corrections=corrections(own, measured.profile.joint, OFF))
-    return Diagnosed(report, corrected=corrected(fitted, own, OFF, fitted.fit.x))
+    report = replace(
+        report, corrections=corrections(own, measured.profile.joint, SETTINGS.corrections.min_off)
+    )
+    return Diagnosed(
+        report, corrected=corrected(fitted, own, SETTINGS.corrections.min_off, fitted.fit.x)
+    )
 
 
 def _forced(measured: Measured) -> bool:

@@ -15,6 +15,7 @@ from joda.diagnosis.baseline import Baseline, fit_segments
 from joda.diagnosis.free_runs import drawn_strengths, searched
 from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.search import narrowed, searched_on
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.estimator import Fit
 from joda.estimation.problem import segments_for
 from joda.estimation.segments import Segments
@@ -23,8 +24,6 @@ from joda.scenes.limits import Stops
 
 Array = NDArray[np.float64]
 
-ALIKE = 9.0
-"""Loss by which fits differ that are as good."""
 NEARER = 1.0, 0.25, 0.06
 """Errors of what segments tell, in which whole runs are fitted from elsewhere, one after another.
 """
@@ -60,7 +59,11 @@ def in_whole_runs(measured: Measured, ranking: Ranking, stops: Stops | None) -> 
     best = searched(whole.estimator, whole.base, min(fits, key=_loss))
     narrow = searched_on(narrowed(replace(whole, fit=best), ranking))
     found = narrow.baseline
-    most = found.fit.loss + ALIKE + max(found.excess, 0.0) * found.estimator.samples
+    most = (
+        found.fit.loss
+        + SETTINGS.whole_runs.equal_loss
+        + max(found.excess, 0.0) * found.estimator.samples
+    )
     alike = np.array([one.x for one in fits if one.loss < most] + [found.fit.x])
     apart = np.abs(alike - found.fit.x).max(axis=0, initial=0.0)
     return WholeRuns(narrow, np.hypot(np.sqrt(np.diag(found.covariance)), apart))
