@@ -107,7 +107,7 @@ def test_a_proposer_of_ones_own(folder):
 
 def test_the_rooms_of_contributing_are_there():
     text = (ROOT / "CONTRIBUTING.md").read_text()
-    rooms = re.findall(r"`(\w+)/`", text[text.index("| room") : text.index("## A template")])
+    rooms = re.findall(r"`(\w+)/`", text[text.index("| module") : text.index("## A template")])
     package = ROOT / "python" / "joda"
     own = {path.name for path in package.iterdir() if path.is_dir()} - {"__pycache__"}
     assert set(rooms) == own | {"cpp"}
