@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from dataclasses import dataclass, fields, replace
+from inspect import signature
 from pathlib import Path
 
 import mujoco
@@ -15,7 +16,8 @@ from scenes import attached, model_of, write
 from scipy.optimize import least_squares
 
 from joda import JodaError, Profile, attach, compare, context, refine
-from joda.commands.refine import Refined, _beyond, _settled
+from joda.cli import measure
+from joda.commands.refine import ITERATIONS, Refined, _beyond, _settled
 from joda.component import Component
 from joda.effects import GravityOffset
 from joda.estimation.profile_parameters import Parameters
@@ -355,6 +357,11 @@ def test_a_curve_of_a_tenth_of_the_force_is_asked_about(tmp_path):
     done = command(tmp_path, "curve.csv")
     assert (done.returncode, done.stdout) == (2, "")
     assert "10 times the measured one: see to its unit first" in done.stderr
+
+
+def test_the_command_line_fits_as_long_as_the_function():
+    own = signature(measure.refine).parameters["iterations"].default
+    assert own == ITERATIONS == signature(refine).parameters["iterations"].default
 
 
 def test_inertia_and_gravity_that_stay_are_not_written(tmp_path):

@@ -356,11 +356,11 @@ def _beyond(
             also["armature"] = "0"
     if "gravity" in parameters.kinds:
         a, b = (parameters.number(theta, "gravity", k) for k in (0, 1))
-        if not (a or b):
-            return also, [*said, "Gravity: as it is."]
         what = f"{a:.4g} cos q + {b:.4g} sin q N·m" if found.joint.type == "hinge" else f"{a:.4g} N"
         said.append(
             f"Gravity's force on the joint lacks {what}: it is in the profile as a gravity_offset; "
             "the bodies' centre of mass or tilt may be off."
+            if a or b
+            else "Gravity: as it is."
         )
     return also, said

@@ -48,10 +48,10 @@ that fit the starts of one."""
 
 
 def fitted_stops(train: Measured, held: Measured | None = None) -> Stops | None:
-    """Ends of the range that suit the runs there, if they make all runs,
-    also those that were held out, clearly likelier, and each number is worth its price (Schwarz
-    1978); else None. The impedance is changed only where that does so again. Where much is left,
-    one end may get a stop besides the joint's limit, of which MuJoCo has one for both.
+    """Ends of the range that suit the runs there, if they make all runs, also those that were held
+    out, clearly likelier, and each number is worth its price (Schwarz 1978); else None. The
+    impedance is changed only where that does so again. Where much is left, one end may get a stop
+    besides the joint's limit, of which MuJoCo has one for both.
 
     Args:
         train: the joint with a profile, and runs to fit.

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import Baseline
 from joda.diagnosis.settings import SETTINGS
+from joda.estimation import simplex
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import Fit, SegmentEstimator
 from joda.estimation.segmentation import segments_of
-from joda.estimation.simplex import least
 from joda.measured.instability import followed
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
@@ -233,8 +233,8 @@ class _Whole:
 
 
 def searched(estimator: SegmentEstimator, base: BaseModel, found: Fit) -> Fit:
-    """A fit to whole runs after a search without derivatives of its numbers
-    and the runs' starts, if these are not too many: where a joint sticks, the loss is jagged."""
+    """A fit to whole runs after a search without derivatives of its numbers and the runs' starts,
+    if these are not too many: where a joint sticks, the loss is jagged."""
     make, unknowns, unknown = base.simulator, base.unknowns, estimator.segments.prior_std
     k = len(found.x)
     scale = np.append(ASIDE * unknowns.step, AWAY * unknown.ravel())
@@ -252,7 +252,7 @@ def searched(estimator: SegmentEstimator, base: BaseModel, found: Fit) -> Fit:
 
     z = np.zeros(len(scale))
     for _ in range(TIMES):
-        z = least(loss, z, 1.0, EACH, adaptive=True)
+        z = simplex.least(loss, z, 1.0, EACH, adaptive=True)
     fit = estimator.fit(make, unknowns, *at(z))
     return min(found, estimator.refit(make, unknowns, fit), key=lambda one: one.loss)
 

@@ -39,6 +39,11 @@ CHANCE = 3.0
 """By how much per number the loss of two good fits may differ by chance."""
 
 
+def by_chance(least: float, estimator: SegmentEstimator, numbers: int) -> float:
+    """By how much the loss of a good fit of so many numbers may be above the least by chance."""
+    return CHANCE * numbers * max(least / max(estimator.samples, 1.0), 1.0)
+
+
 class Between:
     """Fits between the jumps of a joint's force."""
 
@@ -55,20 +60,19 @@ class Between:
             report: see `Progress`.
         """
         count = len(MOVES) + len(FINE)
-        moves, fine = (MOVES, FINE) if iterations > count + 1 and self._ends(theta) else ((), ())
-        rest = iterations - len(moves) - len(fine)
+        jumps = iterations > count + 1 and bool(self._ends(theta))
+        rest = iterations - count * jumps
         theta = self._smooth(theta, rest - rest // 2, report)
-        for move in moves:
+        for move in MOVES * jumps:
             theta = self._moved(theta, move, LENGTHS[-1], report)
         theta = self._smooth(theta, rest // 2, report)
-        return self.placed(theta, report) if fine else theta
+        return self.placed(theta, report) if jumps else theta
 
     def placed(self, theta: Array, report: Progress) -> Array:
         """The numbers with jumps moved a little to where long segments over them are missed least;
         see `fit`."""
-        if self._ends(theta):
-            for move in FINE:
-                theta = self._moved(theta, move, LENGTHS[0], report)
+        for move in FINE:
+            theta = self._moved(theta, move, LENGTHS[0], report)
         return theta
 
     def worse(self, theta: Array, than: Array) -> bool:
@@ -76,8 +80,7 @@ class Between:
         others and chance do."""
         for estimator in (self._clear(than), self.shooting.estimator(LENGTHS[-1])):
             loss, least = self._loss(estimator, theta), self._loss(estimator, than)
-            usual = least / max(int(estimator.segments.count[estimator.counts].sum()), 1)
-            if loss > least + CHANCE * len(theta) * max(usual, 1.0):
+            if loss > least + by_chance(least, estimator, len(theta)):
                 return True
         return False
 

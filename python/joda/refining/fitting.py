@@ -9,7 +9,7 @@ error. What the motion does not show is held by a prior at its first value, of t
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial, reduce
 from typing import Literal
 
 import numpy as np
@@ -20,7 +20,7 @@ from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.least_squares import Fit
 from joda.estimation.profile_parameters import Parameters
 from joda.measured.runs import known
-from joda.refining.between import CHANCE, Between
+from joda.refining.between import Between, by_chance
 from joda.refining.engine import Engine
 from joda.refining.shooting import Shooting
 from joda.refining.sizes import NOISE, sized
@@ -67,7 +67,7 @@ MISSED = 1.2
 """Whole runs that are missed by more than so many times the noise leave something to fit."""
 
 
-def later(report: Report, by: int) -> Report:
+def _later(report: Report, by: int) -> Report:
     """One that counts on from a number."""
     return lambda stage, number, rms: report(stage, by + number, rms)
 
@@ -96,10 +96,16 @@ class Problem:
         least = sum(durations) / MOST
         lengths = [max(SHORT, least), max(LONG, least), max(durations) + engine.h]
         self.short, self.long, self.whole = map(self.shooting.estimator, lengths)
-        self.longer = []
-        while (longer := LONGER * lengths[1]) < lengths[2]:
-            self.longer.append(self.shooting.estimator(longer))
-            lengths[1] = longer
+        self._lengths = lengths[1:]
+
+    @cached_property
+    def longer(self) -> list[SegmentEstimator]:
+        """Of segments that are longer and longer, up to whole runs."""
+        length, most = self._lengths
+        out = []
+        while (length := LONGER * length) < most:
+            out.append(self.shooting.estimator(length))
+        return out
 
     @property
     def between(self) -> Between:
@@ -143,29 +149,28 @@ class Problem:
         """
         begun = self.parameters, self.shooting
         sizes = iterations >= MANY and "values" in self.parameters.kinds
-        ways: tuple[Sizes, ...] = ("near", "none", "far") if sizes else ("none",)
+        ways: tuple[Sizes, ...] = ("near", "none") if sizes else ("none",)
+        if sizes and any(slot.kind == "intervals" for slot in self.parameters.slots):
+            ways = (*ways, "far")
         tried: list[Tried] = []
         history: tuple[tuple[str, float], ...] = ()
         for way in ways:
             self.parameters, self.shooting = begun
-            found = self._fit(iterations, later(report, len(history)), way)
+            found = self._fit(iterations, _later(report, len(history)), way)
             tried.append((found, self.parameters, self.shooting))
             history += found.history
-            if found.interrupted or self._follows(found):
+            if found.interrupted or way == ways[-1] or not self._again(found, way):
                 break
-            stuck = self.shooting.rms(self.short, found.theta) > STUCK * self.sigma
-            if not self.shooting.engine.quick and not (stuck and way == "near"):
-                break
-        best = tried[0]
-        for other in tried[1:]:
-            best = self._better(best, other)
-        fit, self.parameters, self.shooting = best
+        fit, self.parameters, self.shooting = reduce(self._better, tried)
         return replace(fit, history=history, interrupted=tried[-1][0].interrupted)
 
-    def _follows(self, found: Fit) -> bool:
-        """Whether short segments and whole runs are missed by no more than noise."""
+    def _again(self, found: Fit, way: Sizes) -> bool:
+        """Whether another start may do better: short segments or whole runs are missed by more than
+        noise; of a scene, short ones by much more, and it was tried but once."""
         short = self.shooting.rms(self.short, found.theta)
-        return short < NOISE * self.sigma and self.rms(found.theta) < FOLLOWED * self.sigma
+        if not self.shooting.engine.quick:
+            return way == "near" and short > STUCK * self.sigma
+        return short >= NOISE * self.sigma or self.rms(found.theta) >= FOLLOWED * self.sigma
 
     def _better(self, one: Tried, other: Tried) -> Tried:
         """The one that misses short segments less, by more than chance; else long ones; else whole
@@ -175,8 +180,8 @@ class Problem:
                 estimator.started(shooting.simulator(fit.theta)).loss
                 for fit, _, shooting in (one, other)
             ]
-            usual = max(min(losses) / max(estimator.samples, 1.0), 1.0)
-            if abs(losses[1] - losses[0]) > CHANCE * len(one[0].theta) * usual:
+            chance = by_chance(min(losses), estimator, len(one[0].theta))
+            if abs(losses[1] - losses[0]) > chance:
                 break
         return other if losses[1] < losses[0] else one
 

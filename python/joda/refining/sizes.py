@@ -65,14 +65,12 @@ def sized(
     own = parameters.about(parameters.profile, SIZES)
     begun, weak = (own.written(own.start - by, exact=True) for by in (0.0, WEAKER))
     for kinds in stages:
-        bases = [found]
-        if "places" in kinds:  # sizes that were fitted elsewhere may lead nowhere
-            bases = _farther(shooting, estimator, weak) if wide else [found, begun, weak]
-        numbers = [parameters.about(base, kinds) for base in bases]
-        if wide:
-            starts = [(shooting.about(one), one.start) for one in numbers]
-        else:
-            starts = _starts(shooting, estimator, numbers)
+        if wide and kinds == SIZES + PLACES:
+            far = [parameters.about(one, kinds) for one in _farther(shooting, estimator, weak)]
+            starts = [(shooting.about(one), one.start) for one in far]
+        else:  # sizes that were fitted elsewhere may lead nowhere
+            bases = [found, begun, weak] if "places" in kinds else [found]
+            starts = _starts(shooting, estimator, [parameters.about(one, kinds) for one in bases])
         least = np.inf
         for other, start in starts:
             x = other.fit_windows(estimator, start, other.parameters.prior_std, iterations)
