@@ -131,6 +131,28 @@ def numbers(
     return (*out, *(_of_actuator(base, servo, x[n:], errors[n:]) if servo else ()))
 
 
+def numbers_beside(
+    baseline: Baseline, effects: Sequence[tuple[FittedHypothesis, float]]
+) -> tuple[Number, ...]:
+    """The model's own numbers beside an effect that is not sure: beside another that may be missing
+    in its place the same runs show others, which belongs to their errors (Bayesian model averaging,
+    Hoeting et al., Statistical Science 14, 1999).
+
+    Args:
+        baseline: the model fitted alone.
+        effects: fitted with it, and how probable each is; the values told are those beside the
+            first.
+    """
+    every = [numbers(baseline, one) for one, _ in effects]
+    weights = np.array([probability for _, probability in effects])
+    out = []
+    for same in zip(*every, strict=True):
+        squares = [one.error**2 + (one.value - same[0].value) ** 2 for one in same]
+        error = float(np.sqrt(np.average(squares, weights=weights)))
+        out.append(replace(same[0], error=error))
+    return tuple(out)
+
+
 def errors_beside_a_force(
     estimator: SegmentEstimator, base: BaseModel, fit: Fit, force: float
 ) -> Array:

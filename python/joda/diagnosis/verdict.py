@@ -18,6 +18,7 @@ from joda.diagnosis.corrections import (
     errors_beside_a_force,
     heavier,
     numbers,
+    numbers_beside,
     off,
     off_beside,
     off_without,
@@ -254,7 +255,8 @@ def _missing(
     one_way = moved_one_way(measured)
     summary = summarised(first, selection, measured.floor, one_way, ranking.restitution, doubt)
     sure = verdict == "missing_effect" and not doubt  # else they stand in for what is not known
-    own = numbers(ranking.baseline, candidate) if sure else ()
+    beside = [(ranking.candidates[k], one.probability) for k, one in findings.items()]
+    own = numbers_beside(ranking.baseline, beside) if sure else ()
     summary += f" But {doubt}." if doubt else off_beside(own)
     told = tuple(findings.values())
     worth = tuple(one for one in told if one.probability >= SETTINGS.naming.worth_naming)
