@@ -84,3 +84,21 @@ def test_every_template_has_a_hypothesis(tmp_path, templates):
     assert all(part.label == NAME and part.interval == (0.2, 0.8) for part in parts)
     assert max(parts[1].y) == pytest.approx(0.5 * max(parts[0].y))
     assert own.magnitude(x) == pytest.approx(max(parts[0].y))
+
+
+@pytest.mark.parametrize("name", ["magnetic_strip", "magnetic_return_to_low_end", "constant_rub"])
+def test_a_name_like_one_of_the_librarys_makes_no_law(tmp_path, name):
+    """What a template is told to be is what its curves are, whatever it is called."""
+    measured = read(draw(3, "quadratic_damping"))[0]
+    content = {
+        "name": name,
+        "description": "A strip of magnets that push and pull.",
+        "placement": "Anywhere.",
+        "channels": {"conservative": {"x": U.tolist(), "y": TEETH.tolist()}},
+    }
+    (tmp_path / f"{name}.json").write_text(json.dumps(content))
+    units = units_of(segments_for(measured), measured)
+    every = hypotheses(units, read_templates([tmp_path]), measured.profile)
+    (own,) = [one for one in every if one.effect == name]
+    part = own.write(measured.profile, np.array([2.0, 0.2, 0.8])).channels.conservative
+    assert part.components[-1].y == pytest.approx(2 * units.force * TEETH)

@@ -44,11 +44,6 @@ DRAWS = 6
 HEAVIER = "added_inertia"
 """An effect that without gravity is a force of another scale but for what else resists: it is named
 where it is any likelier."""
-EQUIVALENT = (
-    *(HEAVIER, "gravity_offset", "asymmetric_friction"),
-    *("constant_positive_conservative_hinge", "constant_negative_conservative_hinge"),
-)
-"""Effects that may be the same as one of the numbers."""
 
 
 @dataclass(frozen=True)
@@ -414,5 +409,5 @@ def covariance(
 
 def _equivalent(baseline: Baseline) -> list[FittedHypothesis]:
     """The effects that may be the same as a number, fitted."""
-    there = [one for one in baseline.hypotheses if one.effect in EQUIVALENT]
+    there = [one for one in baseline.hypotheses if one.like_a_number]
     return [baseline.refined(baseline.coarse(one)) for one in there]

@@ -30,8 +30,6 @@ HARDLY = 20.0
 noise."""
 NARROWED = 6
 """How many effects are looked at again in longer segments, where the first is not sure."""
-WELLS = {"detent_internal", "bistable_mechanism_internal"}
-"""Effects of which one may stand in for the other where no run went all the way."""
 TELLS, TELLS_EACH = 60.0, 0.1
 """Gain in loss from which segments without impacts tell of an effect; the same, per sample."""
 
@@ -198,12 +196,13 @@ def _beside(
     candidates: Sequence[FittedHypothesis],
     work: _Work,
 ) -> list[FittedHypothesis]:
-    """Those that may be where the best one was found."""
+    """Wells that may be where the best one was found, which has more or fewer: no run may have gone
+    all the way."""
     alike = [
         beside(h, best)
         for best in best_of_each(candidates)[:1]
         for h in tried
-        if {h.effect, best.hypothesis.effect} == WELLS
+        if h.wells and best.hypothesis.wells and h.wells != best.hypothesis.wells
     ]
     return work.all(baseline.refined, work.all(baseline.coarse, alike))
 

@@ -50,13 +50,6 @@ FEW_RUNS = 5
 SHAPE = {KNOWN_LAW: 0.01, FREE_CURVE: 0.07, KNOWN_SHAPE: 0.05}
 """Part of its size by which an effect's law may differ from its kind, by what is known of it;
 these and what follows are calibrated by the bench `hidden cover` (docs/reliability.md)."""
-OWN_SHAPE = {
-    "bistable_mechanism": 0.12,  # its force goes on growing outside the range
-    "end_stop_restitution": 0.12,  # an impact lies between two samples
-    "backlash": 0.03,  # a stiff contact yields a little before it carries
-    "presliding_friction": 0.04,  # bristles yield before they slide
-}
-"""The same of single effects."""
 DEFINITION = 0.08
 """Part of its interval's width by which what counts as its end may differ."""
 TOLERATED = 0.02
@@ -140,7 +133,8 @@ def uncertainty(baseline: Baseline, found: FittedHypothesis, left: float) -> Unc
     best = fitted.described(fitted.x)
     data = from_data(fitted, TOLERATED * gain * (found.hypothesis.misfit_tolerance == KNOWN_SHAPE))
     magnitude, a, b = map(float, best)
-    shape = OWN_SHAPE.get(found.hypothesis.effect, SHAPE[found.hypothesis.misfit_tolerance])
+    own = found.hypothesis.shape_doubt
+    shape = SHAPE[found.hypothesis.misfit_tolerance] if own is None else own
     left = float(np.clip(left, 0.0, 1.0))
     part = min(shape + HIDDEN * left**0.5 / max(1.0 - left, 1 / FARTHEST), FARTHEST)
     seen, visited = _seen(baseline, found)
@@ -263,9 +257,8 @@ def _restitution(baseline: Baseline, found: FittedHypothesis) -> Uncertainty:
     size = found.hypothesis.magnitude(found.x)
     told = baseline.rebounds
     whole = Rebound.together([told[side] for side in sides if side in told])
-    error = float(
-        np.hypot(best_ratio(whole, segments, base, sides)[1], OWN_SHAPE[RESTITUTION] * size)
-    )
+    doubt = found.hypothesis.shape_doubt or 0.0
+    error = float(np.hypot(best_ratio(whole, segments, base, sides)[1], doubt * size))
     known = (side in sides or (side in told and not told[side].may_be(size)) for side in (-1, 1))
     low, high = (AT_END if there else UNKNOWN_END for there in known)
     return Uncertainty(error, (low, high))

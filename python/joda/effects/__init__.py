@@ -1,4 +1,4 @@
-"""Effects beyond the three channels: one class each, with law, source, parameters and units.
+"""Effects beyond the three channels: one file each, with law, source, parameters and units.
 
 A profile lists them under `effects`; the plugin and the JAX twin execute them inside the step. Two
 effects are no more than a free curve in a channel, and are written there (`in_channel`).
@@ -8,21 +8,22 @@ from typing import Annotated
 
 from pydantic import Field
 
+from joda.effects.added_inertia import AddedInertia
+from joda.effects.asymmetric_friction import AsymmetricFriction
+from joda.effects.backlash import Backlash
 from joda.effects.base import CurveEffect, Effect
-from joda.effects.damping import DirectionDependentDamping, QuadraticDamping
-from joda.effects.friction import (
-    AsymmetricFriction,
-    LoadDependentFriction,
-    PreslidingFriction,
-    StribeckFriction,
-)
-from joda.effects.learned import LearnedForce
-from joda.effects.mechanics import AddedInertia, Backlash, EndStopRestitution, GravityOffset
+from joda.effects.direction_dependent_damping import DirectionDependentDamping
+from joda.effects.end_stop_restitution import EndStopRestitution
+from joda.effects.gravity_offset import GravityOffset
+from joda.effects.learned_force import LearnedForce
+from joda.effects.load_dependent_friction import LoadDependentFriction
+from joda.effects.presliding_friction import PreslidingFriction
+from joda.effects.quadratic_damping import QuadraticDamping
+from joda.effects.stribeck_friction import StribeckFriction
 
 __all__ = [
     "CHANNEL_EFFECTS",
     "EFFECTS",
-    "ON_FRICTION",
     "AddedInertia",
     "AnyEffect",
     "AsymmetricFriction",
@@ -77,9 +78,3 @@ CHANNEL_EFFECTS = {
     "position_dependent_damping": "damping",
 }
 """Effects that are a free curve in a channel, and that channel."""
-
-ON_FRICTION = (
-    *("asymmetric_friction", "stribeck_friction"),
-    *("load_dependent_friction", "presliding_friction"),
-)
-"""Effects that act through the solver's friction row."""

@@ -45,6 +45,11 @@ class Effect(Frozen):
         NAME: what a model without it lacks, in a few words.
         KIND: a force over position or a resistance, which runs in one direction do not tell apart;
             None of neither.
+        ON_FRICTION: whether it acts through the solver's friction row.
+        LIKE_A_NUMBER: whether a number of the model or of the measurement that is off may look the
+            same in runs.
+        SHAPE_DOUBT: part of its size by which the real thing may differ from its law; None: as
+            others of its kind (calibrated: `python tests/benchmarks hidden cover`).
         DESCRIPTION: in plain words.
         LAW: the formula; v is the joint's velocity, s its normalised position.
         SOURCE: where the formula is from.
@@ -53,6 +58,9 @@ class Effect(Frozen):
 
     NAME: ClassVar[str]
     KIND: ClassVar[Literal["force", "resistance"] | None] = None
+    ON_FRICTION: ClassVar[bool] = False
+    LIKE_A_NUMBER: ClassVar[bool] = False
+    SHAPE_DOUBT: ClassVar[float | None] = None
     DESCRIPTION: ClassVar[str]
     LAW: ClassVar[str]
     SOURCE: ClassVar[str]

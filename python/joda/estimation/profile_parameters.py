@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from joda.component import Component
 from joda.effects import Backlash, Effect, LearnedForce
-from joda.effects.mechanics import HEAVIEST
+from joda.effects.backlash import HEAVIEST
 from joda.estimation.least_squares import Inequalities
 from joda.profile import CHANNELS, Profile, rounded
 from joda.scenes.context import Context

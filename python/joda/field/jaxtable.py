@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from joda.component import MAX_VALUE
-from joda.effects.learned import EDGE, LearnedForce
+from joda.effects.learned_force import EDGE, LearnedForce
 from joda.field.jaxcubics import Array, cubic, pchip_of
 
 register = jax.tree_util.register_dataclass

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from joda.effects.learned import EDGE, LearnedForce
+from joda.effects.learned_force import EDGE, LearnedForce
 from joda.field.reference import pchip_slopes
 
 Array = NDArray[np.float64]

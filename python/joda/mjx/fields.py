@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from joda.component import Curve
-from joda.effects import ON_FRICTION, CurveEffect, LearnedForce
+from joda.effects import CurveEffect, LearnedForce
 from joda.errors import JodaError
 from joda.field import jaxeffects, jaxfield, jaxtable
 from joda.field.jaxeffects import Effects, from_effects
@@ -194,7 +194,7 @@ def prepare(fields: Fields) -> Prepared:
 def _check_friction_row(model: mujoco.MjModel, name: str, profile: Profile, place: Place) -> None:
     enabled = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS
     rubs = profile.channels.friction.components or any(
-        effect.effect in ON_FRICTION for effect in profile.effects
+        effect.ON_FRICTION for effect in profile.effects
     )
     if place.friction_row < 0 and enabled and rubs:
         raise JodaError(

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import warp as wp
 
-from joda.effects import ON_FRICTION, Backlash
+from joda.effects import Backlash
 from joda.errors import JodaError
 from joda.profile import Profile
 from joda.scenes.model import find_joint, joint_type
@@ -231,7 +231,7 @@ def _check(model: mujoco.MjModel, joint: int, name: str, profile: Profile) -> No
         )
     dof = int(model.jnt_dofadr[joint])
     rubs = profile.channels.friction.components or any(
-        effect.effect in ON_FRICTION for effect in profile.effects
+        effect.ON_FRICTION for effect in profile.effects
     )
     if rubs and not model.dof_frictionloss[dof] > 0:
         raise JodaError(

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from joda.effects import LearnedForce
-from joda.effects.learned import EDGE as FADES
+from joda.effects.learned_force import EDGE as FADES
 from joda.field.table import cubics
 from joda.profile import Profile
 from joda.warp.laws import STILL

@@ -40,6 +40,11 @@ class Hypothesis:
         neg_log_prior: twice the logarithm of how much rarer it is than others.
         misfit_tolerance: part of the excess misfit that it may leave where it is the true one: more
             where only the rough shape of its curve is known.
+        like_a_number: whether a number of the model or of the measurement that is off may look the
+            same in runs.
+        shape_doubt: part of its size by which the real thing may differ from its law; None: as
+            others of its kind.
+        wells: how many wells its force has, of which a motion may have seen some only; 0 for none.
         itself: whether it is, with these numbers, what its name says: more than a simpler effect
             would be, and of no size at which forces no longer count.
         kept: how many rough fits are fitted to the end: several where the motion jumps in a number.
@@ -59,6 +64,9 @@ class Hypothesis:
     ends: int = 0
     neg_log_prior: float = 0.0
     misfit_tolerance: float = KNOWN_LAW
+    like_a_number: bool = False
+    shape_doubt: float | None = None
+    wells: int = 0
     itself: Callable[[Array], bool] = lambda x: True
     kept: int = 1
     uneven: "Hypothesis | None" = None

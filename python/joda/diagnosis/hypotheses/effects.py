@@ -16,7 +16,7 @@ from joda.diagnosis.hypotheses.base import (
     unknowns_of,
 )
 from joda.diagnosis.hypotheses.intervals import GRID, WHOLE, felt
-from joda.effects import CHANNEL_EFFECTS, EFFECTS, CurveEffect
+from joda.effects import CHANNEL_EFFECTS, EFFECTS, CurveEffect, Effect
 from joda.effects.guesses import STRENGTH, TINY, TRIAL, InitialGuess, Units
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
@@ -98,11 +98,11 @@ def from_effects(units: Units) -> Iterator[Hypothesis]:
     """The effects beyond the channels that can show in such a joint's motion."""
     for name, card in EFFECTS.items():
         for guess in card.guesses(units):
-            found = _hypothesis(name, guess)
+            found = _hypothesis(name, card, guess)
             yield _along(units, found, guess) if issubclass(card, CurveEffect) else found
 
 
-def _hypothesis(name: str, guess: InitialGuess) -> Hypothesis:
+def _hypothesis(name: str, card: type[Effect], guess: InitialGuess) -> Hypothesis:
     """An effect as its card begins it."""
     return Hypothesis(
         name,
@@ -115,6 +115,8 @@ def _hypothesis(name: str, guess: InitialGuess) -> Hypothesis:
         guess.unit,
         neg_log_prior=0.0 if guess.direction == "both" else ONE_OF_TWO,
         misfit_tolerance=KNOWN_LAW if guess.exact else KNOWN_SHAPE,
+        like_a_number=card.LIKE_A_NUMBER,
+        shape_doubt=card.SHAPE_DOUBT,
         itself=lambda x: guess.itself(x.tolist()),
         kept=guess.kept,
     )

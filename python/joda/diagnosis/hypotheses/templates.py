@@ -19,8 +19,13 @@ from joda.diagnosis.hypotheses.base import (
 from joda.diagnosis.hypotheses.intervals import FELT, WHOLE, ends, felt, places
 from joda.effects.guesses import STRENGTH, TRIAL, Units
 from joda.profile import CHANNELS, Profile
-from joda.template import Template
+from joda.template import Template, read_templates
 
+WELLS = {"detent_internal": 1, "bistable_mechanism_internal": 2}
+"""How many wells each of these has."""
+GROWING = 0.12
+"""Part of an over-centre mechanism's size by which it may differ: its force goes on growing outside
+the range."""
 WIDEST = 0.5
 """Of a latch."""
 EDGE, SOFT_EDGE = (0.002, 0.3, 0.01), (0.002, 0.48, 0.01)
@@ -73,27 +78,6 @@ POWER, USUAL_POWER = (1.0, 4.0, 0.05), (2.0, 0.5)
 between plate and pole 2, of two poles up to 4, where a yoke leads the flux less than 2."""
 
 
-def from_templates(units: Units, templates: Mapping[str, Template]) -> Iterator[Hypothesis]:
-    """A hypothesis or two for each template."""
-    for name, template in templates.items():
-        if name.startswith("constant_"):
-            yield from _constant(units, name, template)
-        elif name.startswith("spring_return"):
-            yield from _spring(units, name)
-        elif name.startswith("spring_loaded_snap"):
-            yield _snap(units, name)
-        elif name.startswith("magnetic"):
-            yield _magnet(units, name)
-        elif name == "bistable_mechanism":
-            yield _bistable(units, name)
-        elif name == "bistable_mechanism_internal":
-            yield _wells(units, name, 2)
-        elif name == "detent_internal":
-            yield _wells(units, name, 1)
-        else:
-            yield _drawn(units, name, template)
-
-
 def _caught(profile: Profile, name: str, interval: tuple[float, float], most: float) -> Profile:
     """With the dry friction of a catch."""
     if most <= 0:
@@ -104,16 +88,11 @@ def _caught(profile: Profile, name: str, interval: tuple[float, float], most: fl
     return profile.with_component("friction", part)
 
 
-def _wells(units: Units, name: str, wells: int) -> Hypothesis:
+def _wells(units: Units, template: Template) -> Iterator[Hypothesis]:
     """Potential wells: strength, where within its part each pulls most, friction, how much one
     flank pulls more than the other (of two wells the outer ones than the inner); of two, how much
-    one pulls more than the other and how wide each is; the interval.
-
-    Args:
-        units: of the joint.
-        name: of the template.
-        wells: how many, one or two.
-    """
+    one pulls more than the other and how wide each is; the interval."""
+    name, wells = template.name, WELLS[template.name]
     two = wells == 2
     flanks = np.array(((0.5, -0.5), (-0.5, 0.5))[:wells])
     each = np.linspace(-0.5, 0.5, wells) if two else np.zeros(1)
@@ -143,7 +122,7 @@ def _wells(units: Units, name: str, wells: int) -> Hypothesis:
     own += [LEAN, WELL_WIDTH] if two else []
     first = (TRIAL, 0.45, 0.0, *((0.0, 0.0, 0.5) if two else (0.0,)))
     unknowns = known(unknowns_of(*own, *bounds), 3, 0.0, USUAL_LEAN)
-    return Hypothesis(
+    yield Hypothesis(
         name,
         "both",
         known(unknowns, 4, 0.0, USUAL_LEAN) if two else unknowns,
@@ -155,11 +134,13 @@ def _wells(units: Units, name: str, wells: int) -> Hypothesis:
         len(bounds),
         neg_log_prior=RARE,
         misfit_tolerance=KNOWN_SHAPE,
+        wells=wells,
     )
 
 
-def _magnet(units: Units, name: str) -> Hypothesis:
+def _magnet(units: Units, template: Template) -> Iterator[Hypothesis]:
     """An attraction 1 / (distance + gap)ⁿ: strength, friction, n, gap."""
+    name = template.name
     low = name.endswith("low_end")
 
     def law(n: float) -> Array:
@@ -186,7 +167,7 @@ def _magnet(units: Units, name: str) -> Hypothesis:
         return (0.0, reach) if low else (1 - reach, 1.0)
 
     gaps = (0.02, 0.04, 0.08, 0.16)
-    return Hypothesis(
+    yield Hypothesis(
         name,
         "both",
         known(unknowns_of(STRENGTH, CATCH, POWER, GAP), 2, *USUAL_POWER),
@@ -200,8 +181,9 @@ def _magnet(units: Units, name: str) -> Hypothesis:
     )
 
 
-def _spring(units: Units, name: str) -> Iterator[Hypothesis]:
+def _spring(units: Units, template: Template) -> Iterator[Hypothesis]:
     """Its force at the far end, what part of that is preload, how it bends, how far it reaches."""
+    name = template.name
     low = name.endswith("low_end")
     place = "low" if low else "high"
 
@@ -237,9 +219,10 @@ def _spring(units: Units, name: str) -> Iterator[Hypothesis]:
     yield one(place)
 
 
-def _snap(units: Units, name: str) -> Hypothesis:
+def _snap(units: Units, template: Template) -> Iterator[Hypothesis]:
     """A latch: how it holds, its barrier, the hold at the very end, where it tips over, where it
     holds most, friction, where its barrier is highest, how far it reaches."""
+    name = template.name
     low = name.endswith("low_end")
     place = "low" if low else "high"
 
@@ -266,7 +249,7 @@ def _snap(units: Units, name: str) -> Hypothesis:
     own += [(0.3, 0.75, 0.01, 0.1, 0.92), (0.05, 0.7, 0.02, np.nan, 0.95), CATCH, TOP]
     first = TRIAL, 0.8, 0.5
     then = 0.45, 0.0, USUAL_TOP[0]
-    return Hypothesis(
+    yield Hypothesis(
         name,
         "both",
         known(unknowns_of(*own, *bounds), 6, *USUAL_TOP),
@@ -281,9 +264,10 @@ def _snap(units: Units, name: str) -> Hypothesis:
     )
 
 
-def _bistable(units: Units, name: str) -> Hypothesis:
+def _bistable(units: Units, template: Template) -> Iterator[Hypothesis]:
     """Strength, where it tips over, and of either side: how far from there the force turns and its
     part at the end; how much one side pushes more than the other."""
+    name = template.name
 
     def write(profile: Profile, x: Array) -> Profile:
         tip, lean = float(x[1]), np.exp(np.array((-0.5, 0.5)) * x[6])
@@ -297,7 +281,7 @@ def _bistable(units: Units, name: str) -> Hypothesis:
     for side in (4, 5):
         own = known(own, side, *USUAL_END)
     tries = product((0.35, 0.5, 0.65), (0.3, 0.6))
-    return Hypothesis(
+    yield Hypothesis(
         name,
         "both",
         own,
@@ -307,10 +291,11 @@ def _bistable(units: Units, name: str) -> Hypothesis:
         lambda x: units.force * float(x[0] * np.exp(0.5 * abs(x[6])) * max(1.0, *x[4:6])),
         units.of_force(),
         misfit_tolerance=KNOWN_SHAPE,
+        shape_doubt=GROWING,
     )
 
 
-def _drawn(units: Units, name: str, template: Template) -> Hypothesis:
+def _drawn(units: Units, template: Template) -> Iterator[Hypothesis]:
     """A template of which no law is known: its curves as they are drawn. Strength of the first, of
     each other one in units of that, the interval."""
     curves = {
@@ -318,7 +303,7 @@ def _drawn(units: Units, name: str, template: Template) -> Hypothesis:
         for channel in CHANNELS
         if (curve := getattr(template.channels, channel)) is not None
     }
-    first = next(iter(curves))
+    first, name = next(iter(curves)), template.name
 
     def unit(channel: str) -> float:
         return units.force / (units.speed if channel == "damping" else 1.0)
@@ -334,7 +319,7 @@ def _drawn(units: Units, name: str, template: Template) -> Hypothesis:
     bounds, tries = places("anywhere")
     others: Bounds = [RATIO] * (len(curves) - 1)
     tries += [(float(a), float(a + w)) for w in WIDER for a in np.arange(0, 1.001 - w, 0.05)]
-    return Hypothesis(
+    yield Hypothesis(
         name,
         "both",
         unknowns_of(STRENGTH, *others, *bounds),
@@ -350,8 +335,9 @@ def _drawn(units: Units, name: str, template: Template) -> Hypothesis:
     )
 
 
-def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesis]:
+def _constant(units: Units, template: Template) -> Iterator[Hypothesis]:
     """A constant in one channel, all over the range, on most or on a part of it."""
+    name = template.name
     channel, sign = next(
         (c, np.sign(curve.y[0]))
         for c in ("conservative", "friction", "damping")
@@ -399,6 +385,7 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
             units.of_force(int(channel == "damping")),
             len(bounds),
             RARE if same else 0.0,
+            like_a_number=channel == "conservative",
             itself=itself,
         )
 
@@ -406,3 +393,29 @@ def _constant(units: Units, name: str, template: Template) -> Iterator[Hypothesi
     yield one("anywhere")
     if name in LOCAL:
         yield one("most")
+
+
+LAWS = {
+    "bistable_mechanism": _bistable,
+    **dict.fromkeys(WELLS, _wells),
+    "constant_damping_hinge": _constant,
+    "constant_friction_hinge": _constant,
+    "constant_negative_conservative_hinge": _constant,
+    "constant_positive_conservative_hinge": _constant,
+    "magnetic_return_to_high_end": _magnet,
+    "magnetic_return_to_low_end": _magnet,
+    "spring_loaded_snap_detent_to_high_end": _snap,
+    "spring_loaded_snap_detent_to_low_end": _snap,
+    "spring_return_to_high_end": _spring,
+    "spring_return_to_low_end": _spring,
+}
+"""Of the library's templates; others are taken as their curves are drawn."""
+
+
+def from_templates(units: Units, templates: Mapping[str, Template]) -> Iterator[Hypothesis]:
+    """A hypothesis or two for each template: by the law of its kind, or by its curves where it is
+    not of the library, or has other curves than that."""
+    library = read_templates()
+    for name, template in templates.items():
+        known_law = name in LAWS and template.channels == library[name].channels
+        yield from (LAWS[name] if known_law else _drawn)(units, template)

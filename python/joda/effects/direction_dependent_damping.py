@@ -1,4 +1,4 @@
-"""Effects that change the joint's damping."""
+"""Damping by direction."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -7,7 +7,7 @@ from pydantic import Field
 
 from joda.component import Points
 from joda.effects.base import DIRECTIONS, CurveEffect, Direction, parameter
-from joda.effects.guesses import AnyDirection, InitialGuess, Units
+from joda.effects.guesses import InitialGuess, Units
 
 
 class DirectionDependentDamping(CurveEffect):
@@ -30,26 +30,3 @@ class DirectionDependentDamping(CurveEffect):
         """In each direction."""
         for direction in DIRECTIONS:
             yield cls.guess(joint, direction=direction)
-
-
-class QuadraticDamping(CurveEffect):
-    """Drag that grows with the square of speed."""
-
-    NAME = "drag that grows with the square of speed"
-    KIND = "resistance"
-    DESCRIPTION = "Drag grows with the square of speed: air, oil through an orifice."
-    LAW = "force -y(s) v |v|"
-    SOURCE = "Newton's drag; Blevins, Applied Fluid Dynamics Handbook (1984)"
-    SHOWS = "Fast motions lose more than in proportion; slow ones hardly anything."
-    POWER = 2
-
-    effect: Literal["quadratic_damping"] = "quadratic_damping"
-    direction: AnyDirection = Field(
-        default="both", description="in which it acts; positive: q grows"
-    )
-    y: Points = parameter("drag", "N·m·s²/rad²", "N·s²/m²", (0.01, 50))
-
-    @classmethod
-    def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
-        """In both directions."""
-        yield cls.guess(joint)
