@@ -76,6 +76,18 @@ class Calibration:
         """Their standard errors, shape (k,)."""
         return np.sqrt(np.diag(self.covariance))
 
+    @property
+    def sure(self) -> tuple[NuisanceName, ...]:
+        """Those that are off by several of their errors."""
+        own = self.fit.x[len(self.fit.x) - len(self.names) :]
+        off = np.abs(own) > SETTINGS.corrections.body_errors * self.errors
+        return tuple(name for name, one in zip(self.names, off, strict=True) if one)
+
+    @property
+    def alternatives(self) -> list[list[NuisanceName]]:
+        """Of each number, the names of those that the data cannot tell from it."""
+        return [[name for name, _ in alike] for alike in self.others]
+
     def only(self, names: Sequence[NuisanceName]) -> "Calibration":
         """Some of the numbers, not fitted anew."""
         kept = [k for k, name in enumerate(self.names) if name in names]

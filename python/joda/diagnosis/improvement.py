@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from joda.diagnosis.adding import Error, add_effect, by_all, error, fallen
 from joda.diagnosis.applied_corrections import AppliedCorrections
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.calibration import Calibration
 from joda.diagnosis.corrections import Corrected, corrected, corrections, numbers
 from joda.diagnosis.departures import FAITHFUL, Departures
 from joda.diagnosis.end_stops import fitted_stops
@@ -98,24 +97,27 @@ def improved(
             steps.append(first)
         while len(steps) <= MOST:
             progress("diagnose")
-            found = diagnosed(_with(parts, steps[-1].profile)[0], calibrate=len(steps) == 1)
+            given = steps[-1].profile
+            found = diagnosed(_with(parts, given)[0], calibrate=len(steps) == 1)
             said, own = found.diagnosis, found.diagnosis.corrections
             if found.calibration:
-                if not (more := _calibrated(parts, steps[-1], found.calibration, own)):
+                if not (more := _calibrated(parts, steps[-1], found, progress)):
                     why = NOTHING_HELPS
                     break
                 parts = _righted(parts, found.calibration.righted)
-                steps.append(more)
-                own = tuple(one for one in own if one not in more.corrections)
+                steps += more
+                if steps[-1].profile is not given:
+                    continue
+                own = tuple(one for one in own if one not in steps[-1].corrections)
             steps[-1] = replace(steps[-1], diagnosis=said)
             if said.doubt:
                 why = said.summary
                 break
             anew = found.calibration or not steps[-1].corrections
             right = found.corrected if anew else None
-            if right and (more := _set_right(parts, steps[-1].error, right, own, progress)):
-                parts = _driven(parts, more.servo)
-                steps.append(replace(more, right=steps[-1].right))
+            if right and (set_right := _set_right(parts, steps[-1].error, right, own, progress)):
+                parts = _driven(parts, set_right.servo)
+                steps.append(replace(set_right, right=steps[-1].right))
                 continue
             if not (stairs := _next(parts, steps[-1], found, progress)):
                 why = NOTHING_HELPS if said.verdict == "missing_effect" else said.summary
@@ -161,15 +163,25 @@ def _numbers_first(parts: Parts, before: Error, progress: Progress) -> Step | No
     return _set_right(parts, before, right, own, progress) if right else None
 
 
-def _calibrated(
-    parts: Parts, last: Step, found: Calibration, said: Sequence[Correction]
-) -> Step | None:
-    """The joint and its runs with numbers set right, if that lowers the error held out."""
-    after = error(_righted(parts, found.righted)[1].changed(last.profile))
-    if after.window > WORTH * last.error.window:
-        return None
-    own = tuple(one for one in said if one.parameter in found.names)
-    return Step(None, last.profile, after, corrections=own, right=found.righted)
+def _calibrated(parts: Parts, last: Step, found: Diagnosed, progress: Progress) -> list[Step]:
+    """The joint and its runs with numbers set right, if that lowers the error held out: by itself,
+    or else together with the model's own that were found off beside them, or with the effect that
+    was; none if it does not."""
+    assert found.calibration
+    right, said = found.calibration.righted, found.diagnosis
+    beside = _righted(parts, right)
+    after = error(_with(beside, last.profile)[1])
+    own = tuple(one for one in said.corrections if one.parameter in found.calibration.names)
+    alone = Step(None, last.profile, after, said, corrections=own, right=right)
+    if fallen(last.error, after):
+        return [alone]
+    if found.corrected:
+        numbers_right = _set_right(
+            _with(beside, last.profile), last.error, found.corrected, said.corrections, progress
+        )
+        return [replace(numbers_right, diagnosis=said, right=right)] if numbers_right else []
+    stairs = [replace(one, right=right) for one in _next(beside, alone, found, progress)]
+    return [alone, *stairs] if stairs and fallen(last.error, stairs[-1].error) else []
 
 
 def _righted(parts: Parts, right: AppliedCorrections) -> Parts:

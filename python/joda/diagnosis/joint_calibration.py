@@ -62,6 +62,5 @@ def jointly(
     fit = estimator.fit(make, unknowns, x, estimator.started(make(x)).start)
     fit = estimator.refit(make, unknowns, fit)
     every = nuisances_of(measured, own.base)
-    others = [[name for name, _ in alike] for alike in found.others]
-    errors = covariance(estimator, own, every, fit, others, effect.hypothesis)
+    errors = covariance(estimator, own, every, fit, found.alternatives, effect.hypothesis)
     return replace(found, numbers=own, fit=replace(fit, x=fit.x[: k + n]), covariance=errors)

@@ -173,13 +173,17 @@ def _set_right(
         if best.hypothesis.effect == RESTITUTION:  # which segments do not tell of
             break
         beside = measured, found, ranking.baseline, best
-        if (fewer := needed(*beside)) is None:
+        left = needed(*beside)
+        if left and left.names == found.names:
+            left = jointly(*beside)
+            if left.sure == found.names:
+                found = left
+                break
+            left = left.only(left.sure) if left.sure else None
+        if left is None:
             plain = looked(measured, exclude, progress)
             return replace(_concluded(measured, plain), looks=plain.evidence)
-        if fewer.names == found.names:
-            found = jointly(*beside)
-            break
-        found = fewer
+        found = left
         looks = looked(found.of(measured), exclude, progress)
     others = [one.of(measured) for one in found.drawn()]
     same = not SAME_EFFECT.keys().isdisjoint(found.names)

@@ -39,8 +39,6 @@ def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[DataCheck], A
     """What is wrong with unit, sign, zero and range; and the positions without it."""
     if told := _wrapped(run, context):
         return [suspect(run, "wrapped", told)], run.position
-    if told := _wrapped(run, context):
-        return [suspect(run, "wrapped", told)], run.position
     glitches, position = _outside(run, run.position, context)
     if 0 < np.sum(position != run.position) <= max(FEW * len(position), 3):
         return glitches, position
