@@ -32,12 +32,14 @@ def needed(
     """
     length = baseline.estimator.segments.length
     best, kept = effect.fit.loss, found
+    hypothesis = effect.hypothesis
+    hypothesis = replace(hypothesis, trials=np.vstack([hypothesis.trials, effect.x]))
     while kept.names:
         tried = []
         for name in kept.names:
             fewer = kept.only(tuple(one for one in kept.names if one != name))
             without = fit_baseline(fewer.of(measured), length)
-            if again := without.fit_hypothesis(effect.hypothesis):
+            if again := without.fit_hypothesis(hypothesis):
                 tried.append((again.fit.loss, fewer))
         if not tried:
             break
