@@ -14,9 +14,10 @@ from joda.diagnosis.hypotheses import hypotheses
 from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
 from joda.diagnosis.hypotheses.effects import KNOTS, from_effects
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
+from joda.diagnosis.hypotheses.templates import WELLS
 from joda.diagnosis.hypothesis_fits import beside, joined, price
 from joda.diagnosis.ranking import evidence, hopeful, weigh
-from joda.diagnosis.search import NARROWED, WELLS, _shown_without_impacts, narrowed, rank
+from joda.diagnosis.search import NARROWED, _shown_without_impacts, narrowed, rank
 from joda.diagnosis.selection import Evidence, Selection, closer_counts, decide, doubted
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.verdict import diagnosed
