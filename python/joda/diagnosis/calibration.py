@@ -80,8 +80,7 @@ class Calibration:
     def sure(self) -> tuple[NuisanceName, ...]:
         """Those that are off by several of their errors."""
         own = self.fit.x[len(self.fit.x) - len(self.names) :]
-        off = np.abs(own) > SETTINGS.corrections.body_errors * self.errors
-        return tuple(name for name, one in zip(self.names, off, strict=True) if one)
+        return _surely_off(self.names, own, self.errors)
 
     @property
     def alternatives(self) -> list[list[NuisanceName]]:
@@ -325,11 +324,9 @@ def _concluded(
     starts = (coarse.start, estimator.segments.start)
     fits = (estimator.fit(own.make, own.unknowns, coarse.x, start) for start in starts)
     fit = estimator.refit(own.make, own.unknowns, min(fits, key=_loss))
-    sure = np.abs(fit.x[baseline.base.count :]) > SETTINGS.corrections.body_errors * np.sqrt(
-        np.diag(covariance(estimator, own, own, fit, [()] * len(names)))
-    )
-    if not sure.all():  # long steps asked for more
-        kept = tuple(name for name, there in zip(names, sure, strict=True) if there)
+    errors = np.sqrt(np.diag(covariance(estimator, own, own, fit, [()] * len(names))))
+    kept = _surely_off(names, fit.x[baseline.base.count :], errors)
+    if kept != names:  # long steps asked for more
         fewer = replace(fit, x=own.taken(fit.x, kept))
         return _concluded(found, kept, fewer, whole) if kept else None
     loss = fit.loss + found.price * len(names)
@@ -366,6 +363,12 @@ def _concluded(
         others.append(tuple(swapped))
     errors = covariance(estimator, own, every, fit, [[name for name, _ in one] for one in others])
     return Calibration(own, fit, errors, loss, alone, tuple(others))
+
+
+def _surely_off(names: Sequence[NuisanceName], x: Array, errors: Array) -> tuple[NuisanceName, ...]:
+    """Which of the numbers are off by several of their errors."""
+    off = np.abs(x) > SETTINGS.corrections.body_errors * errors
+    return tuple(name for name, one in zip(names, off, strict=True) if one)
 
 
 def covariance(

@@ -169,17 +169,15 @@ def _calibrated(parts: Parts, last: Step, found: Diagnosed, progress: Progress) 
     was; none if it does not."""
     assert found.calibration
     right, said = found.calibration.righted, found.diagnosis
-    beside = _righted(parts, right)
-    after = error(_with(beside, last.profile)[1])
+    beside = _with(_righted(parts, right), last.profile)
+    after = error(beside[1])
     own = tuple(one for one in said.corrections if one.parameter in found.calibration.names)
     alone = Step(None, last.profile, after, said, corrections=own, right=right)
     if fallen(last.error, after):
         return [alone]
     if found.corrected:
-        numbers_right = _set_right(
-            _with(beside, last.profile), last.error, found.corrected, said.corrections, progress
-        )
-        return [replace(numbers_right, diagnosis=said, right=right)] if numbers_right else []
+        more = _set_right(beside, last.error, found.corrected, said.corrections, progress)
+        return [replace(more, diagnosis=said, right=right)] if more else []
     stairs = [replace(one, right=right) for one in _next(beside, alone, found, progress)]
     return [alone, *stairs] if stairs and fallen(last.error, stairs[-1].error) else []
 

@@ -133,8 +133,7 @@ def uncertainty(baseline: Baseline, found: FittedHypothesis, left: float) -> Unc
     best = fitted.described(fitted.x)
     data = from_data(fitted, TOLERATED * gain * (found.hypothesis.misfit_tolerance == KNOWN_SHAPE))
     magnitude, a, b = map(float, best)
-    own = found.hypothesis.shape_doubt
-    shape = SHAPE[found.hypothesis.misfit_tolerance] if own is None else own
+    shape = _of_its_law(found)
     left = float(np.clip(left, 0.0, 1.0))
     part = min(shape + HIDDEN * left**0.5 / max(1.0 - left, 1 / FARTHEST), FARTHEST)
     seen, visited = _seen(baseline, found)
@@ -208,6 +207,12 @@ def _seen(baseline: Baseline, found: FittedHypothesis) -> tuple[float, tuple[flo
     return magnitude, (float(low), float(high))
 
 
+def _of_its_law(found: FittedHypothesis) -> float:
+    """Part of its size by which the real thing may differ from its law: its own, or its kind's."""
+    own = found.hypothesis.shape_doubt
+    return SHAPE[found.hypothesis.misfit_tolerance] if own is None else own
+
+
 def _there(found: FittedHypothesis) -> bool:
     """Whether it is more than nothing, however large."""
     first = found.hypothesis.unknowns
@@ -257,8 +262,8 @@ def _restitution(baseline: Baseline, found: FittedHypothesis) -> Uncertainty:
     size = found.hypothesis.magnitude(found.x)
     told = baseline.rebounds
     whole = Rebound.together([told[side] for side in sides if side in told])
-    doubt = found.hypothesis.shape_doubt or 0.0
-    error = float(np.hypot(best_ratio(whole, segments, base, sides)[1], doubt * size))
+    law = _of_its_law(found) * size
+    error = float(np.hypot(best_ratio(whole, segments, base, sides)[1], law))
     known = (side in sides or (side in told and not told[side].may_be(size)) for side in (-1, 1))
     low, high = (AT_END if there else UNKNOWN_END for there in known)
     return Uncertainty(error, (low, high))
