@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 from wheel import SCENE, pushed
 
-from joda import diagnose
+from joda import JodaError, diagnose
+from joda.diagnosis.hypotheses.effects import from_effects
+from joda.diagnosis.overlap import divided, places
+from joda.diagnosis.plausible import Needs
+from joda.diagnosis.units import units_of
 from joda.effects import EFFECTS, Effect, LearnedForce
 from joda.effects.guesses import STRENGTH, TRIAL, InitialGuess, Units
+from joda.estimation.problem import segments_for
+from joda.measured.reading import read_measured
 
 NAME = "root_drag"
 
@@ -18,6 +24,7 @@ class RootDrag(Effect):
 
     NAME = "drag that grows with the root of speed"
     KIND = "resistance"
+    WRITTEN_AS = "learned_force"
     DESCRIPTION = "A film of grease that thins as it is sheared."
     LAW = "force -y sign(v) sqrt(|v|)"
     SOURCE = "power-law fluid: Ostwald 1925, de Waele 1923"
@@ -35,6 +42,62 @@ class RootDrag(Effect):
             return LearnedForce(velocities=tuple(speeds), y=(tuple(y),))
 
         yield InitialGuess([STRENGTH], [[TRIAL]], effect, lambda x: unit * x[0], "N·m·(s/rad)^0.5")
+
+
+def gaining(x):
+    """A table that adds energy."""
+    return LearnedForce(velocities=(-1.0, 0.0, 1.0), y=((1.0, 0.0, -1.0),))
+
+
+GAINING = InitialGuess([STRENGTH], [[TRIAL]], gaining, lambda x: x[0], "N·m")
+
+
+@pytest.fixture
+def measured(tmp_path, monkeypatch, rng):
+    """A wheel and a short run of it, where the card is known."""
+    scene = tmp_path / "wheel.xml"
+    scene.write_text(SCENE)
+    pushed(scene, rng, 0, tmp_path / "run.csv", steps=1000)
+    monkeypatch.setitem(EFFECTS, NAME, RootDrag)
+    return read_measured(scene, "wheel", [tmp_path / "run.csv"])
+
+
+def dragged(measured, size):
+    """The joint's profile with the drag as its card writes it."""
+    (guess,) = RootDrag.guesses(units_of(segments_for(measured), measured))
+    return measured.profile.with_effect(guess.effect([size]))
+
+
+def test_it_exerts_no_more_than_the_runs_can_need(measured):
+    """As every effect: what its card writes is told from the rest of the profile."""
+    needs = Needs(measured)
+    little, much = (dragged(measured, size) for size in (0.1, 100.0))
+    assert needs.exerted(little, NAME) > 0 and needs.allow(little, NAME)
+    assert not needs.allow(much, NAME)
+    own, others = divided(little, NAME)
+    assert own.effects == little.effects and not others.effects
+
+
+def test_where_it_acts_is_where_its_table_is(measured):
+    (one,) = dragged(measured, 0.1).effects
+    part = measured.profile.with_effect(one.model_copy(update={"interval": (0.2, 0.6)}))
+    assert places(part, NAME) == [(0.2, 0.6)]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"WRITTEN_AS": None}, "its guesses make 'learned_force', but a profile lists it as"),
+        (
+            {"guesses": classmethod(lambda cls, joint: iter([GAINING]))},
+            "the first trial of its guesses makes no effect: y must not have the sign opposite",
+        ),
+    ],
+)
+def test_a_card_that_makes_something_else_is_told_so(measured, monkeypatch, change, said):
+    monkeypatch.setitem(EFFECTS, NAME, type("Wrong", (RootDrag,), change))
+    with pytest.raises(JodaError, match=f"effect '{NAME}': {said}"):
+        list(from_effects(units_of(segments_for(measured), measured)))
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """A template that nobody has written a law for: its effect is found, told and added."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from wheel import SCENE, pushed
 from joda import JodaError, add, attach, diagnose
 from joda.component import Component
 from joda.diagnosis.hypotheses import hypotheses
+from joda.diagnosis.rivals import indistinguishable, kinds_of
+from joda.diagnosis.selection import Selection
 from joda.diagnosis.units import units_of
 from joda.estimation.problem import segments_for
 from joda.hidden import draw
@@ -29,6 +32,8 @@ def templates(tmp_path):
         "name": NAME,
         "description": "A cam whose three teeth draw the joint to three places.",
         "placement": "Anywhere.",
+        "title": "a worn cam",
+        "shows": "it is drawn to three places",
         "channels": {"conservative": {"x": U.tolist(), "y": TEETH.tolist()}},
     }
     (folder / f"{NAME}.json").write_text(json.dumps(content))
@@ -52,7 +57,8 @@ def test_it_is_diagnosed_and_added_without_code(tmp_path, templates, rng):
     found = diagnose(*line, templates=[templates], json=tmp_path / "d.json")
     assert found.verdict == "missing_effect", found.summary
     first = found.effects[0]
-    assert first.effect == NAME and "cam with three teeth" in found.summary
+    assert first.effect == NAME and "lacks a worn cam" in found.summary
+    assert "A worn cam at q" in first.explanation and "it is drawn to three" in first.explanation
     assert first.magnitude == pytest.approx(size, rel=0.1)
     assert first.interval == pytest.approx((a, b), abs=0.03)
     model, joint, files = line
@@ -63,6 +69,24 @@ def test_it_is_diagnosed_and_added_without_code(tmp_path, templates, rng):
     assert added.after.window < 0.3 * added.before.window
     with pytest.raises(JodaError, match=f"no effect '{NAME}'"):  # without the folder
         add(model, joint, tmp_path / "d.json", files, tmp_path / "no.xml")
+
+
+def test_one_way_it_is_not_told_from_the_other_kind(tmp_path):
+    """A resistance of one's own is the same as a force where the joint goes one way only."""
+    content = {
+        "name": "wedge_rub",
+        "description": "Two wedges that rub.",
+        "placement": "Anywhere.",
+        "channels": {"friction": {"x": [0, 1], "y": [0, 1]}},
+    }
+    (tmp_path / "wedge_rub.json").write_text(json.dumps(content))
+    names = "wedge_rub", "quadratic_damping", "constant_positive_conservative_hinge"
+    found = [SimpleNamespace(hypothesis=SimpleNamespace(effect=name)) for name in names]
+    ranking = SimpleNamespace(candidates=found, n_effective=1000)
+    weighed = Selection("missing_effect", (0.9, 0.05, 0.01), (10.0, (0.1, 1.0, 2.0)), names)
+    kinds = kinds_of(ranking, read_templates([tmp_path]))
+    assert indistinguishable(ranking, weighed, 0, kinds) == names[2:]
+    assert indistinguishable(ranking, weighed, 0, {}) == ()  # moved both ways
 
 
 @pytest.mark.slow

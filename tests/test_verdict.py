@@ -17,7 +17,7 @@ from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.corrections import errors_beside_a_force, numbers, off
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.findings import Diagnosis, Finding
-from joda.diagnosis.phrases import explained
+from joda.diagnosis.phrases import explained, named
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.summary import summarised
 from joda.diagnosis.verdict import diagnosed
@@ -31,6 +31,7 @@ from joda.profile import Joint
 
 DETENT = Finding(
     effect="detent_internal",
+    name=named("detent_internal"),
     interval=(0.3, 0.5),
     interval_error=(0.01, 0.01),
     probability=0.8,
@@ -86,6 +87,9 @@ def test_what_no_effect_explains_is_a_guess():
     one = selection(0.2, verdict="unexplained")
     said = summarised(DETENT, one, FLOOR, one_way=False, restitution=False)
     assert said.startswith("Best guess: a click")
+    assert "(probability 80 %)" in said and "none of the known effects explains the data" in said
+    assert said.endswith("has 80 %.")  # the rest of what `selection` gives the named ones
+    assert "others" not in said  # of which nothing is known here
 
 
 @pytest.mark.parametrize(

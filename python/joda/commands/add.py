@@ -49,6 +49,7 @@ class Added:
         corrections: the file of what the diagnosis says that the measurement has wrong; None where
             nothing of it is.
         effect: its name.
+        name: the same in words.
         added: whether the scene has it.
         reason: why it has not, a clause; None if it has.
         before, after: errors on what was held out of the fit.
@@ -68,6 +69,7 @@ class Added:
     picture: Path | None
     corrections: Path | None
     effect: str
+    name: str
     added: bool
     reason: str | None
     before: Error
@@ -190,6 +192,7 @@ def add(
         picture=picture if added else None,
         corrections=corrections if added else None,
         effect=name,
+        name=named(name, measured.templates),
         added=added,
         reason=added_effect.reason,
         before=added_effect.before,
@@ -207,7 +210,7 @@ def add(
 
 def sentences(added: Added) -> list[str]:
     """What came of it, for a person."""
-    what = named(added.effect)
+    what = added.name
     errors = errors_described(
         added.before, added.after, added.noise_floor, added.unit, added.blocks
     )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.outcome import NO_TRUST, read_runs
-from joda.diagnosis.phrases import LEARN, effect_names, named, percent
+from joda.diagnosis.phrases import LEARN, effect_names, percent
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
 from joda.files import check_targets, write_together
@@ -100,9 +100,7 @@ def _candidates(diagnosis: Diagnosis) -> list[str]:
 
 
 def _candidate(found: Finding) -> str:
-    alike = " or ".join(map(named, found.indistinguishable_from))
-    told = f" These data cannot tell it from {alike}." if alike else ""
-    return f"{percent(found.probability)} {found.effect}: {found.explanation}{told}"
+    return f"{percent(found.probability)} {found.effect}: {found.explanation}"
 
 
 def _after(diagnosis: Diagnosis) -> list[str]:
@@ -133,7 +131,7 @@ def _row(found: Finding, unit: str) -> tuple[str, ...]:
     a, b = found.interval
     of = "" if found.unit == "1" else f" {found.unit}"
     return (
-        named(found.effect),
+        found.name,
         f"s = {a:.2f} to {b:.2f}",
         f"{found.magnitude:.3g} \u00b1 {found.magnitude_error:.2g}{of}",
         percent(found.probability),

@@ -145,7 +145,7 @@ def hidden_effect(
     say(f"  hidden: {truth}")
     for one in () if alien else diagnosis.effects[:1]:
         doubt = f" \u00b1 {one.magnitude_error:.2g}"
-        say(f"  said:   {named(one.effect)}, {_where(vars(one))}, {_size(vars(one), doubt)}")
+        say(f"  said:   {one.name}, {_where(vars(one))}, {_size(vars(one), doubt)}")
     say(judgement)
     if case.visible < VISIBLE:
         say(f"It moves the joint by only {case.visible:.1f} times the measurement's noise.")
@@ -221,7 +221,7 @@ def _judged_law(
     known = diagnosis.verdict != "unexplained"
     said = ""
     if known and diagnosis.effects:
-        said = f"It has no name, and was taken for {named(diagnosis.effects[0].effect)}. "
+        said = f"It has no name, and was taken for {diagnosis.effects[0].name}. "
     if after is None or not before.rmse_window or not after.rmse_window:
         return f"{said}Missed: nothing was learned.", False
     part = after.rmse_window / before.rmse_window

@@ -19,7 +19,7 @@ from joda.diagnosis.outcome import (
     scene_files,
     wholes,
 )
-from joda.diagnosis.phrases import LEARN, named
+from joda.diagnosis.phrases import LEARN
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.files import write_together
 from joda.measured.corrections_file import corrections_beside
@@ -228,7 +228,7 @@ def _page(result: Improved, drawn: bytes) -> str:
     head, *rows = _rows(result)
     count = sum(step.effect is not None for step in result.steps)
     first, last = result.steps[0].error.window, result.steps[-1].error.window
-    added = ", ".join(named(step.effect) for step in result.steps if step.effect)
+    added = ", ".join(step.added.name for step in result.steps if step.added)
     what = nearby(result.steps[0].error, result.blocks)
     noise = f"the measurement's noise is {result.noise_floor:.2g} {result.unit}."
     done = ["The model's own numbers corrected"] if len(rows) - 1 > count else []

@@ -7,7 +7,7 @@ import numpy as np
 
 from joda.component import Component
 from joda.diagnosis.overlap import Interval, overlap, places
-from joda.effects import AnyEffect
+from joda.effects import AnyEffect, written_as
 from joda.field import evaluate
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile
 
@@ -102,10 +102,10 @@ def moved(given: Profile, profile: Profile, effect: str) -> tuple[Moved, ...]:
         for number, pair in enumerate(zip(old, new, strict=False)):
             if pair[0].label != effect and (told := _curve(*pair, name, given.joint)):
                 out.append(Moved(name, number, told))
-    now = {one.key: one for one in profile.effects}
+    now, listed = {one.key: one for one in profile.effects}, written_as(effect)
     for old in given.effects:
         new = now[old.key]
-        if old.effect != effect and _differs(old, new):
+        if old.effect != listed and _differs(old, new):
             out.append(Moved(EFFECTS, old.key, f"{old.described()} → {new.described()}"))
     return tuple(out)
 
@@ -119,7 +119,8 @@ def given_parts(given: Profile, effect: str) -> tuple[Moved, ...]:
         for number, one in enumerate(components)
         if one.label != effect
     ]
-    others = [Moved(EFFECTS, one.key, one.key) for one in given.effects if one.effect != effect]
+    listed = written_as(effect)
+    others = [Moved(EFFECTS, one.key, one.key) for one in given.effects if one.effect != listed]
     return (*curves, *others)
 
 

@@ -53,6 +53,7 @@ class Finding:
 
     Attributes:
         effect: its name.
+        name: what a model without it lacks, in a few words.
         interval: where it acts, in normalised position.
         interval_error: one standard deviation of either end.
         probability: that it is the missing one, 0 to 1.
@@ -68,6 +69,7 @@ class Finding:
     """
 
     effect: str
+    name: str
     interval: tuple[float, float]
     interval_error: tuple[float, float]
     probability: float

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.effects import EndStopRestitution
+from joda.effects import written_as
 from joda.field import merge
 from joda.profile import CHANNELS, Channels, Profile
 
@@ -24,7 +24,7 @@ def divided(profile: Profile, effect: str, given: Profile | None = None) -> tupl
 
     Args:
         profile: divided by the labels of its components and the names of its effects.
-        effect: a name.
+        effect: a name; what it is written as counts (`joda.effects.written_as`).
         given: what this had of the effect already counts among the rest; its components are the
             first of the profile's.
     """
@@ -33,6 +33,7 @@ def divided(profile: Profile, effect: str, given: Profile | None = None) -> tupl
 
 def _some(profile: Profile, effect: str, given: Profile | None, *, own: bool) -> Profile:
     keys = {one.key for one in given.effects} if given else set()
+    listed = written_as(effect)
     channels = {}
     for name in CHANNELS:
         channel = getattr(profile.channels, name)
@@ -41,7 +42,7 @@ def _some(profile: Profile, effect: str, given: Profile | None, *, own: bool) ->
         kept = tuple(c for k, c in parts if (k >= there and c.label == effect) is own)
         channels[name] = channel.model_copy(update={"components": kept})
     effects = tuple(
-        one for one in profile.effects if (one.effect == effect and one.key not in keys) is own
+        one for one in profile.effects if (one.effect == listed and one.key not in keys) is own
     )
     return profile.model_copy(update={"channels": Channels(**channels), "effects": effects})
 
@@ -50,7 +51,7 @@ def places(profile: Profile, effect: str, given: Profile | None = None) -> list[
     """Where a profile's effect acts, in normalised position, by each of the levels: of its force,
     and of how far that rises above its least value.
 
-    All over the range if it is a law, at its end if it is an end of the range.
+    All over the range if it is a law, where it has no interval.
 
     Args:
         profile: that has it.
@@ -63,8 +64,7 @@ def places(profile: Profile, effect: str, given: Profile | None = None) -> list[
         if channel.components:
             value = np.abs(merge(channel)(np.linspace(0, 1, GRID))[0])
             return [_felt(own, level) for own in (value, value - value.min()) for level in LEVELS]
-    ends = [one.interval for one in own.effects if isinstance(one, EndStopRestitution)]
-    return ends or [(0.0, 1.0)]
+    return [getattr(one, "interval", (0.0, 1.0)) for one in own.effects] or [(0.0, 1.0)]
 
 
 def _felt(value: Array, level: float) -> Interval:

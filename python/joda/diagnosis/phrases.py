@@ -1,6 +1,8 @@
 """Effects in words: what is missing, where, how much, and what shows it."""
 
-from functools import cache
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
 from joda.profile import Joint
@@ -31,27 +33,48 @@ SUREST = 0.99
 """Highest probability that is said."""
 
 
-@cache
 def effect_names() -> tuple[str, ...]:
     """All that may be missing, but for templates of one's own."""
     return (*read_templates(), *CURVES, *EFFECTS)
 
 
-def named(effect: str) -> str:
-    """The effect in a few words: a template of one's own by its file's name."""
-    return _words(effect)[0]
+@dataclass(frozen=True)
+class Words:
+    """An effect in words.
+
+    Attributes:
+        name: what a model without it lacks.
+        shows: how it shows in measurements, a clause.
+        kind: a force over position or a resistance, which are the same where the joint goes one way
+            only; None of neither.
+    """
+
+    name: str
+    shows: str
+    kind: Literal["force", "resistance"] | None
 
 
-@cache
-def _words(effect: str) -> tuple[str, str]:
-    """An effect's name, and what shows it."""
+def words_of(effect: str, templates: Mapping[str, Template] | None = None) -> Words:
+    """What a card or a template says of an effect.
+
+    Args:
+        effect: its name.
+        templates: by name; None: the library's.
+    """
     if effect in CURVES:
-        return CURVES[effect]
+        return Words(*CURVES[effect], "resistance")
     if effect in EFFECTS:
-        return EFFECTS[effect].NAME, _lower(EFFECTS[effect].SHOWS)
-    if own := read_templates().get(effect):
-        return own.named, own.shows
-    return effect.replace("_", " "), Template.model_fields["shows"].default
+        card = EFFECTS[effect]
+        return Words(card.NAME, _lower(card.SHOWS), card.KIND)
+    if template := (read_templates() if templates is None else templates).get(effect):
+        forces = template.channels.conservative is not None
+        return Words(template.named, template.shows, "force" if forces else "resistance")
+    return Words(effect.replace("_", " "), Template.model_fields["shows"].default, None)
+
+
+def named(effect: str, templates: Mapping[str, Template] | None = None) -> str:
+    """The effect in a few words."""
+    return words_of(effect, templates).name
 
 
 def percent(probability: float) -> str:
@@ -70,7 +93,7 @@ def placed(interval: tuple[float, float], joint: Joint) -> str:
 
 
 def explained(
-    effect: str,
+    words: Words,
     direction: str,
     interval: tuple[float, float],
     unvisited: tuple[tuple[float, float], ...],
@@ -80,11 +103,12 @@ def explained(
     joint: Joint,
     uneven: bool = False,
     shown: str | None = None,
+    alike: Sequence[str] = (),
 ) -> str:
     """An effect as a sentence for a person.
 
     Args:
-        effect: its name.
+        words: what it is called, and how it shows.
         direction: both, positive or negative.
         interval: where it acts, in normalised position.
         unvisited: what of that no run has visited.
@@ -94,19 +118,21 @@ def explained(
         joint: of which it is.
         uneven: whether its size differs along the way.
         shown: how it shows with its other numbers, a sentence; None: as it does with any.
+        alike: in words, what these data cannot tell from it.
     """
     value, doubt, unit = size
     largest = " where it is largest" if uneven else ""
     way = f", {WAYS[direction]}" if direction in WAYS else ""
     of = "" if unit == "1" else f" {unit}"
-    shows = _lower(shown) if shown else _words(effect)[1]
+    shows = _lower(shown) if shown else words.shows
     before, after, noise = errors
-    name = named(effect)
+    name = words.name
+    told = f" These data cannot tell it from {' or '.join(alike)}." if alike else ""
     return (
         f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} "
         f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}{largest}: {shows}. {extrapolated(unvisited)}"
         f"With it, windows held out of the fit are missed by {after:.2g} "
-        f"instead of {before:.2g} {error_unit} (noise {noise:.2g} {error_unit})."
+        f"instead of {before:.2g} {error_unit} (noise {noise:.2g} {error_unit}).{told}"
     )
 
 

@@ -7,14 +7,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.settings import SETTINGS
-from joda.effects import (
-    AddedInertia,
-    AnyEffect,
-    GravityOffset,
-    LearnedForce,
-    LoadDependentFriction,
-)
-from joda.effects.base import CurveEffect
+from joda.effects.base import Motion
 from joda.estimation.problem import segments_for
 from joda.field import merge
 from joda.joints.resistance import damping, friction_bounds
@@ -140,7 +133,8 @@ class Needs:
             applied = max(applied, float(np.abs(measured.exerted(run)).max()))
         gravity = max(map(abs, measured.context.gravity_force))
         inertia = measured.joint_model.inertia * self.acceleration
-        self.force = inertia + applied + gravity + self.exerted(measured.profile)
+        self.force = inertia + applied + gravity
+        self.force += self.exerted(measured.profile)
         self.resistance = self._resisted(measured.profile)
         self.forced = measured.pushed
 
@@ -156,7 +150,8 @@ class Needs:
             if channel.components:
                 most = float(np.abs(merge(channel)(grid)[0]).max())
                 total += most * (self.speed if name == "damping" else 1.0)
-        return total + self._of(profile.effects)
+        motion = Motion(self.speed, self.acceleration, self.force)
+        return total + sum(one.largest_force(motion) for one in profile.effects)
 
     def exceeded(self, force: float) -> bool:
         """Whether a force (N·m or N) is far more than the runs can need."""
@@ -179,21 +174,6 @@ class Needs:
         friction = np.concatenate(friction_bounds(profile, s, v))
         drag = np.concatenate([damping(profile, s, v), damping(profile, s, -v)])
         return float(friction.mean() + v * drag.mean())
-
-    def _of(self, effects: Sequence[AnyEffect]) -> float:
-        total = 0.0
-        for one in effects:
-            if isinstance(one, CurveEffect):
-                total += max(one.y) * self.speed**one.POWER
-            elif isinstance(one, LearnedForce):
-                total += max(abs(y) for row in one.y for y in row)
-            elif isinstance(one, AddedInertia):
-                total += one.inertia * self.acceleration
-            elif isinstance(one, GravityOffset):
-                total += abs(one.force) + float(np.hypot(one.sin, one.cos))
-            elif isinstance(one, LoadDependentFriction):
-                total += one.coefficient * getattr(self, "force", 0.0)
-        return total
 
 
 def _speed(time: Array, position: Array) -> float:

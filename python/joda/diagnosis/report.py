@@ -6,9 +6,9 @@ from joda.diagnosis.experiments import Model, means_of, next_experiment, there_a
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.hypothesis_fits import joined
-from joda.diagnosis.phrases import explained
+from joda.diagnosis.phrases import explained, named, words_of
 from joda.diagnosis.ranking import Ranking
-from joda.diagnosis.rivals import indistinguishable
+from joda.diagnosis.rivals import indistinguishable, kinds_of
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.uncertainty import uncertainty
@@ -45,9 +45,11 @@ def finding(
     )
     interval = hypothesis.interval(x)
     joint = measured.profile.joint
+    words = words_of(hypothesis.effect, measured.templates)
     alone = hypothesis.write(Profile(joint=joint), x).effects
     return Finding(
         effect=hypothesis.effect,
+        name=words.name,
         interval=interval,
         interval_error=doubt.ends,
         probability=selection.probabilities[number],
@@ -56,7 +58,7 @@ def finding(
         magnitude_error=doubt.magnitude,
         unit=hypothesis.unit,
         explanation=explained(
-            hypothesis.effect,
+            words,
             hypothesis.direction,
             interval,
             unvisited_part(measured, interval),
@@ -66,6 +68,7 @@ def finding(
             joint,
             uneven=hypothesis.factors > 0,
             shown=next((one.shown for one in alone if one.effect == hypothesis.effect), None),
+            alike=[named(other, measured.templates) for other in alike],
         ),
         held_out_error_before=before,
         held_out_error_after=after,
@@ -77,10 +80,11 @@ def likeliest_findings(
     measured: Measured, ranking: Ranking, selection: Selection
 ) -> dict[int, Finding]:
     """The first few effects of a ranking that are worth a word, by their place there."""
-    held, one_way = Holdout(ranking.baseline, measured), moved_one_way(measured)
+    held = Holdout(ranking.baseline, measured)
+    kinds = kinds_of(ranking, measured.templates) if moved_one_way(measured) else {}
     return {
         k: finding(
-            measured, ranking, held, k, selection, indistinguishable(ranking, selection, k, one_way)
+            measured, ranking, held, k, selection, indistinguishable(ranking, selection, k, kinds)
         )
         for k in range(min(SETTINGS.naming.named, len(ranking.candidates)))
         if k == 0 or selection.probabilities[k] > SETTINGS.naming.worth_naming

@@ -1,11 +1,14 @@
 """The verdict as a sentence."""
 
+from collections.abc import Mapping
+
 from joda.diagnosis import phrases
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.settings import SETTINGS
 from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import compared
+from joda.template import Template
 
 STILL = " With it windows held out of the fit are still missed by {:.0f} times the noise."
 SAME = (
@@ -33,6 +36,7 @@ def summarised(
     one_way: bool,
     restitution: bool,
     doubt: str | None = None,
+    templates: Mapping[str, Template] | None = None,
 ) -> str:
     """The verdict in a sentence, where something is missing.
 
@@ -47,12 +51,14 @@ def summarised(
         one_way: whether the joint was moved in one direction only.
         restitution: of the ends, as in `Ranking`.
         doubt: of `one_factor` or `other_unit`: then it is a candidate.
+        templates: by name, which call effects what they call them; None: the library's.
     """
-    name = phrases.named(first.effect)
-    others = " or ".join(map(phrases.named, first.indistinguishable_from))
+    name = first.name
+    alike = first.indistinguishable_from
+    others = " or ".join(phrases.named(other, templates) for other in alike)
     either = f"{name} or {others}" if others else name
     if selection.verdict == "unexplained":
-        return _unexplained(either if one_way else name, selection, one_way, restitution)
+        return _unexplained(first, either if one_way else name, selection, one_way, restitution)
     likely = f"probability {phrases.percent(first.probability)}"
     if not helps(first, floor):
         return (
@@ -84,7 +90,7 @@ def heavier_summary(found: Finding, numbers_off: str) -> str:
     """
     likely = f"probability {phrases.percent(found.probability)}"
     return (
-        f"The model lacks {phrases.named(found.effect)} ({likely}): without it, its own numbers "
+        f"The model lacks {found.name} ({likely}): without it, its own numbers "
         f"would be off by one and the same factor ({numbers_off}), which chance seldom makes."
     )
 
@@ -113,13 +119,20 @@ def _sum(first: Finding, selection: Selection) -> float:
     return sum(p for name, p in selection.named if name in alike)
 
 
-def _unexplained(what: str, selection: Selection, one_way: bool, restitution: bool) -> str:
+def _unexplained(
+    first: Finding, what: str, selection: Selection, one_way: bool, restitution: bool
+) -> str:
     if restitution and selection.excess[0] < SETTINGS.selection.unexplained_excess:
         return ENDS_LEFT
     share = 100 * min(selection.share, 1.0)
     same = SAME if one_way and " or " in what else ""
     if share <= 1:
-        return f"Best guess: {what}{same}; others may explain as much."
+        none = phrases.percent(selection.unknown or 0.0)
+        likely = phrases.percent(first.probability)
+        return (
+            f"Best guess: {what}{same} (probability {likely}); that none of the known effects "
+            f"explains the data has {none}."
+        )
     part = f"{share:.0f} %"
     if share < SETTINGS.naming.something_else:
         return (

@@ -257,7 +257,8 @@ def _missing(
     base, candidate = ranking.baseline.base, ranking.candidates[number]
     doubt = (_forced(measured) and one_factor(base, candidate)) or other_unit(measured)
     one_way = moved_one_way(measured)
-    summary = summarised(first, selection, measured.floor, one_way, ranking.restitution, doubt)
+    how = selection, measured.floor, one_way, ranking.restitution, doubt
+    summary = summarised(first, *how, measured.templates)
     sure = verdict == "missing_effect" and not doubt  # else they stand in for what is not known
     beside = [(ranking.candidates[k], one.probability) for k, one in findings.items()]
     own = numbers_beside(ranking.baseline, beside) if sure else ()

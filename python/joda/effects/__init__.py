@@ -38,6 +38,7 @@ __all__ = [
     "PreslidingFriction",
     "QuadraticDamping",
     "StribeckFriction",
+    "written_as",
 ]
 
 AnyEffect = Annotated[
@@ -72,6 +73,13 @@ EFFECTS: dict[str, type[Effect]] = {
     )
 }
 """By name; those that a profile lists under `effects`."""
+
+
+def written_as(effect: str) -> str:
+    """The effect that a profile lists for one: itself, or what its card writes it as."""
+    card = EFFECTS.get(effect)
+    return (card and card.WRITTEN_AS) or effect
+
 
 CHANNEL_EFFECTS = {
     "position_dependent_friction": "friction",

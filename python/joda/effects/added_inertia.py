@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import nan
 from typing import Literal
 
-from joda.effects.base import Effect, parameter
+from joda.effects.base import Effect, Motion, parameter
 from joda.effects.guesses import MOVED, InitialGuess, Units
 
 HEAVY = 300.0
@@ -23,6 +23,10 @@ class AddedInertia(Effect):
 
     effect: Literal["added_inertia"] = "added_inertia"
     inertia: float = parameter("additional inertia", "kg·m²", "kg", (0.001, 5), gt=0)
+
+    def largest_force(self, motion: Motion) -> float:
+        """In such a motion, N·m or N."""
+        return self.inertia * motion.acceleration
 
     @classmethod
     def guesses(cls, joint: Units) -> Iterator[InitialGuess]:

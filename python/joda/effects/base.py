@@ -1,6 +1,7 @@
 """What every effect has: a name, a law, parameters with units, a text for the plugin."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import Any, ClassVar, Literal, Self
 
@@ -37,6 +38,21 @@ def parameter(
     )
 
 
+@dataclass(frozen=True)
+class Motion:
+    """How fast and under what force a joint moves at most.
+
+    Attributes:
+        speed: rad/s or m/s.
+        acceleration: rad/s² or m/s².
+        force: N·m or N.
+    """
+
+    speed: float
+    acceleration: float
+    force: float = 0.0
+
+
 class Effect(Frozen):
     """An effect beyond the three channels.
 
@@ -48,6 +64,7 @@ class Effect(Frozen):
         ON_FRICTION: whether it acts through the solver's friction row.
         LIKE_A_NUMBER: whether a number of the model or of the measurement that is off may look the
             same in runs.
+        WRITTEN_AS: the effect that a profile lists for it, as the plugin executes it; None: itself.
         SHAPE_DOUBT: part of its size by which the real thing may differ from its law; None: as
             others of its kind (calibrated: `python tests/benchmarks hidden cover`).
         DESCRIPTION: in plain words.
@@ -60,6 +77,7 @@ class Effect(Frozen):
     KIND: ClassVar[Literal["force", "resistance"] | None] = None
     ON_FRICTION: ClassVar[bool] = False
     LIKE_A_NUMBER: ClassVar[bool] = False
+    WRITTEN_AS: ClassVar[str | None] = None
     SHAPE_DOUBT: ClassVar[float | None] = None
     DESCRIPTION: ClassVar[str]
     LAW: ClassVar[str]
@@ -78,6 +96,10 @@ class Effect(Frozen):
     def shown(self) -> str:
         """How it shows in measurements, with its parameters; a sentence."""
         return self.SHOWS
+
+    def largest_force(self, motion: Motion) -> float:
+        """That it may exert in such a motion, N·m or N; 0 of what exerts none of its own."""
+        return 0.0
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:
@@ -142,6 +164,10 @@ class CurveEffect(Curve, Effect):
         if min(self.y) < 0:
             raise ValueError("y must not be negative")
         return self
+
+    def largest_force(self, motion: Motion) -> float:
+        """Where its curve is largest, N·m or N."""
+        return max(self.y) * motion.speed**self.POWER
 
     def text(self) -> str:
         """The effect as in the plugin's attribute."""

@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from joda.effects.base import Effect, parameter
+from joda.effects.base import Effect, Motion, parameter
 from joda.effects.guesses import TINY, TRIAL, InitialGuess, Units
 
 PULL = (-300.0, 300.0, 0.005)
@@ -37,6 +37,10 @@ class GravityOffset(Effect):
         if not (self.sin or self.cos or self.force):
             raise ValueError("give sin or cos for a hinge, force for a slide")
         return self
+
+    def largest_force(self, motion: Motion) -> float:
+        """In such a motion, N·m or N."""
+        return abs(self.force) + hypot(self.sin, self.cos)
 
     @classmethod
     def guesses(cls, joint: Units) -> Iterator[InitialGuess]:

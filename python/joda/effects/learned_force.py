@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from joda.component import MAX_VALUE, MIN_WIDTH, numbers
-from joda.effects.base import TABLE, Effect, parameter
+from joda.effects.base import TABLE, Effect, Motion, parameter
 
 LEAST_STEP = 1e-9
 """Narrowest gap between velocities of a table, rad/s or m/s: less is rest."""
@@ -107,6 +107,10 @@ class LearnedForce(Effect):
         if self.memory == "position" and self.gain < 0:
             raise ValueError("gain of a memory of position must not be negative")
         return self
+
+    def largest_force(self, motion: Motion) -> float:
+        """In such a motion, N·m or N."""
+        return max(abs(y) for row in self.y for y in row)
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import nan
 from typing import Literal
 
-from joda.effects.base import Effect, parameter
+from joda.effects.base import Effect, Motion, parameter
 from joda.effects.guesses import MOVED, InitialGuess, Units
 
 JAMMED = 1.0
@@ -27,6 +27,10 @@ class LoadDependentFriction(Effect):
 
     effect: Literal["load_dependent_friction"] = "load_dependent_friction"
     coefficient: float = parameter("friction per load", "1", "1", (0.02, 0.5), ge=0)
+
+    def largest_force(self, motion: Motion) -> float:
+        """In such a motion, N·m or N."""
+        return self.coefficient * motion.force
 
     @classmethod
     def guesses(cls, joint: Units) -> Iterator[InitialGuess]:

@@ -5,7 +5,7 @@ from typing import Any
 from nicegui import ui
 
 from joda.commands.studio.shared import Shared, user_errors_shown
-from joda.diagnosis.phrases import named, percent
+from joda.diagnosis.phrases import percent
 
 
 class DiagnosisPanel:
@@ -78,7 +78,7 @@ class DiagnosisPanel:
             with ui.element("article").classes("candidate"):
                 with ui.element("div").classes("line"):
                     ui.label(percent(found["probability"])).classes("probability")
-                    ui.label(named(found["effect"])).classes("name").tooltip(found["effect"])
+                    ui.label(found["name"]).classes("name").tooltip(found["effect"])
                     ui.element("div").classes("space")
                     before, after = found["held_out_error_before"], found["held_out_error_after"]
                     unit = diagnosis["unit"]

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from joda.diagnosis.hypotheses.base import Hypothesis
 from joda.diagnosis.hypotheses.effects import free_curves, from_effects
 from joda.diagnosis.hypotheses.templates import from_templates
+from joda.effects import written_as
 from joda.effects.guesses import Units
 from joda.profile import Profile
 from joda.template import Template
@@ -22,6 +23,7 @@ def hypotheses(
 
 
 def _there(h: Hypothesis, present: set[str]) -> bool:
+    listed = written_as(h.effect)
     if h.direction == "both":
-        return any(key.split()[0] == h.effect for key in present)
-    return bool({f"{h.effect} {h.direction}", f"{h.effect} both"} & present)
+        return any(key.split()[0] == listed for key in present)
+    return bool({f"{listed} {h.direction}", f"{listed} both"} & present)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from pydantic import ValidationError
 
 from joda.component import Component
 from joda.diagnosis.hypotheses.base import (
@@ -16,8 +17,9 @@ from joda.diagnosis.hypotheses.base import (
     unknowns_of,
 )
 from joda.diagnosis.hypotheses.intervals import GRID, WHOLE, felt
-from joda.effects import CHANNEL_EFFECTS, EFFECTS, CurveEffect, Effect
+from joda.effects import CHANNEL_EFFECTS, EFFECTS, CurveEffect, Effect, written_as
 from joda.effects.guesses import STRENGTH, TINY, TRIAL, InitialGuess, Units
+from joda.errors import JodaError
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
 
@@ -98,8 +100,25 @@ def from_effects(units: Units) -> Iterator[Hypothesis]:
     """The effects beyond the channels that can show in such a joint's motion."""
     for name, card in EFFECTS.items():
         for guess in card.guesses(units):
+            _check(name, guess)
             found = _hypothesis(name, card, guess)
             yield _along(units, found, guess) if issubclass(card, CurveEffect) else found
+
+
+def _check(name: str, guess: InitialGuess) -> None:
+    """Raises JodaError if what a card's guess makes is not what a profile lists for it."""
+    try:
+        made = guess.effect(list(guess.trials[0]))
+    except ValidationError as error:
+        said = error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise JodaError(
+            f"effect '{name}': the first trial of its guesses makes no effect: {said}."
+        ) from None
+    if made.effect != (listed := written_as(name)):
+        raise JodaError(
+            f"effect '{name}': its guesses make '{made.effect}', but a profile lists it as "
+            f"'{listed}'; give its card WRITTEN_AS = '{made.effect}'."
+        )
 
 
 def _hypothesis(name: str, card: type[Effect], guess: InitialGuess) -> Hypothesis:

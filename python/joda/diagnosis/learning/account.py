@@ -19,7 +19,6 @@ from joda.diagnosis.learning.formula import Formula, formula
 from joda.diagnosis.learning.law import Memory
 from joda.diagnosis.learning.nearest import Nearest, nearest
 from joda.diagnosis.outcome import draw_repaired
-from joda.diagnosis.phrases import named
 from joda.measured.measured_joint import Measured
 from joda.pictures.style import COLOURS, EFFECTS, house_style, note
 from joda.profile import Profile
@@ -131,7 +130,7 @@ def sentences(told: Account) -> list[str]:
         out.append("No formula of few terms is as good and stable.")
     if told.nearest:
         out.append(
-            f"Nearest of what has a name: {named(told.nearest.effect)}; with it what was held out "
+            f"Nearest of what has a name: {told.nearest.name}; with it what was held out "
             f"is missed by {told.nearest.times:.2g} times what it is missed by with the law."
         )
     if told.next_experiment:

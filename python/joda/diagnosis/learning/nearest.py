@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from joda.diagnosis.adding import error, starts
 from joda.diagnosis.baseline import fit_baseline
+from joda.diagnosis.phrases import named
 from joda.measured.measured_joint import Measured
 
 
@@ -13,10 +14,12 @@ class Nearest:
 
     Attributes:
         effect: its name.
+        name: the same in words.
         times: its error on what was held out, in segments, in the learned law's.
     """
 
     effect: str
+    name: str
     times: float
 
 
@@ -33,4 +36,5 @@ def nearest(train: Measured, held: Measured, effect: str, unseen: float) -> Near
     profiles = starts(fit_baseline(train), effect, None, None)
     if not profiles or not unseen:
         return None
-    return Nearest(effect, error(held, profiles[0]).window / unseen)
+    name = named(effect, train.templates)
+    return Nearest(effect, name, error(held, profiles[0]).window / unseen)
