@@ -151,7 +151,7 @@ inline double BristleStiffnessScaleInRow(double left, double h, double stiffness
 }
 
 // The force at the joint position q.
-inline double OffsetForce(const GravityOffset& gravity, double q) {
+inline double GravityForce(const GravityOffset& gravity, double q) {
   if (gravity.descent == 0) return gravity.force;
   return gravity.force + gravity.sin * std::sin(q) + gravity.cos * std::cos(q);
 }
@@ -197,7 +197,7 @@ struct Loose {
 
 // Moves the handle, on which `applied` acts, by a step beside the part that moves at v; returns the
 // force that it exerts on the part.
-inline double MoveHandle(const Backlash& backlash, double h, double applied, double v,
+inline double BacklashForce(const Backlash& backlash, double h, double applied, double v,
                          Loose* handle) {
   const double half = 0.5 * backlash.play;
   const double gap = std::clamp(handle->gap, -half, half);  // the profile may have been replaced

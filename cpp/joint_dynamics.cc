@@ -162,7 +162,7 @@ double JointDynamics::PushThroughPlay(const mjData* d, const mjtNum* state, doub
                                       Joint* joint) {
   joint->handle = {state[1], state[2]};
   const double pushed = joint->applied + state[3];
-  return MoveHandle(joint->profile.effects->backlash, h, pushed, d->qvel[joint->dof],
+  return BacklashForce(joint->profile.effects->backlash, h, pushed, d->qvel[joint->dof],
                     &joint->handle) -
          pushed;
 }
@@ -179,7 +179,7 @@ void JointDynamics::Compute(const mjModel* m, mjData* d, int instance) {
 
     double spring = step.spring ? p.conservative.Value(s, &joint.conservative) : 0;
     if (effects) {
-      spring += OffsetForce(effects->gravity, q);
+      spring += GravityForce(effects->gravity, q);
       SetStops(step, d, joint);
     }
     double yielding = h * ImplicitStiffness(p, step.spring, h, s, v, spring, inertia);

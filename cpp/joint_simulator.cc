@@ -138,7 +138,7 @@ JODA_INLINE void JointSimulator::Advance(double h, double force, double command,
   };
   const Resistance own = resist(v);
   double spring = p.conservative.Value(s, &near->conservative), pushed = force;
-  if (effects) spring += OffsetForce(effects->gravity, q);
+  if (effects) spring += GravityForce(effects->gravity, q);
   // without the plugin the engine takes springs as they are before the step, and integrates damping
   // after all rows, as it does an actuator's
   const bool bare = scheme_ == Scheme::kEngine && body_.friction_row[1] > 0;
@@ -152,7 +152,7 @@ JODA_INLINE void JointSimulator::Advance(double h, double force, double command,
   Passage behind;
   const bool has_load = effects && effects->backlash.load > 0;
   if (effects && effects->backlash.handle > 0) {
-    pushed = MoveHandle(effects->backlash, h, force, v, &state->loose);
+    pushed = BacklashForce(effects->backlash, h, force, v, &state->loose);
   } else if (has_load) {
     behind = Meet(effects->backlash, h, body_.inertia, spring + weight + force, v, own, yielding,
                   resist(v + state->loose.velocity), state->loose);

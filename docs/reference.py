@@ -1,8 +1,9 @@
-"""The reference, from the code: commands, Python, the plugin's attributes, effects, schemas, the
-house."""
+"""The reference, from the code: commands, Python, the plugin's attributes, effects, settings of the
+diagnosis, schemas, the house."""
 
 import inspect
 import json
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, get_args
@@ -12,6 +13,7 @@ import typer
 
 import joda
 from joda.cli import app
+from joda.diagnosis import settings as decisions
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
 from joda.profile import ATTRIBUTES, CHANNELS
 
@@ -52,6 +54,7 @@ def write(folder: Path) -> None:
         "python": python,
         "attributes": attributes,
         "effects": effects,
+        "settings": settings,
         "schemas": schemas,
         "architecture": architecture.page,
     }
@@ -131,6 +134,17 @@ def effects() -> str:
         out += [f"In measurements: {cls.SHOWS}", f"Source: {cls.SOURCE}."]
     out += ["## Free curves in a channel", "These effects are one more component of a channel:"]
     return _page([*out, _table(("effect", "channel"), CHANNEL_EFFECTS.items())])
+
+
+def settings() -> str:
+    """Every number that decides a diagnosis: value, unit, meaning."""
+    out = ["# Settings of the diagnosis", inspect.cleandoc(decisions.__doc__ or "")]
+    for name, group in vars(decisions.SETTINGS).items():
+        first, _, listed = inspect.cleandoc(type(group).__doc__ or "").partition("Attributes:")
+        told = dict(re.findall(r"^    (\w+): (.*(?:\n     .*)*)", listed, re.MULTILINE))
+        rows = [(f"`{key}`", f"{value:g}", _cell(told[key])) for key, value in vars(group).items()]
+        out += [f"## {name}", first.strip(), _table(("setting", "value", "what it decides"), rows)]
+    return _page(out)
 
 
 def schemas() -> str:

@@ -13,8 +13,9 @@ from joda.commands.improve import _departures as told_by_improve
 from joda.component import Component
 from joda.diagnosis import adding
 from joda.diagnosis.adding import OWN, Error, add_effect
-from joda.diagnosis.departures import DOUBT, Departures, departures, given_parts, moved, restored
+from joda.diagnosis.departures import Departures, departures, given_parts, moved, restored
 from joda.diagnosis.improvement import Step
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import Trials
 from joda.diagnosis.split import parted
 from joda.effects import GravityOffset, StribeckFriction
@@ -84,7 +85,7 @@ def test_a_curve_that_changes_at_one_place_is_told_there():
 
 def test_a_number_of_either_sign_counts_too():
     given = LID.with_effect(GravityOffset(sin=0.5, cos=-1.0))
-    for cos, far in ((-1.0, 0), (-1.0 + 0.9 * DOUBT, 0), (0.2, 1)):
+    for cos, far in ((-1.0, 0), (-1.0 + 0.9 * SETTINGS.adding.model_error, 0), (0.2, 1)):
         new = LID.with_effect(GravityOffset(sin=0.5, cos=cos))
         assert len(moved(given, new, "detent_internal")) == far
         assert moved(given, new, "gravity_offset") == ()  # that was added to
@@ -139,7 +140,7 @@ def test_a_number_that_need_not_vanish_stays(rubbing, monkeypatch):
     added_effect = add_effect(*parted(rubbing), ADDED)
     assert added_effect.effect == ADDED, added_effect.reason
     own, added = (max(part.y) for part in added_effect.profile.channels.friction.components)
-    assert own == pytest.approx(FRICTION, rel=DOUBT)
+    assert own == pytest.approx(FRICTION, rel=SETTINGS.adding.model_error)
     # the noise of two throws leaves about 2 %
     assert own + added == pytest.approx(FRICTION + RUBS, rel=0.2)
     assert added_effect.departs.sentences == ()

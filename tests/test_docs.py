@@ -1,5 +1,6 @@
 """The site is built without a warning, and what its tutorial and how-to pages show runs."""
 
+import importlib
 import json
 import re
 import shutil
@@ -234,17 +235,23 @@ def test_the_plugin_has_the_attributes_of_the_reference():
     assert ("range", *re.findall(r'"(\w+)"', texts)) == ATTRIBUTES
 
 
-def test_the_table_of_what_decides_has_every_setting():
+def test_the_table_of_what_decides_has_the_settings_of_the_formulas():
     text = (DOCS / "diagnose.md").read_text()
     table = text.partition("| setting | value |")[2].partition("\n\n")[0]
     rows = [row.split("|")[1:3] for row in table.splitlines() if row.startswith("| `")]
-    told = {
-        name: float(value)
-        for names, values in rows
-        for name, value in zip(re.findall(r"`(\w+)`", names), values.split(","), strict=True)
-    }
-    groups = asdict(SETTINGS).values()
-    assert told == {name: value for group in groups for name, value in group.items()}
+    told = {name.strip(" `"): float(value) for name, value in rows}
+    assert told == asdict(SETTINGS.selection)
+
+
+def test_every_other_setting_is_told_with_its_value():
+    sys.path.insert(0, str(DOCS))
+    page = importlib.import_module("reference").settings()
+    for name, group in asdict(SETTINGS).items():
+        table = page.partition(f"## {name}\n")[2].partition("\n## ")[0]
+        rows = dict(re.findall(r"^\| `(\w+)` \| (\S+) \| .{15,} \|$", table, re.MULTILINE))
+        assert set(rows) == set(group), name
+        for key, value in group.items():
+            assert float(rows[key]) == pytest.approx(value, rel=1e-5)
 
 
 def test_the_tests_that_pages_name_are_there():

@@ -28,7 +28,7 @@ def sentence(share):
     return " ".join(_places(SimpleNamespace(failing=(place,), unit="rad")))
 
 
-def rows(force, doubt, ways=(1.0, -1.0), count=60):
+def rows(force, force_error, ways=(1.0, -1.0), count=60):
     """Windows missed by ten times a noise of 1 that may blame such a force."""
     out = np.zeros((count, COLUMNS))
     out[:, 0] = np.linspace(0.05, 0.95, count)
@@ -36,12 +36,12 @@ def rows(force, doubt, ways=(1.0, -1.0), count=60):
     out[:, 2] = out[:, 1] / 2
     out[:, 3] = np.arange(count)
     out[:, 5:8] = 10.0, 40, 4000.0
-    out[:, 8], out[:, 9] = force, doubt
+    out[:, 8], out[:, 9] = force, force_error
     return out
 
 
 @pytest.mark.parametrize(
-    ("force", "doubt", "blamed"),
+    ("force", "force_error", "blamed"),
     [
         (0.7, 0.02, 0.7),
         (2e-16, 3e-3, None),
@@ -51,8 +51,8 @@ def rows(force, doubt, ways=(1.0, -1.0), count=60):
         (0.0, np.inf, None),
     ],
 )
-def test_a_force_that_may_be_none_is_not_blamed(force, doubt, blamed):
-    found = failing(rows(force, doubt))
+def test_a_force_that_may_be_none_is_not_blamed(force, force_error, blamed):
+    found = failing(rows(force, force_error))
     assert found and all(place.force == pytest.approx(blamed) for place in found)
     ways = [place for place in found if place.by == "direction"]
     assert len(ways) == 2 * (blamed is not None)  # each for itself, with its share
@@ -87,7 +87,7 @@ def test_noise_free_runs_that_stick_blame_no_tiny_force(friction, spring, rest, 
     assert not blamed or min(blamed) > 1e-3 * friction
     measured = read_measured(path, "lid", [runs[0]])
     (window, *_) = measured.replayer.windows(read_run(runs[0]), measured.sigma[0])
-    assert window.force == 0.0 and np.isinf(window.doubt)  # friction holds it at rest
+    assert window.force == 0.0 and np.isinf(window.force_error)  # friction holds it at rest
 
 
 SWINGS = """<mujoco><compiler angle="radian"/><option timestep=".001"/><worldbody><body>

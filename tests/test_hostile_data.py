@@ -549,7 +549,7 @@ def test_what_is_unusual_but_right_raises_no_doubt(name, tmp_path):
     model, path = tmp_path / "model.xml", written(tmp_path, lambda log: log.text(), make())
     model.write_text(xml)
     measured = read_measured(model, "door", [path])
-    light = {doubt for doubt in measured.context.doubts if "lighter than foam" in doubt}
+    light = {doubt for doubt in measured.context.warnings if "lighter than foam" in doubt}
     assert set(measured.notes) <= light  # a button with the geom of a door
     found = joda.compare(model, "door", [path])
     span = np.ptp(measured.profile.joint.range)
@@ -624,7 +624,7 @@ def test_a_range_in_the_wrong_unit_is_suspected_aloud(angle, limits, said, good,
     compiler = f'><compiler angle="{angle.strip()}"/' if angle else ""
     model.write_text(scene(HINGE.format(limits), angle=compiler))
     found = joda.context(model, "door")
-    doubt = " ".join(found.doubts)
+    doubt = " ".join(found.warnings)
     assert said in doubt
     assert bool(doubt) == bool(said)
     if limits == "0 90" and said:

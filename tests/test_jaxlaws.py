@@ -108,9 +108,9 @@ def test_bristles_at_rest_and_without_friction_are_whole():
 
 def test_a_gravity_offset_is_a_weight_on_an_arm():
     offset = alone(GravityOffset(sin=3.0, cos=-4.0)).gravity_offset
-    force, steepest = laws.offset_force(offset, jnp.array(0.7))
+    force, steepest = laws.gravity_force(offset, jnp.array(0.7))
     assert force == pytest.approx(3 * np.sin(0.7) - 4 * np.cos(0.7)) and steepest == 5
-    assert laws.offset_force(alone(GravityOffset(force=2.0)).gravity_offset, jnp.array(0.7)) == (
+    assert laws.gravity_force(alone(GravityOffset(force=2.0)).gravity_offset, jnp.array(0.7)) == (
         2,
         0,
     )
@@ -121,7 +121,7 @@ def test_a_handle_flies_through_its_play_and_gives_its_momentum():
     handle = alone(Backlash(play=0.01, inertia=J)).backlash
     g, w, v, given = *numbers(0, 0, 0), 0.0
     for n in range(1, 40):
-        on_part, g, w = laws.move_handle(handle, g, w, v, jnp.array(force), h)
+        on_part, g, w = laws.backlash_force(handle, g, w, v, jnp.array(force), h)
         given += h * float(on_part)
         flown = 0.5 * n * (n + 1) * h * h * force / J
         assert g == pytest.approx(min(flown, 0.005))
@@ -188,12 +188,12 @@ def test_an_effect_that_a_joint_has_not_does_nothing():
     place = numbers(0.3, 0.2)
     assert laws.extra_damping(own, *place) == 0
     assert laws.friction_bounds(own, *place, jnp.array(2.0)) == (0, 0)
-    assert laws.offset_force(own.gravity_offset, place[0]) == (0, 0)
+    assert laws.gravity_force(own.gravity_offset, place[0]) == (0, 0)
     row = numbers(-1, 2, 0.3, 0.1)
     assert laws.stiffen_friction_row(
         own.presliding_friction, *row, 0.01
     ) == laws.stiffen_friction_row(none.presliding_friction, *row, 0.01)
-    assert laws.move_handle(own.backlash, *numbers(0, 0.1, 0.3, 7), 0.01) == (7, 0, 0.1)
+    assert laws.backlash_force(own.backlash, *numbers(0, 0.1, 0.3, 7), 0.01) == (7, 0, 0.1)
     for learned in (own.learned_force, None):
         assert laws.learned_force(learned, *place, jnp.array(0.4), 0.01) == (0, 0)
     against = laws.Resistance(*numbers(1, 2, 3))
@@ -211,14 +211,14 @@ def test_derivatives_at_rest_are_finite():
     def everything(own, s, v, held, bound):
         up, down = laws.friction_bounds(own, s, v, 0 * v)
         row = laws.stiffen_friction_row(own.presliding_friction, held, bound, v, 1 + s, 0.01)
-        moved = laws.move_handle(own.backlash, 0 * v, 0 * v, v, 0 * v, 0.01)
+        moved = laws.backlash_force(own.backlash, 0 * v, 0 * v, v, 0 * v, 0.01)
         against = laws.resistance(own, s, s, s, v, 0 * v)
         passage = laws.meet(own.backlash, *[0 * v] * 3, 1 + s, 0 * v, against, s, against, 0.01)
         moved += laws.settle(own.backlash, passage, 0 * v, 0 * v, v, 0.01)
         moved += (*laws.learned_force(own.learned_force, s, v, held, 0.01), passage.scale)
         moved += (laws.remember(own.learned_force, v, held, 0.01),)
         parts = (laws.extra_damping(own, s, v), up, down, *row, *moved, passage.force)
-        return sum(parts) + sum(laws.offset_force(own.gravity_offset, s))
+        return sum(parts) + sum(laws.gravity_force(own.gravity_offset, s))
 
     run = jax.jit(jax.grad(everything, argnums=range(5)), compiler_options=FAST)
     for own in (*map(from_effects, both), from_effects((), NAMES)):

@@ -11,14 +11,14 @@ from joda.diagnosis import baseline as fits
 from joda.diagnosis import search
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.hypotheses import hypotheses
-from joda.diagnosis.hypotheses.base import KNOWN_SHAPE, unknowns_of
+from joda.diagnosis.hypotheses.base import unknowns_of
 from joda.diagnosis.hypotheses.effects import KNOTS, from_effects
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypotheses.templates import WELLS
 from joda.diagnosis.hypothesis_fits import beside, joined, price
 from joda.diagnosis.ranking import evidence, hopeful, weigh
 from joda.diagnosis.search import NARROWED, _shown_without_impacts, narrowed, rank
-from joda.diagnosis.selection import Evidence, Selection, closer_counts, decide, doubted
+from joda.diagnosis.selection import Evidence, Selection, closer_counts, decide, pooled
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.verdict import diagnosed
 from joda.effects import EndStopRestitution, QuadraticDamping
@@ -97,7 +97,7 @@ def test_of_free_runs_a_play_has_a_load_behind_it():
 @pytest.mark.slow
 def test_what_is_left_rough_changes_nothing_of_the_best(baseline, ranked, monkeypatch):
     refined = []
-    monkeypatch.setattr(search, "ENOUGH", 0.0)
+    monkeypatch.setattr(search, "SEARCH", replace(search.SEARCH, noise_loss=0.0))
     monkeypatch.setattr(
         fits, "refined", lambda *args, make=fits.refined: refined.append(0) or make(*args)
     )
@@ -118,7 +118,7 @@ def test_where_the_model_leaves_only_noise_few_are_fitted_to_the_end(monkeypatch
         fits, "refined", lambda *args, make=fits.refined: refined.append(0) or make(*args)
     )
     few, some = rank(baseline), len(refined)
-    monkeypatch.setattr(search, "HARDLY", -np.inf)
+    monkeypatch.setattr(search, "SEARCH", replace(search.SEARCH, rough_gain=-np.inf))
     whole = rank(baseline)
     assert some < (len(refined) - some) / 2
     assert weigh(few).verdict == weigh(whole).verdict == "adequate"
@@ -130,7 +130,9 @@ def test_all_are_fitted_to_the_end_only_if_the_best_few_are_promising(
     baseline, ranked, promising, monkeypatch
 ):
     refined, asked = [], []
-    monkeypatch.setattr(search, "ENOUGH", 0.0)  # else what is far off is left rough all the same
+    monkeypatch.setattr(
+        search, "SEARCH", replace(search.SEARCH, noise_loss=0.0)
+    )  # else what is far off is left rough all the same
     monkeypatch.setattr(
         fits, "refined", lambda *args, make=fits.refined: refined.append(0) or make(*args)
     )
@@ -249,11 +251,11 @@ def test_what_a_closer_look_contradicts_is_believed_less(before, closer, likely,
     other = names[:1] if closer is not None else ()
     said = (closer,) if closer is not None else ()
     denied = Selection("unexplained", said, (7.0, (1.5,) * len(other)), other)
-    found = doubted(first, denied)
+    found = pooled(first, denied)
     assert (found.verdict, found.effects) == (verdict, names)
     assert found.probabilities == pytest.approx((likely, 0.1 / 3))
     assert found.unknown == pytest.approx(1 - 0.1 / 3 - likely)
-    assert doubted(first, replace(denied, verdict="missing_effect")) == first
+    assert pooled(first, replace(denied, verdict="missing_effect")) == first
 
 
 @pytest.mark.parametrize(
@@ -328,7 +330,7 @@ def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
             )
             for candidate, part in zip(clear.candidates, parts, strict=False)
         ]
-        coarse = replace(candidates[0].hypothesis, misfit_tolerance=KNOWN_SHAPE)
+        coarse = replace(candidates[0].hypothesis, misfit_tolerance=SETTINGS.tolerances.known_shape)
         candidates[0] = replace(candidates[0], hypothesis=coarse)
         return weigh(replace(clear, candidates=tuple(candidates))).verdict
 

@@ -12,7 +12,8 @@ from test_hidden_bench import RELIABLE, RUNS
 
 from joda.diagnosis.baseline import RESTITUTION, fit_baseline
 from joda.diagnosis.search import rank
-from joda.diagnosis.uncertainty import AFAR, FARTHEST, REACHING, SHAPE, from_data, uncertainty
+from joda.diagnosis.settings import SETTINGS
+from joda.diagnosis.uncertainty import SHAPE, from_data, uncertainty
 from joda.diagnosis.uncertainty import _fitted as fitted
 from joda.diagnosis.uncertainty import _gaps as gaps
 from joda.hidden import EFFECTS, draw
@@ -78,7 +79,7 @@ def test_what_is_there_has_a_size_however_badly_it_is_known():
     size = candidate.hypothesis.magnitude(candidate.x)
     assert from_data(fitted(baseline, candidate))[0] >= size  # by itself it may be none
     said = uncertainty(baseline, candidate, 0.0).magnitude
-    assert size < said < (FARTHEST + 1) * size
+    assert size < said < (SETTINGS.errors.farthest + 1) * size
     assert abs(size - case.seal["magnitude"]) < 2 * said
 
 
@@ -86,7 +87,7 @@ def test_what_is_there_has_a_size_however_badly_it_is_known():
 def test_a_pull_that_is_felt_all_over_may_be_the_far_end_of_any(seed=11):
     case, baseline, candidate = found(seed, "magnetic_return_to_high_end", forced=False)
     a, b = candidate.hypothesis.interval(candidate.x)
-    assert b - a > REACHING
+    assert b - a > SETTINGS.errors.reaching
     said = uncertainty(baseline, candidate, 0.0).magnitude
     assert abs(candidate.hypothesis.magnitude(candidate.x) - case.seal["magnitude"]) < 2 * said
 
@@ -111,7 +112,11 @@ def test_what_is_left_and_what_nobody_visited_make_it_less_sure():
     none, half = (uncertainty(baseline, candidate, left) for left in (0.0, 0.5))
     assert half.magnitude > none.magnitude
     low, high = candidate.hypothesis.interval(candidate.x)
-    most = AFAR if high - low > REACHING else FARTHEST
+    most = (
+        SETTINGS.errors.from_afar
+        if high - low > SETTINGS.errors.reaching
+        else SETTINGS.errors.farthest
+    )
     assert none.magnitude <= (most + 1) * size
     # no run was below s = 0.16: how strong the magnet is at its end nobody knows
     assert abs(case.seal["magnitude"] - size) < 2 * none.magnitude

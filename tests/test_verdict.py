@@ -17,7 +17,7 @@ from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.corrections import errors_beside_a_force, numbers, off
 from joda.diagnosis.coverage import moved_one_way
 from joda.diagnosis.findings import Diagnosis, Finding
-from joda.diagnosis.phrases import explained, named
+from joda.diagnosis.phrases import explained, named, words_of
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.summary import summarised
 from joda.diagnosis.verdict import diagnosed
@@ -175,7 +175,9 @@ def test_where_no_effect_is_named_it_was_missed():
 def test_what_no_run_visited_is_said_where_it_can_be_read(away, said):
     joint = Joint(name="lid", type="hinge", range=(0.0, 2.0), unit="rad")
     size, errors = (1.0, 0.1, "N·m"), (0.1, 0.01, 0.01)
-    told = explained("detent_internal", "both", (0.1, 0.8), away, size, errors, "rad", joint)
+    told = explained(
+        words_of("detent_internal"), "both", (0.1, 0.8), away, size, errors, "rad", joint
+    )
     assert ("No run visited" in told) == bool(said)
     assert not said or said in told
 
@@ -185,7 +187,7 @@ def test_the_size_of_what_is_uneven_is_said_to_be_the_largest(uneven):
     joint = Joint(name="lid", type="hinge", range=(0.0, 2.0), unit="rad")
     size, errors = (1.0, 0.1, "N·m"), (0.1, 0.01, 0.01)
     told = explained(
-        "asymmetric_friction", "positive", (0, 1), (), size, errors, "rad", joint, uneven
+        words_of("asymmetric_friction"), "positive", (0, 1), (), size, errors, "rad", joint, uneven
     )
     assert ("1 ± 0.1 N·m where it is largest: " in told) == uneven
     assert ("1 ± 0.1 N·m: " in told) != uneven
@@ -196,7 +198,9 @@ def test_of_play_it_is_said_how_it_shows_on_its_side(side):
     joint = Joint(name="lid", type="hinge", range=(0.0, 2.0), unit="rad")
     size, errors = (0.03, 0.001, "rad"), (0.1, 0.01, 0.01)
     shown = Backlash(play=0.03, inertia=0.01, side=side).shown
-    told = explained("backlash", "both", (0, 1), (), size, errors, "rad", joint, shown=shown)
+    told = explained(
+        words_of("backlash"), "both", (0, 1), (), size, errors, "rad", joint, shown=shown
+    )
     assert f"rad: side {side}: after each reversal" in told
     assert ("the joint is light for a moment" in told) == (side == "motor")
     assert ("nothing happens for a moment" in told) == (side == "load")

@@ -23,7 +23,7 @@ from joda.diagnosis.selection import (
     Selection,
     closer_counts,
     decide,
-    doubted,
+    pooled,
     second_counts,
 )
 from joda.diagnosis.settings import SETTINGS, SelectionSettings
@@ -52,11 +52,11 @@ def decided(row: dict, settings: SelectionSettings) -> Selection:
     said = decide(first, settings=settings)
     if said.verdict != "missing_effect" and more:
         again = decide(more.pop(0), settings.second_look, wholly=True, settings=settings)
-        said = again if second_counts(said, again, settings) else said
+        said = again if second_counts(said, again) else said
     for closer in more:
         anew = decide(closer, settings=settings)
         if not closer_counts(said, anew):
-            said = doubted(said, anew, settings)
+            said = pooled(said, anew)
             break
         said = anew
     return said

@@ -86,7 +86,7 @@ bool Resist(Random& random, const Effects& e) {
   const double left = BristleStiffnessScale(e.presliding, held, bounds.Bound(), v);
   Loose handle = {0, v};
   const Backlash backlash = e.backlash.handle > 0 ? e.backlash : Backlash{1, 1};
-  const double force = MoveHandle(backlash, h, load, -v, &handle);
+  const double force = BacklashForce(backlash, h, load, -v, &handle);
   const Backlash behind = e.backlash.load > 0 ? e.backlash : Backlash{1, 0, 0.5, 0.5};
   const Resistance own = {damping, bounds};
   const Passage passage = Meet(behind, h, 1, load, v, own, 0, own, {held, v});
@@ -94,7 +94,7 @@ bool Resist(Random& random, const Effects& e) {
   const Push learned = LearnedForce(e.learned, h, s, v, held);
   return damping >= 0 && std::isfinite(damping) && bounds.positive >= 0 && bounds.negative >= 0 &&
          std::isfinite(bounds.Bound()) && left > 0 && left <= 2 && std::isfinite(force) &&
-         std::abs(handle.gap) <= 0.5 * backlash.play && std::isfinite(OffsetForce(e.gravity, v)) &&
+         std::abs(handle.gap) <= 0.5 * backlash.play && std::isfinite(GravityForce(e.gravity, v)) &&
          passage.scale >= 1 && passage.scale <= 1 / (1 - kHeaviestLoad) + 1e-9 &&
          learned.drag >= 0 && std::isfinite(learned.push + learned.drag) &&
          std::isfinite(Remember(e.learned, h, v, held)) &&

@@ -239,9 +239,9 @@ TEST_CASE("between break-away and the bound plasticity rises as half a sine") {
 }
 
 TEST_CASE("the gravity offset is a sine of the position, or a force") {
-  CHECK(OffsetForce({0.3, -0.4, 0, 0.5}, 1.2) ==
+  CHECK(GravityForce({0.3, -0.4, 0, 0.5}, 1.2) ==
         doctest::Approx(0.3 * std::sin(1.2) - 0.4 * std::cos(1.2)));
-  CHECK(OffsetForce({0, 0, 7, 0}, 1.2) == 7);
+  CHECK(GravityForce({0, 0, 7, 0}, 1.2) == 7);
 }
 
 TEST_CASE("backlash is before the part, or behind it") {
@@ -295,18 +295,18 @@ TEST_CASE("friction stops what coasts, and no more") {
 
 TEST_CASE("a handle moves freely within its play and exerts nothing") {
   Loose handle;
-  CHECK(MoveHandle({0.1, 2}, 0.01, 4, 0, &handle) == doctest::Approx(0));
+  CHECK(BacklashForce({0.1, 2}, 0.01, 4, 0, &handle) == doctest::Approx(0));
   CHECK(handle.velocity == doctest::Approx(0.02));
   CHECK(handle.gap == doctest::Approx(0.0002));
 }
 
 TEST_CASE("a handle at the end of its play moves with the part and passes on its momentum") {
   Loose handle = {0.05, 3};
-  CHECK(MoveHandle({0.1, 2}, 0.01, 4, 1, &handle) == doctest::Approx(4 + 2 * (3 - 1) / 0.01));
+  CHECK(BacklashForce({0.1, 2}, 0.01, 4, 1, &handle) == doctest::Approx(4 + 2 * (3 - 1) / 0.01));
   CHECK(handle.velocity == 1);
   CHECK(handle.gap == 0.05);
   Loose outside = {9, 1};  // a profile with less play took over
-  CHECK(MoveHandle({0.1, 2}, 0.01, 4, 1, &outside) == doctest::Approx(4));
+  CHECK(BacklashForce({0.1, 2}, 0.01, 4, 1, &outside) == doctest::Approx(4));
   CHECK(outside.gap == 0.05);
 }
 

@@ -291,8 +291,8 @@ def weigh(
     from joda import weigh as run
 
     done = run(model, joint, output, force=force)
-    for doubt in done.doubts:
-        say(doubt)
+    for warning in done.warnings:
+        say(warning)
     say(f"{done.describe()}; weigh it if you can.", output)
 
 

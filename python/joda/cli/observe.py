@@ -33,7 +33,7 @@ def context(
     found = run(model, joint)
     if as_json:
         write_text(as_json, plain(found.model_dump_json(indent=2)) + "\n")
-    say(*found.describe().split("\n"), *found.doubts)
+    say(*found.describe().split("\n"), *found.warnings)
     if as_json:
         say(as_json)
 

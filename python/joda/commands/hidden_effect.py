@@ -144,8 +144,8 @@ def hidden_effect(
     judgement, right = judge(diagnosis, case.seal, before, after)
     say(f"  hidden: {truth}")
     for one in () if alien else diagnosis.effects[:1]:
-        doubt = f" \u00b1 {one.magnitude_error:.2g}"
-        say(f"  said:   {one.name}, {_where(vars(one))}, {_size(vars(one), doubt)}")
+        error = f" \u00b1 {one.magnitude_error:.2g}"
+        say(f"  said:   {one.name}, {_where(vars(one))}, {_size(vars(one), error)}")
     say(judgement)
     if case.visible < VISIBLE:
         say(f"It moves the joint by only {case.visible:.1f} times the measurement's noise.")
@@ -172,9 +172,9 @@ def _where(told: dict[str, Any]) -> str:
     return f"s = {a:.2f} to {b:.2f}"
 
 
-def _size(told: dict[str, Any], doubt: str = "") -> str:
+def _size(told: dict[str, Any], error: str = "") -> str:
     of = "" if told["unit"] == "1" else f" {told['unit']}"
-    return f"{told['magnitude']:.3g}{doubt}{of}"
+    return f"{told['magnitude']:.3g}{error}{of}"
 
 
 def _unseen(before: Comparison, after: Comparison) -> str:

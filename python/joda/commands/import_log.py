@@ -103,7 +103,7 @@ def import_log(
     columns_made = scaled(read, compiled, chosen, unit_of, zero_of)
     targets = [folder / f"{file_name(one.name)}.csv" for one in read.recordings]
     made = [rows(read, one, columns_made, interpolate) for one in read.recordings]
-    found, doubts = understood(compiled, made, columns_made)
+    found, warnings = understood(compiled, made, columns_made)
     alone = None if only is None else next(p for p in chosen if p.role == "position")
     comment = "\n".join(
         [f"joda import: {read.format}, {source.resolve().name}", "time in s; rad or m, and per s"]
@@ -115,7 +115,7 @@ def import_log(
     make_folder(folder)
     check_targets(targets, force, _inputs(source, model))
     write_together(dict(zip(targets, texts, strict=True)))
-    notes = [*read.notes, *(note for one in made for note in one.notes), *doubts]
+    notes = [*read.notes, *(note for one in made for note in one.notes), *warnings]
     if only is not None and names.driven[only]:
         notes.append(
             f"Joint '{joint_name(compiled, only)}' has an actuator in the model: what it did is in "

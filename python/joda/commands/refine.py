@@ -206,7 +206,7 @@ def refine(
         raise JodaError(f"{source}: the profile of joint '{name}' has nothing to fit.")
     if why := hardly_moved(at_first):
         raise JodaError(f"{', '.join(one.name for one in clear.measured)}: {why}")
-    if times := at_first.doubtful_unit:
+    if times := at_first.unit_factor:
         raise JodaError(f"{target}: not written, as {compared(times)}: see to its unit first.")
 
     def all_of(profile: Profile) -> Profile:

@@ -33,7 +33,7 @@ Decide = Callable[[str, Generated], Decision | None]
 again, where a decision came to nothing, with the reason among the notes."""
 
 
-def doubtful(done: Mapping[str, Generated | JodaError]) -> list[str]:
+def unsure(done: Mapping[str, Generated | JodaError]) -> list[str]:
     """The labels of joints that nobody has looked at and that should be, the least sure first."""
     made = {label: one for label, one in done.items() if isinstance(one, Generated)}
     return sorted(
@@ -68,7 +68,7 @@ def review(
     Yields:
         the label of a joint that was decided on, and what it has become.
     """
-    for label in doubtful(done):
+    for label in unsure(done):
         made = done[label]
         assert isinstance(made, Generated)
         while (decision := decide(label, made)) is not None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes
-from joda.scenes.masses import mass_doubts, misplaced
+from joda.scenes.masses import implausible_mass, misplaced
 from joda.scenes.materials import Weight, estimate_weight
 from joda.scenes.model import find_joint, joint_name, load, load_model, moves_with, write_out
 
@@ -22,13 +22,13 @@ class Weighed:
     Attributes:
         before: of what the joint moves in the model, kg.
         estimate: from its size and material.
-        doubts: why the mass before cannot be, a sentence each; empty where it can.
+        warnings: why the mass before cannot be, a sentence each; empty where it can.
         output: the model with the estimate.
     """
 
     before: float
     estimate: Weight
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
     output: Path
 
     def describe(self) -> str:
@@ -71,8 +71,8 @@ def weigh(
     before, estimate = float(compiled.body_subtreemass[body]), estimate_weight(compiled, number)
     if estimate is None:
         raise JodaError(f"{source}: joint '{name}' moves no geoms, so nothing tells its size.")
-    doubts = mass_doubts(compiled, number, 1.0, True)
-    if not doubts and not force:
+    warnings = implausible_mass(compiled, number, 1.0, True)
+    if not warnings and not force:
         raise JodaError(
             f"{source}: joint '{name}' moves {before:.3g} kg, which can be (by its size about "
             f"{estimate.mass:.3g} kg); add --force to replace it all the same."
@@ -95,7 +95,7 @@ def weigh(
     found = float(after.body_subtreemass[after.jnt_bodyid[find_joint(after, joint)]])
     if not np.isclose(found, estimate.mass, rtol=1e-3):
         raise JodaError(f"{target}: MuJoCo wrote {found:.3g} kg, not {estimate.mass:.3g} kg.")
-    return Weighed(before, estimate, doubts, target)
+    return Weighed(before, estimate, warnings, target)
 
 
 def _by_geoms(spec: mujoco.MjSpec) -> mujoco.MjModel:

@@ -12,23 +12,15 @@ import numpy as np
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
 from joda.diagnosis.coverage import at_rest
-from joda.diagnosis.departures import (
-    FAITHFUL,
-    SHARED,
-    Departures,
-    departures,
-    given_parts,
-    restored,
-)
+from joda.diagnosis.departures import FAITHFUL, Departures, departures, given_parts, restored
 from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.overlap import overlap
-from joda.diagnosis.paired_test import FALLEN, MISSED_MORE, WORSE, risen, worse
+from joda.diagnosis.paired_test import MISSED_MORE, risen, worse
 from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import (
-    LIKELIER,
     LONGEST,
-    NEARLY,
     Likelihood,
     Trials,
     Tried,
@@ -50,8 +42,6 @@ OWN = (
     "the model's own numbers, fitted without it, do as well on what was held out; joda refine fits "
     "them"
 )
-NO_MORE = 1.1
-"""Error before, in units of the noise, up to which what was held out tells nothing."""
 NOTHING_LEFT = (
     "what was held out of the fit is missed by no more than the noise even without it, so that it "
     "cannot tell"
@@ -180,7 +170,7 @@ def add_effect(
         first, after, _ = best(held_fast)
         tried += held_fast
     if not first:
-        silent = reason == NO_LESS and before.window < NO_MORE * held.floor
+        silent = reason == NO_LESS and before.window < SETTINGS.adding.silent * held.floor
         return AddedEffect(train.profile, None, before, before, NOTHING_LEFT if silent else reason)
     departs = departures(given, first.profile, effect, near)
     if departs.sentences:
@@ -240,21 +230,25 @@ def by_all(
 
 def fallen(before: Error, after: Error) -> bool:
     """Whether windows are missed by less, or whole runs where windows are too short to show it."""
-    windows = after.window < NEARLY * before.window
+    windows = after.window < SETTINGS.adding.max_window_error * before.window
     if before.whole is None or after.whole is None:
         return windows
-    return windows or (after.whole < FALLEN * before.whole and after.window < before.window)
+    return windows or (
+        after.whole < SETTINGS.adding.whole_run_fall * before.whole and after.window < before.window
+    )
 
 
 def _missed_before_an_end(held: Measured, before: Errors, after: Errors) -> bool:
     """Whether whole runs are missed by more until they come to an end: what they do after that is
     also the stop's, which may be another than the model's."""
-    return risen(until_an_end(held, before), until_an_end(held, after)) > WORSE
+    return risen(until_an_end(held, before), until_an_end(held, after)) > SETTINGS.adding.max_rise
 
 
 def _as_good(other: Tried, first: Tried) -> bool:
     """Whether a profile is as good as the likeliest, on what was held out and on all runs."""
-    return other.score < first.score + LIKELIER and not clearly(first.unseen, other.unseen)
+    return other.score < first.score + SETTINGS.adding.likelier and not clearly(
+        first.unseen, other.unseen
+    )
 
 
 def starts(
@@ -268,7 +262,11 @@ def starts(
         baseline.refined(baseline.coarse(there)) for h in tried if (there := _placed(h, near))
     ]
     candidates.sort(key=lambda found: found.score)
-    close = [g for g in candidates if near and overlap(g.hypothesis.interval(g.x), near) >= SHARED]
+    close = [
+        g
+        for g in candidates
+        if near and overlap(g.hypothesis.interval(g.x), near) >= SETTINGS.adding.min_overlap
+    ]
     firsts = candidates[:1] if not close or close[0] is candidates[0] else [candidates[0], close[0]]
     shaped = [baseline.perturbed(baseline.uneven(one)) for one in firsts]
     return [checked(one.written(baseline.base)) for one in shaped]

@@ -22,6 +22,7 @@ from joda.diagnosis.hypothesis_fits import (
     uneven,
 )
 from joda.diagnosis.impacts import Impacts, Rebound, best_ratio, ends_of, impacts_at
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.units import units_of
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import Fit, SegmentEstimator, excess
@@ -43,9 +44,6 @@ class Cut(Protocol):
         """The segments; `fine`: as of `segments_of`."""
 
 
-CLEARLY, CALM = 10.0, 0.1
-"""Gain in loss from which runs tell that MuJoCo made them, in its steps or with a friction that
-yields as its own does, and what that may leave per sample beyond noise."""
 FINER = 4.0
 """Steps for one of the scene's, from which runs cannot tell that they were made in these."""
 RESTITUTION = "end_stop_restitution"
@@ -203,7 +201,7 @@ class _Fitted:
         """Whether hardly more than noise is left, so that nothing else is missing, be the model's
         own strengths as far off as they may."""
         left = self.estimator.loss(self.fit.squares)
-        return excess(left, max(self.estimator.samples, 1.0)) < CALM
+        return excess(left, max(self.estimator.samples, 1.0)) < SETTINGS.search.stepping_excess
 
 
 def _fitted(
@@ -215,7 +213,7 @@ def _fitted(
 ) -> _Fitted:
     """The model in steps that stand for none or in MuJoCo's, with a row of friction that yields."""
     estimator, plain = posed(measured, segments, accurate, row)
-    base = corrected_base(plain, measured.doubtful)
+    base = corrected_base(plain, measured.loose)
     as_it_is = base.unknowns.mean
     given = estimator.begun(base.simulator, as_it_is)
     tried = [(as_it_is, segments.start), (as_it_is, given.start)]
@@ -240,7 +238,7 @@ def _as_made(measured: Measured, cut: Cut, near: Array | None, usual: _Fitted) -
     rows = (*((None,) if stepped else ()), *((own,) if own else ()))
     made = [_fitted(measured, segments, near, not stepped, row) for row in rows]
     best = min((one for one in made if one.calm), key=lambda one: one.loss, default=usual)
-    clearly = CLEARLY / max(usual.estimator.samples, 1.0)
+    clearly = SETTINGS.search.stepping_gain / max(usual.estimator.samples, 1.0)
     return best if best.loss < min(usual.loss, alike.loss) - clearly else usual
 
 

@@ -108,7 +108,7 @@ class Calibration:
         left = {
             str(name): float(error) for name, error in zip(self.names, self.errors, strict=True)
         }
-        return replace(self.righted.of(measured), doubtful=left)
+        return replace(self.righted.of(measured), loose=left)
 
     def drawn(self) -> list[AppliedCorrections]:
         """The same with numbers that are as likely, within the errors of these."""
@@ -309,7 +309,7 @@ def _effect_instead(
     widths = zip(own.names, own.prior_stds, strict=True)
     usual = {str(name): width for name, width in widths if name not in unusual}
     estimator = found.baseline.estimator
-    model = fit_baseline(replace(found.measured, doubtful=usual), estimator.segments.length)
+    model = fit_baseline(replace(found.measured, loose=usual), estimator.segments.length)
     least = min((one.fit.loss + one.cost for one in _equivalent(model)), default=np.inf)
     told = estimator.fit(own.make, own.unknowns, fit.x, fit.start).loss
     return bool(least < told + found.price * len(unusual) - SETTINGS.corrections.equal_numbers)

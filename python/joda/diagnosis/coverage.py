@@ -17,8 +17,9 @@ def moved_one_way(measured: Measured) -> bool:
     """Whether the joint was moved in one direction only."""
     if not measured.runs:
         return one_way(np.sum([_samples(curve) for curve in measured.curves], axis=0))
-    pairs = zip(measured.runs, measured.sigma, strict=True)
-    return one_way(np.sum([ways(run.position, 6 * sigma) for run, sigma in pairs], axis=0))
+    noise = SETTINGS.naming.reversal_noises * np.asarray(measured.sigma)
+    pairs = zip(measured.runs, noise, strict=True)
+    return one_way(np.sum([ways(run.position, width) for run, width in pairs], axis=0))
 
 
 def _samples(curve: QuasiStaticComparison) -> NDArray[np.float64]:

@@ -7,14 +7,11 @@ import numpy as np
 
 from joda.component import Component
 from joda.diagnosis.overlap import Interval, overlap, places
+from joda.diagnosis.settings import SETTINGS
 from joda.effects import AnyEffect, written_as
 from joda.field import evaluate
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile
 
-DOUBT = 0.3
-"""How far off (one standard deviation, relative) a number of the model as given may be."""
-SHARED = 0.5
-"""Least overlap (intersection over union) of where an effect acts and where it was diagnosed."""
 GRID = np.linspace(0, 1, 201)
 """Positions at which curves are compared."""
 EFFECTS = "effects"
@@ -22,7 +19,7 @@ EFFECTS = "effects"
 
 @dataclass(frozen=True)
 class Moved:
-    """A component or an effect that a model gave, changed by a fit by more than `DOUBT`.
+    """A component or an effect that a model gave, changed by a fit by much (`model_error`).
 
     Attributes:
         where: its channel, or `EFFECTS`.
@@ -40,7 +37,7 @@ class Departures:
     """By what a fitted profile is not what was given and diagnosed.
 
     Attributes:
-        parts: of the model as given that it changes by more than `DOUBT`.
+        parts: of the model as given that it changes by much (`model_error`).
         changed: the same as sentences; None if there are none.
         elsewhere: that its effect acts elsewhere than diagnosed, a sentence; None if it does not.
     """
@@ -73,13 +70,14 @@ def departures(
     parts = moved(given, profile, effect)
     changed = elsewhere = None
     if parts:
+        percent = 100 * SETTINGS.adding.model_error
         changed = (
-            f"The fit changes what the model gave by more than {100 * DOUBT:.0f} %: "
+            f"The fit changes what the model gave by more than {percent:.0f} %: "
             f"{', '.join(part.described for part in parts)}. With that as given, no fit does as "
             "well on what was held out."
         )
     there = places(profile, effect, given)
-    if near and all(overlap(one, near) < SHARED for one in there):
+    if near and all(overlap(one, near) < SETTINGS.adding.min_overlap for one in there):
         (a, b), (c, d) = there[0], near
         elsewhere = (
             f"{effect} acts at s = {a:.2f} to {b:.2f}, diagnosed at s = {c:.2f} to {d:.2f}. No fit "
@@ -141,23 +139,27 @@ def restored(profile: Profile, given: Profile, parts: Collection[Moved]) -> Prof
 
 
 def _curve(old: Component, new: Component, channel: str, joint: Joint) -> str | None:
-    """Its value where it changed most, before and after; None if that is within the doubt."""
+    """Its value where it changed most, before and after; None if that is within its error."""
     before, after = (evaluate(Channel(components=(one,)), GRID)[0] for one in (old, new))
     change = np.abs(after - before)
-    if change.max() <= DOUBT * np.abs(before).max():
+    if change.max() <= SETTINGS.adding.model_error * np.abs(before).max():
         return None
     unit = joint.unit_of(channel)
     at = int(np.argmax(change))
-    where = "" if np.ptp(change) <= DOUBT * change.max() else f" at s = {GRID[at]:.2f}"
+    where = (
+        ""
+        if np.ptp(change) <= SETTINGS.adding.model_error * change.max()
+        else f" at s = {GRID[at]:.2f}"
+    )
     return f"{old.label or channel} {before[at]:.3g} → {after[at]:.3g} {unit}{where}"
 
 
 def _differs(old: AnyEffect, new: AnyEffect) -> bool:
-    """Whether one of its numbers is off by more than the doubt."""
+    """Whether one of its numbers is off by more than its error."""
     for key in (*old.parameters(), "y"):
         before, after = (getattr(one, key, 0.0) for one in (old, new))
         if not isinstance(before, str):
             change = np.abs(np.subtract(after, before)).max()
-            if change > DOUBT * np.abs(before).max():
+            if change > SETTINGS.adding.model_error * np.abs(before).max():
                 return True
     return False

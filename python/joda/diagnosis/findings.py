@@ -5,14 +5,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from joda.diagnosis.settings import SETTINGS
 from joda.errors import JodaError
 from joda.files import read_json
 from joda.plain import plain
 from joda.scenes.contacts import Contact
 
-NO_SIZE = 0.025
-"""Size of an effect, in its standard deviations, up to which it is none; that of one which is seen
-from afar only is a thirtieth (`joda.diagnosis.uncertainty`)."""
 Verdict = Literal["missing_effect", "adequate", "unexplained", "insufficient_data"]
 OfModel = Literal[
     "mass", "inertia", "gravity", "center_of_mass", "damping", "frictionloss", "stiffness"
@@ -85,7 +83,7 @@ class Finding:
     @property
     def sized(self) -> bool:
         """Whether its size is anything but zero."""
-        return abs(self.magnitude) > NO_SIZE * self.magnitude_error
+        return abs(self.magnitude) > SETTINGS.naming.no_size * self.magnitude_error
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,6 @@ from joda.measured.whiteness import drifts, free_parts
 
 Array = NDArray[np.float64]
 
-TRAVELLED = 0.3
-"""Part of a run's travel that must lie before it meets an end, for that to tell of the joint."""
-MOST = 0.9
-"""Part of all samples that free runs must hold, before an end, to tell of all."""
-APART = 5e-3
-"""Part of a strength by which another simulator's may differ."""
 FINER = 4
 """Steps for one of the scene's, for whole runs of a joint that an actuator drives."""
 SEARCHED, EACH, TIMES = 16, 100, 2
@@ -112,7 +106,7 @@ def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = (
         run = followed(measured, whole_run, sigma)
         part = until_end(run, measured.profile.joint.range, CLEAR * sigma)
         found = times(number, part)
-        if np.ptp(part.position) >= TRAVELLED * np.ptp(run.position):
+        if np.ptp(part.position) >= SETTINGS.whole_runs.before_end * np.ptp(run.position):
             told.append(found)
         whole = max(whole, found if len(part.time) == len(run.time) else times(number, run))
     return Worst(max(told, default=whole), whole)
@@ -141,7 +135,7 @@ class FreeRuns:
     @property
     def suffice(self) -> bool:
         """Whether nothing but other strengths, if that, is what the runs ask for."""
-        return self.covered > MOST and not self.drifting
+        return self.covered > SETTINGS.whole_runs.free_share and not self.drifting
 
 
 def free_runs(measured: Measured, baseline: Baseline) -> FreeRuns | None:
@@ -221,7 +215,11 @@ class _Whole:
         """The same of the model with its own strengths, and with such as another simulator may ask
         for: towards those that were fitted."""
         own = self.base.unknowns.mean
-        nearly = np.clip(fit.x, own - APART * np.abs(own), own + APART * np.abs(own))
+        nearly = np.clip(
+            fit.x,
+            own - SETTINGS.whole_runs.simulators_apart * np.abs(own),
+            own + SETTINGS.whole_runs.simulators_apart * np.abs(own),
+        )
         begun = self.estimator.begun(self.base.simulator, nearly)
         return self.denied(self.given) and self.denied(begun)
 
@@ -229,7 +227,9 @@ class _Whole:
         """Standard errors of the fitted numbers, shape (k,)."""
         unknowns = self.base.unknowns
         found = self.estimator.covariance(self.base.simulator, unknowns, fit, unknowns.prior_std)
-        return np.asarray(np.hypot(np.sqrt(np.diag(found)), APART * np.abs(fit.x)))
+        return np.asarray(
+            np.hypot(np.sqrt(np.diag(found)), SETTINGS.whole_runs.simulators_apart * np.abs(fit.x))
+        )
 
 
 def searched(estimator: SegmentEstimator, base: BaseModel, found: Fit) -> Fit:

@@ -88,10 +88,10 @@ def robust_rms(missed: Sequence[Array], noise: float) -> float:
         missed: of each segment its samples' misfits, rad or m.
         noise: standard deviation of a position, rad or m.
     """
-    bend = np.sqrt(CAUCHY_SCALE) * noise
-    logs = [np.log1p((rms(one) / bend) ** 2) for one in missed]
+    scale = np.sqrt(CAUCHY_SCALE) * noise
+    logs = [np.log1p((rms(one) / scale) ** 2) for one in missed]
     mean = np.average(logs, weights=[len(one) for one in missed])
-    return float(bend * np.sqrt(np.expm1(mean)))
+    return float(scale * np.sqrt(np.expm1(mean)))
 
 
 def _misfit(segments: Segments, make: Make, fit: Fit, counts: NDArray[np.bool_]) -> list[Array]:

@@ -20,7 +20,7 @@ from joda.diagnosis.selection import (
     Selection,
     closer_counts,
     decide,
-    doubted,
+    pooled,
     second_counts,
 )
 from joda.diagnosis.settings import SETTINGS
@@ -105,7 +105,7 @@ def looked(
         found.append(evidence(closer))
         anew = decide(found[-1], strictness)
         if not closer_counts(selection, anew):
-            selection = doubted(selection, anew)
+            selection = pooled(selection, anew)
             break
         ranking, selection = closer, anew
     return HorizonSearch(ranking, selection, first, tuple(found), free)

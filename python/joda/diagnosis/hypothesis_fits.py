@@ -11,7 +11,6 @@ from scipy.linalg import eigvalsh
 from joda._core import JointSimulator
 from joda.diagnosis.force_balance import balanced
 from joda.diagnosis.hypotheses import Hypothesis
-from joda.diagnosis.hypotheses.base import FREE_CURVE
 from joda.diagnosis.settings import SETTINGS
 from joda.estimation import simplex
 from joda.estimation.base_model import BaseModel
@@ -32,8 +31,6 @@ MOVES = (0.1, 0.04, 0.015)
 """How far ends of intervals are moved on trial, in normalised position."""
 FAR = 10.0
 """How far other numbers are moved, in their steps."""
-AS_GOOD = 1.0
-"""How much more loss is as good."""
 WIDE = 2.0
 """How far a search begins to look, in those."""
 SEARCHED, SETTLING = 15, 4
@@ -46,13 +43,8 @@ BEST = 3
 """How many trials of a hypothesis with many are fitted."""
 APART = 0.06
 """How much these must differ in one of their numbers."""
-OFF = 0.1
-"""How far off a factor of the model's own strengths is that may stand in for what is missing."""
-MUCH_LESS, FINEST = 0.5, 3
-"""Part of the loss beyond noise, at most, that a size which differs along the way leaves; and how
-many times the places at which it does become more."""
-NOTHING = 0.1
-"""Part of its step below which a strength is none."""
+FINEST = 3
+"""How many times the places at which a size differs along the way become more."""
 LOST = 10.0
 """Mean square residual of segments, in the median, from which a model's fit leads nowhere."""
 MANY = 4000
@@ -96,8 +88,12 @@ class FittedHypothesis:
         """Whether it is hardly there, no more than a simpler effect, or beyond the widest of its
         bounds: something else fits."""
         unknowns = self.hypothesis.unknowns
-        least = 1.01 * unknowns.low[0] or NOTHING * unknowns.step[0]
-        hardly = self.hypothesis.misfit_tolerance != FREE_CURVE and least > 0 and self.x[0] < least
+        least = 1.01 * unknowns.low[0] or SETTINGS.search.no_strength * unknowns.step[0]
+        hardly = (
+            self.hypothesis.misfit_tolerance != SETTINGS.tolerances.free_curve
+            and least > 0
+            and self.x[0] < least
+        )
         return bool(hardly or unknowns.pressed(self.x) or not self.hypothesis.itself(self.x))
 
     def written(self, base: BaseModel) -> Profile:
@@ -127,7 +123,7 @@ def initial_points(
 
     A factor that is far off may stand in for what is missing; many samples lead back from there.
     """
-    far = estimator.samples < MANY and np.any(np.abs(fit.x - given.x) > OFF)
+    far = estimator.samples < MANY and np.any(np.abs(fit.x - given.x) > SETTINGS.search.stand_in)
     fits = [fit, given] if far else [fit]
     wide = [CAUCHY_SCALE * usual(estimator, one) for one in fits]
     return tuple(
@@ -161,9 +157,9 @@ def screened(
         slope = (
             about.products(about.r[:, :, None], d, about.z[:, :, None])[0, 0] - across @ taken[:, 0]
         )
-        cauchy_scale = about.products(d, d)[0, 0] - across @ taken[:, 1]
-        amount = -slope / max(cauchy_scale, 1e-12)
-        gains.append(slope**2 / max(cauchy_scale, 1e-12) if amount > 0 else 0.0)
+        curvature = about.products(d, d)[0, 0] - across @ taken[:, 1]
+        amount = -slope / max(curvature, 1e-12)
+        gains.append(slope**2 / max(curvature, 1e-12) if amount > 0 else 0.0)
         first = trial.copy()
         first[0] = np.clip(
             trial[0] * np.clip(amount, 0.3, 300.0),
@@ -269,7 +265,7 @@ def uneven(
             x[len(own) :] = np.interp(here, there, factors)
         tried.append(refined(estimator, base, finer, [replace(last.fit, x=x)]))
     least = min(tried, key=lambda one: one.score)
-    much = MUCH_LESS * excess(found.fit.loss, samples)
+    much = SETTINGS.search.uneven_share * excess(found.fit.loss, samples)
     return least if excess(least.fit.loss, samples) < much else found
 
 
@@ -301,7 +297,7 @@ def perturbed(
             x = best.x.copy()
             x[k] += way
             trial = estimator.fit(make, unknowns, x, best.start, FEW)
-            if trial.loss < best.loss - AS_GOOD:
+            if trial.loss < best.loss - SETTINGS.search.equal_loss:
                 best = estimator.fit(make, unknowns, trial.x, trial.start)
     return _free(
         estimator, base, scored(estimator, found.hypothesis, estimator.refit(make, unknowns, best))
@@ -317,7 +313,11 @@ def _free(
         return found
     make, unknowns = joined(base, replace(hypothesis, unknowns=hypothesis.unknowns.inside()))
     fit = estimator.fit(make, unknowns, found.fit.x, found.fit.start)
-    return scored(estimator, hypothesis, fit) if fit.loss < found.fit.loss + AS_GOOD else found
+    return (
+        scored(estimator, hypothesis, fit)
+        if fit.loss < found.fit.loss + SETTINGS.search.equal_loss
+        else found
+    )
 
 
 def simplex_searched(

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.hypotheses import Hypothesis
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.base_model import BaseModel
 from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.segments import Segments
@@ -15,14 +16,10 @@ from joda.measured.runs import CLEAR
 from joda.profile import Channels, Profile
 from joda.scenes.limits import IMPACT_STEPS, IMPEDANCE, Stops, rebounding
 
+IMPACTS = SETTINGS.impacts
+
 Array = NDArray[np.float64]
 
-IMPACTS = 2
-"""Fewest impacts at an end whose speeds tell of it."""
-CLEARLY = 0.07
-"""How much more of its speed an end must throw back than the model's."""
-CHANCE, PART = 60.0, 0.35
-"""Least gain in loss of a bouncier end that is more than chance, and least part of the loss."""
 MOST = 24
 """Segments with impacts at an end from which on only some are looked at."""
 RATIOS = np.linspace(0.2, 0.95, 11)
@@ -46,7 +43,7 @@ def best_ratio(
     are changed by a force: where none acted, the mean of both is nearer.
     """
     seen = speed_ratios(segments, base, ends)
-    if len(seen) < IMPACTS:
+    if len(seen) < IMPACTS.min_impacts:
         return whole.ratio, whole.error
     speeds = mean_of(seen)[0]
     ratio = whole.ratio if segments.pushed else (whole.ratio + speeds) / 2
@@ -85,13 +82,13 @@ class Rebound:
     @property
     def bouncier(self) -> bool:
         """Whether a restitution that is larger than the model's is clearly better."""
-        return self.gain > max(CHANCE, PART * self.own)
+        return self.gain > max(IMPACTS.min_gain, IMPACTS.min_share * self.own)
 
     def may_be(self, ratio: float) -> bool:
         """Whether a restitution is not clearly worse than the best one, or the model's."""
         loss = float(np.interp(ratio, self.ratios, self.losses))
         least = min(self.own, float(self.losses.min()))
-        return loss - least < max(CHANCE, PART * least)
+        return loss - least < max(IMPACTS.min_gain, IMPACTS.min_share * least)
 
     @property
     def ratio(self) -> float:
@@ -108,12 +105,12 @@ class Rebound:
         """Where the least one through the three losses about the best is, and its error."""
         k = int(np.clip(np.argmin(self.losses), 1, len(self.ratios) - 2))
         e, loss = self.ratios[k - 1 : k + 2], self.losses[k - 1 : k + 2]
-        cauchy_scale, slope, _ = np.polyfit(e - e[1], loss, 2)
+        curvature, slope, _ = np.polyfit(e - e[1], loss, 2)
         noise = max(float(self.losses.min()) / max(self.samples, 1.0), 1.0)
-        if cauchy_scale <= 0:
+        if curvature <= 0:
             return float(self.ratios[np.argmin(self.losses)]), float(e[2] - e[0])
-        best = e[1] - slope / cauchy_scale / 2
-        return float(np.clip(best, e[0], e[2])), float(np.sqrt(noise / cauchy_scale))
+        best = e[1] - slope / curvature / 2
+        return float(np.clip(best, e[0], e[2])), float(np.sqrt(noise / curvature))
 
 
 @dataclass(frozen=True)
@@ -139,7 +136,9 @@ class Impacts:
 
     def rebound(self, profile: Profile) -> Rebound:
         """How well restitutions suit the impacts of a joint with a profile."""
-        alike = (self._best(ratio, profile) for ratio in (self.own, self.own + CLEARLY))
+        alike = (
+            self._best(ratio, profile) for ratio in (self.own, self.own + IMPACTS.min_restitution)
+        )
         own = min(self._loss(self.given, profile), *alike)
         losses = np.array([self._best(ratio, profile) for ratio in self.ratios])
         return Rebound(self.ratios, losses, own, self.estimator.samples)
@@ -171,10 +170,10 @@ def impacts_at(segments: Segments, base: BaseModel, given: JointModel) -> dict[i
         ratios = RATIOS
         if len(seen := speed_ratios(segments, base, [side])):
             mean, error = mean_of(seen)
-            if mean + error < own + CLEARLY:
+            if mean + error < own + IMPACTS.min_restitution:
                 continue
             ratios = np.append(RATIOS, mean)
-        tried = np.unique(ratios[(ratios > own + CLEARLY) & (ratios <= RATIOS[-1])])
+        tried = np.unique(ratios[(ratios > own + IMPACTS.min_restitution) & (ratios <= RATIOS[-1])])
         if len(tried) < FEWEST:
             continue
         out[side] = Impacts(some_of(segments, numbers), given, own, times, tried)

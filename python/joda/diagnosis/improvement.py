@@ -22,19 +22,10 @@ from joda.scenes.actuators import Servo
 from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
 
-MOST = 5
-"""Effects that are added at most."""
-TRIED = 3
-"""How many effects of a diagnosis are tried, the most likely first."""
-LIKELY = 0.1
-"""Least probability of an effect, besides the first, that is tried."""
+ADDING = SETTINGS.adding
+
 NOTHING_HELPS = "No likely effect clearly lowers the error on what was held out of the fit."
 INTERRUPTED = "Interrupted; what was found until then is kept."
-WORTH, MUCH = 0.95, 0.8
-"""Part of the error before, on runs held out, to which an effect must bring it: a likely one; one
-that is tried because nothing is likely and the first did not."""
-AS_GOOD = 1.05
-"""Part of the error with an effect up to which one that is likelier may take its place."""
 
 Parts = tuple[Measured, Measured]
 """The runs to fit, and those held out."""
@@ -88,14 +79,14 @@ def improved(
         the stairs, the first one the model as it was; and why there are no more, a sentence.
     """
     steps = [Step(None, measured.profile, error(parts[1]))]
-    why = f"{MOST} effects were added; that is as many as are tried."
+    why = f"{ADDING.most_effects} effects were added; that is as many as are tried."
     try:
         if measured.joint_model.servo and (
             first := _numbers_first(parts, steps[0].error, progress)
         ):
             parts = _driven(parts, first.servo)
             steps.append(first)
-        while len(steps) <= MOST:
+        while len(steps) <= ADDING.most_effects:
             progress("diagnose")
             given = steps[-1].profile
             found = diagnosed(_with(parts, given)[0], calibrate=len(steps) == 1)
@@ -226,10 +217,10 @@ def _next(parts: Parts, last: Step, latest: Diagnosed, progress: Progress) -> li
     if latest.unexplained_by and not last.added and not parts[0].joint_model.servo:
         train = parts[0].changed(last.profile)
         known, found = False, pairs(train, latest.unexplained_by, progress)
-    for number, (first, *second) in enumerate(found[:TRIED]):
-        if known and number and first.probability < LIKELY:
+    for number, (first, *second) in enumerate(found[: ADDING.most_tried]):
+        if known and number and first.probability < ADDING.min_probability:
             return []
-        most = WORTH if known or not number else MUCH
+        most = ADDING.max_error if known or not number else ADDING.max_error_unlikely
         if step := _added(parts, last.profile, first, most, progress):
             return _stairs(parts, step, second, progress) or [step]
     return []
@@ -272,7 +263,7 @@ def _renamed(parts: Parts, steps: list[Step], progress: Progress) -> list[Step]:
         instead = found.effects[0]
         for place in sorted({k, len(others)}):  # where it was, and last
             stairs = _stairs(parts, begin, [*others[:place], instead, *others[place:]], progress)
-            if stairs and stairs[-1].error.window < AS_GOOD * added[-1].error.window:
+            if stairs and stairs[-1].error.window < ADDING.equal_error * added[-1].error.window:
                 own = (replace(s, servo=begin.servo, right=begin.right) for s in stairs[1:])
                 return [*before, begin, *own]
     return steps
@@ -284,7 +275,9 @@ def _stairs(
     """What was found, added one after the other; None if one of them does not lower the error."""
     steps = [begin]
     for finding in findings:
-        if not finding or not (step := _added(parts, steps[-1].profile, finding, WORTH, progress)):
+        if not finding or not (
+            step := _added(parts, steps[-1].profile, finding, ADDING.max_error, progress)
+        ):
             return None
         steps.append(step)
     return steps

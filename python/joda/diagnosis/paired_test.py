@@ -5,23 +5,16 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.diagnosis.settings import SETTINGS
 from joda.measured.errors import Errors
+
+ADDING = SETTINGS.adding
 
 Array = NDArray[np.float64]
 
-SIGNIFICANT = 0.05
-"""Largest probability of as clear an improvement by chance."""
-CHANGED = 0.5
-"""By how much a window's error must change to count, in units of the noise."""
-FEWEST = 5
-"""Of fewer windows that change, none may become worse, and all together must be better."""
 EXACT, DRAWS = 12, 4000
 """Windows up to which all signs are gone through; else so many are drawn."""
 MISSED_MORE = "what was held out of the fit, replayed as a whole from its start, is missed by more"
-WORSE = 1.05
-"""How much the geometric mean of the errors of whole runs or blocks may rise."""
-FALLEN = 0.5
-"""To what part that must fall, in every one, where windows are too short to show an effect."""
 
 
 def worse(before: Errors, after: Errors) -> str | None:
@@ -37,11 +30,12 @@ def worse(before: Errors, after: Errors) -> str | None:
         for found in (before, after)
     ]
     shows_late = len(pairs[2]) and all(
-        risen(*one) < FALLEN for one in zip(pairs[2][:, None], pairs[3][:, None], strict=True)
+        risen(*one) < ADDING.whole_run_fall
+        for one in zip(pairs[2][:, None], pairs[3][:, None], strict=True)
     )
     if not improves(pairs[0], pairs[1]) and not (shows_late and not improves(pairs[1], pairs[0])):
         return "windows held out of the fit are not missed by clearly less with it (paired test)"
-    if risen(pairs[2], pairs[3]) > WORSE:
+    if risen(pairs[2], pairs[3]) > ADDING.max_rise:
         return MISSED_MORE
     return None
 
@@ -58,14 +52,14 @@ def improves(before: Array, after: Array) -> bool:
     finite = np.isfinite(before) | np.isfinite(after)
     before, after = (np.minimum(x[finite], 1e6) for x in (before, after))
     every = np.log1p(before**2) - np.log1p(after**2)
-    gain = every[np.abs(before - after) > CHANGED]
-    if len(gain) < FEWEST:
+    gain = every[np.abs(before - after) > ADDING.changed]
+    if len(gain) < ADDING.few_windows:
         return bool(every.sum() > 0 and (gain > 0).all())
     if len(gain) <= EXACT:
         signs = np.array(list(product((-1.0, 1.0), repeat=len(gain))))
     else:
         signs = np.random.default_rng(0).choice((-1.0, 1.0), (DRAWS, len(gain)))
-    return bool(np.mean(signs @ gain >= gain.sum() - 1e-12) < SIGNIFICANT)
+    return bool(np.mean(signs @ gain >= gain.sum() - 1e-12) < ADDING.chance)
 
 
 def risen(before: Array, after: Array) -> float:

@@ -120,7 +120,7 @@ def explained(
         shown: how it shows with its other numbers, a sentence; None: as it does with any.
         alike: in words, what these data cannot tell from it.
     """
-    value, doubt, unit = size
+    value, error, unit = size
     largest = " where it is largest" if uneven else ""
     way = f", {WAYS[direction]}" if direction in WAYS else ""
     of = "" if unit == "1" else f" {unit}"
@@ -130,7 +130,7 @@ def explained(
     told = f" These data cannot tell it from {' or '.join(alike)}." if alike else ""
     return (
         f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} "
-        f"\N{PLUS-MINUS SIGN} {doubt:.2g}{of}{largest}: {shows}. {extrapolated(unvisited)}"
+        f"\N{PLUS-MINUS SIGN} {error:.2g}{of}{largest}: {shows}. {extrapolated(unvisited)}"
         f"With it, windows held out of the fit are missed by {after:.2g} "
         f"instead of {before:.2g} {error_unit} (noise {noise:.2g} {error_unit}).{told}"
     )

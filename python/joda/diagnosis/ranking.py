@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joda.diagnosis.baseline import Baseline
-from joda.diagnosis.hypotheses.base import KNOWN_LAW
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, price
 from joda.diagnosis.selection import Evidence, Selection, decide
 from joda.diagnosis.settings import SETTINGS, SelectionSettings
@@ -98,7 +97,9 @@ def evidence(ranking: Ranking) -> Evidence:
         tolerant=excess(tolerant, samples),
         own=excess(rescaled(estimator, fit, ranking.level), samples),
         gain=_gain(ranking),
-        misfit_tolerance=first.hypothesis.misfit_tolerance if first else KNOWN_LAW,
+        misfit_tolerance=first.hypothesis.misfit_tolerance
+        if first
+        else SETTINGS.tolerances.known_law,
         effects=tuple(candidate.hypothesis.effect for candidate in candidates),
         left=tuple(
             excess(candidate.score, max(ranking.n_effective, 1.0)) for candidate in candidates

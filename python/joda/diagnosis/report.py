@@ -40,7 +40,7 @@ def finding(
     before, after = held.errors(candidate)
     magnitude = hypothesis.magnitude(x)
     own, left = selection.excess
-    doubt = uncertainty(
+    error = uncertainty(
         ranking.baseline, candidate, left[number] / max(own, SETTINGS.selection.negligible_excess)
     )
     interval = hypothesis.interval(x)
@@ -51,18 +51,18 @@ def finding(
         effect=hypothesis.effect,
         name=words.name,
         interval=interval,
-        interval_error=doubt.ends,
+        interval_error=error.ends,
         probability=selection.probabilities[number],
         direction=hypothesis.direction,
         magnitude=magnitude,
-        magnitude_error=doubt.magnitude,
+        magnitude_error=error.magnitude,
         unit=hypothesis.unit,
         explanation=explained(
             words,
             hypothesis.direction,
             interval,
             unvisited_part(measured, interval),
-            (magnitude, doubt.magnitude, hypothesis.unit),
+            (magnitude, error.magnitude, hypothesis.unit),
             (before, after, measured.floor),
             measured.unit,
             joint,

@@ -13,25 +13,20 @@ from joda.diagnosis.baseline import RESTITUTION, Baseline, CoarseFit
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, beside, joined
 from joda.diagnosis.ranking import Ranking, best_of_each, scored
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.estimator import SegmentEstimator
 from joda.profile import Profile
 
-PERTURBED, NEAR = 4, 3.0
-"""Of how many effects the numbers are tried elsewhere, and up to which part of the least loss."""
+SEARCH = SETTINGS.search
+
+PERTURBED = 4
+"""Of how many effects the numbers are tried elsewhere."""
 QUICK = 1200
 """Samples up to which they are tried whatever their loss; of more, up to that part of the own."""
 SEARCHED, FEW = 2, 8
 """Of how many effects they are searched without derivatives, and of how many numbers at most."""
-ENOUGH, FAR = 1.5, 5.0
-"""Loss per sample at which nothing more can be found, and from how many times the least a rough fit
-is then left as it is."""
-HARDLY = 20.0
-"""Gain in loss of a rough fit from which on something may come of it, where a model leaves only
-noise."""
 NARROWED = 6
 """How many effects are looked at again in longer segments, where the first is not sure."""
-TELLS, TELLS_EACH = 60.0, 0.1
-"""Gain in loss from which segments without impacts tell of an effect; the same, per sample."""
 
 
 Progress = Callable[[int, int, str], None]
@@ -115,7 +110,7 @@ def narrowed(
     def unstuck(pair: tuple[FittedHypothesis, FittedHypothesis]) -> FittedHypothesis:
         found, now = pair
         calm = _only_noise(found, before.baseline.estimator)
-        fell = now.fit.loss > least.fit.loss + HARDLY and found.fit.loss < was.fit.loss
+        fell = now.fit.loss > least.fit.loss + SEARCH.rough_gain and found.fit.loss < was.fit.loss
         stuck = fell or (calm and not _only_noise(now, estimator))
         return baseline.perturbed(now) if stuck else now
 
@@ -134,7 +129,11 @@ def searched_on(ranking: Ranking, progress: Progress = lambda done, total, what:
     which the loss is jagged wherever a joint sticks."""
     baseline = ranking.baseline
     least = min((one.fit.loss for one in ranking.candidates), default=0.0)
-    near = [one for one in ranking.candidates if one.fit.loss < NEAR * least + HARDLY]
+    near = [
+        one
+        for one in ranking.candidates
+        if one.fit.loss < SEARCH.near_loss * least + SEARCH.rough_gain
+    ]
     far = [one for one in ranking.candidates if one not in near]
     with ThreadPoolExecutor(cpu_count()) as pool:
         work = _Work(pool, progress, len(near))
@@ -181,12 +180,16 @@ def _fitted(
     """The others fitted to the end; not those that are far off, where one leaves only noise, nor
     those that gain hardly anything, where the model itself does."""
     least = min((one.fit.loss for one in best), default=0.0)
-    most = FAR * least if least < ENOUGH * baseline.estimator.samples else np.inf
+    most = (
+        SEARCH.far_loss * least
+        if least < SEARCH.noise_loss * baseline.estimator.samples
+        else np.inf
+    )
     if baseline.only_noise:
-        most = min(most, baseline.coarse_loss - HARDLY)
+        most = min(most, baseline.coarse_loss - SEARCH.rough_gain)
     near = [one for one in others if one.best.loss < most]
     far = [one for one in others if one.best.loss >= most]
-    refined = partial(baseline.refined, worth=FAR * least)
+    refined = partial(baseline.refined, worth=SEARCH.far_loss * least)
     return work.all(refined, near) + work.all(baseline.coarse_scored, far)
 
 
@@ -212,14 +215,16 @@ def _perturbed(
 ) -> list[FittedHypothesis]:
     """The best effects, in every variant that is near, with their numbers tried elsewhere."""
     best = best_of_each(candidates)[:PERTURBED]
-    if baseline.only_noise and all(baseline.fit.loss - one.fit.loss < HARDLY for one in best):
+    if baseline.only_noise and all(
+        baseline.fit.loss - one.fit.loss < SEARCH.rough_gain for one in best
+    ):
         return []
     names = {one.hypothesis.effect for one in best}
     others = [one for one in candidates if one.hypothesis.effect in names and one is not best[0]]
     perturbed = work.all(baseline.perturbed, work.all(baseline.uneven, best[:1]))
     least = min((one.fit.loss for one in (*candidates, *perturbed)), default=0.0)
     part = min(QUICK / max(baseline.estimator.samples, 1.0), 1.0)
-    most = max(NEAR * least, part * baseline.fit.loss)
+    most = max(SEARCH.near_loss * least, part * baseline.fit.loss)
     near = [one for one in others if one.fit.loss < most]
     work.total = work.done + len(near)
     return perturbed + work.all(baseline.perturbed, near)
@@ -231,9 +236,11 @@ def _simplex_searched(
     """The best effects where they leave more than noise, searched without derivatives."""
     best = best_of_each(candidates)[:SEARCHED]
     least = min((one.fit.loss for one in best), default=0.0)
-    if least < ENOUGH * baseline.estimator.samples:
+    if least < SEARCH.noise_loss * baseline.estimator.samples:
         return []
-    near = [one for one in best if one.fit.loss < NEAR * least and len(one.fit.x) <= FEW]
+    near = [
+        one for one in best if one.fit.loss < SEARCH.near_loss * least and len(one.fit.x) <= FEW
+    ]
     return work.all(baseline.simplex_searched, near)
 
 
@@ -242,14 +249,16 @@ def _shown_without_impacts(baseline: Baseline, candidates: Sequence[FittedHypoth
     then the restitution of the ends is asked once that is added."""
     samples = baseline.estimator.samples
     best = min(candidates, key=lambda one: one.score, default=None)
-    if best is None or best.fit.loss > ENOUGH * samples:
+    if best is None or best.fit.loss > SEARCH.noise_loss * samples:
         return False
-    return baseline.fit.loss - best.fit.loss - best.cost > max(TELLS, TELLS_EACH * samples)
+    return baseline.fit.loss - best.fit.loss - best.cost > max(
+        SEARCH.smooth_gain, SEARCH.smooth_gain_per_sample * samples
+    )
 
 
 def _only_noise(candidate: FittedHypothesis, estimator: SegmentEstimator) -> bool:
     """Whether a candidate leaves no more than noise of some segments."""
-    return candidate.fit.loss < ENOUGH * estimator.samples
+    return candidate.fit.loss < SEARCH.noise_loss * estimator.samples
 
 
 def _restarted(baseline: Baseline, candidates: Sequence[FittedHypothesis]) -> Baseline:

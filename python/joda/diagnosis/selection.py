@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joda.diagnosis.findings import Verdict
-from joda.diagnosis.hypotheses.base import KNOWN_LAW
 from joda.diagnosis.settings import SETTINGS, SelectionSettings
 
 
@@ -55,12 +54,14 @@ class Selection:
         probabilities: of the candidates, in their order.
         excess: per sample, of the model as it is and of each candidate.
         effects: the candidates' names.
+        settings: that decided.
     """
 
     verdict: Verdict
     probabilities: tuple[float, ...]
     excess: tuple[float, tuple[float, ...]]
     effects: tuple[str, ...] = ()
+    settings: SelectionSettings = SETTINGS.selection
 
     @property
     def named(self) -> tuple[tuple[str, float], ...]:
@@ -75,16 +76,14 @@ class Selection:
     @property
     def likely(self) -> bool:
         """Whether an effect is missing, and one of those named is more likely than not."""
-        return (
-            self.verdict == "missing_effect" and sum(self.probabilities) > SETTINGS.selection.likely
-        )
+        return self.verdict == "missing_effect" and sum(self.probabilities) > self.settings.likely
 
     @property
     def share(self) -> float:
         """Part of the model's excess that the first candidate leaves; all where that is too little
         to be told from what every candidate leaves."""
         own, left = self.excess
-        return left[0] / own if left and own > SETTINGS.selection.negligible_excess else 1.0
+        return left[0] / own if left and own > self.settings.negligible_excess else 1.0
 
 
 def decide(
@@ -102,18 +101,21 @@ def decide(
         settings: every number that decides.
     """
     if not found.samples:
-        return Selection("adequate", (), (0.0, ()))
+        return Selection("adequate", (), (0.0, ()), settings=settings)
     tolerant = found.tolerant < settings.unexplained_excess and not found.restitution
     without: Verdict = "adequate" if tolerant else "unexplained"
     if not found.left:
-        return Selection(without, (), (found.model, ()))
+        return Selection(without, (), (found.model, ()), settings=settings)
     left = np.array(found.left)
     noise = min(
         left.min(), settings.noise_stds * float(np.sqrt(2 / found.n_effective))
     )  # not known better
     own, left = max(found.own - noise, 0.0), left - noise
     part = settings.share_in_noise if found.noisy else found.misfit_tolerance
-    least = max(KNOWN_LAW * own, min(settings.unknown_share * own, settings.unknown_excess))
+    least = max(
+        settings.least_share * own,
+        min(settings.unknown_share * own, settings.unknown_excess),
+    )
     beside = settings.rival_share * left[1:].min(initial=np.inf)
     unknown = strictness * max(min(part * own, beside), least)
     if wholly and found.noisy:  # then an unknown one is as likely as the first
@@ -122,16 +124,16 @@ def decide(
     weights = (left + little) ** -settings.exponent
     novelty_weight = (unknown + little) ** -settings.exponent
     likely = weights / (weights.sum() + novelty_weight)
-    doubtful = likely[0] < settings.min_probability or found.restitution
+    hardly = likely[0] < settings.min_probability or found.restitution
     chance = max(settings.min_gain, settings.min_gain_per_sample * found.samples)
-    if found.gain < chance or (own < settings.unexplained_excess and doubtful):
+    if found.gain < chance or (own < settings.unexplained_excess and hardly):
         verdict = without
     elif weights[0] <= novelty_weight:
         verdict = "unexplained"
     else:
         verdict = "missing_effect"
     excess = own, tuple(map(float, left))
-    return Selection(verdict, tuple(map(float, likely)), excess, found.effects)
+    return Selection(verdict, tuple(map(float, likely)), excess, found.effects, settings)
 
 
 def closer_counts(before: Selection, closer: Selection) -> bool:
@@ -141,25 +143,21 @@ def closer_counts(before: Selection, closer: Selection) -> bool:
     return closer.verdict == "missing_effect" and (surer or closer.share <= before.share)
 
 
-def doubted(
-    before: Selection, closer: Selection, settings: SelectionSettings = SETTINGS.selection
-) -> Selection:
+def pooled(before: Selection, closer: Selection) -> Selection:
     """A look after a closer one that does not count: where that one finds that none of the effects
     explains the runs, it is believed more (a linear opinion pool), and an effect is named only if
     it is more likely than not all the same."""
     if closer.verdict != "unexplained":
         return before
-    other, more = dict(closer.named), settings.closer_weight
+    other, more = dict(closer.named), before.settings.closer_weight
     likely = tuple((p + more * other.get(name, 0.0)) / (1 + more) for name, p in before.named)
-    verdict: Verdict = "missing_effect" if likely[0] > SETTINGS.selection.likely else "unexplained"
+    verdict: Verdict = "missing_effect" if likely[0] > before.settings.likely else "unexplained"
     return replace(before, verdict=verdict, probabilities=likely)
 
 
-def second_counts(
-    first: Selection, second: Selection, settings: SelectionSettings = SETTINGS.selection
-) -> bool:
+def second_counts(first: Selection, second: Selection) -> bool:
     """Whether a second look, at longer segments, tells more than the first that left a question."""
-    if second.excess[0] <= settings.longer_excess:  # nothing shows there to be explained
+    if second.excess[0] <= first.settings.longer_excess:  # nothing shows there to be explained
         return False
     if first.verdict == "adequate":
         return second.verdict != "adequate"

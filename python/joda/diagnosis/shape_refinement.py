@@ -14,18 +14,21 @@ from numpy.typing import NDArray
 
 from joda._core import JointSimulator
 from joda.component import Component, Curve
-from joda.diagnosis.departures import DOUBT, EFFECTS, Moved
+from joda.diagnosis.departures import EFFECTS, Moved
 from joda.diagnosis.hypothesis_fits import usual
+from joda.diagnosis.settings import SETTINGS
 from joda.effects import EndStopRestitution
 from joda.estimation.estimator import CAUCHY_SCALE, SegmentEstimator
 from joda.estimation.problem import as_it_is, segments_for
-from joda.estimation.profile_parameters import DOUBT as USUAL
 from joda.estimation.profile_parameters import NARROWEST, Kind, Parameters, Slot
+from joda.estimation.profile_parameters import PRIOR_STD as USUAL
 from joda.estimation.segments import Segments
 from joda.estimation.unknowns import Unknowns
 from joda.field import evaluate
 from joda.measured.measured_joint import Measured
 from joda.profile import CHANNELS, Channel, Channels, Profile
+
+ADDING = SETTINGS.adding
 
 Array = NDArray[np.float64]
 
@@ -36,27 +39,20 @@ LAST, LONGEST = (3.0, 9.0, 27.0), 1.5
 too, s."""
 FINER = 2
 """How often control points are doubled."""
-FACTORS, LEAPS, CLEARLY = (0.5, 0.7, 1.4, 2.0), 3, 10.0
-"""By what one size is changed at a time, how often at most, and the least gain in score."""
+FACTORS, LEAPS = (0.5, 0.7, 1.4, 2.0), 3
+"""By what one size is changed at a time, and how often at most."""
 ROUNDS = 6
 """Iterations with each length, while segments that are far off count, and after."""
 NUDGE = 0.004
 """Step of a number for differences, in its own unit."""
 HELD = 1e-3
-"""Part of a number's usual doubt that is left to one that is held."""
+"""Part of a number's prior standard deviation that is left to one that is held."""
 VANISHED = 1e3
 """How many times a curve its law is, from which on a fit has made next to nothing of it."""
 EFFECT, NATIVE, LITTLE = 1.0, 0.2, 0.1
 """By what part of it an effect's curve may be more or less off its law at one end than at the
 other, one standard deviation; the model's own off what they were given as; and what part of its
 largest value counts as so much at the least."""
-PRICE = 2.0
-"""What a control point must gain, of twice the log-likelihood (Akaike 1974)."""
-NEARLY = 0.95
-"""Part of the error before, and of the loss, to which an effect must bring runs held out."""
-LIKELIER = 2 * float(np.log(20))
-"""How much less that loss, twice a negative log-likelihood, must be at least: a model that was not
-fitted to data makes them 20 times likelier than the true one does in one of 20 cases at most."""
 
 
 class Likelihood:
@@ -128,7 +124,7 @@ class Trials:
     def tried(self, profile: Profile) -> Tried:
         """A profile, scored."""
         loss = self.unseen.loss(profile)
-        price = PRICE * sum(len(part.x) for part in _parts(profile))
+        price = ADDING.control_point * sum(len(part.x) for part in _parts(profile))
         return Tried(profile, loss, self.seen.loss(profile) + loss + price)
 
     def reshaped(
@@ -193,7 +189,7 @@ class Trials:
         for _ in range(LEAPS):
             progress("sizes that fits do not reach")
             leapt = likeliest([found[-1], *map(self.tried, self._resized(found[-1].profile))])
-            if leapt.score > found[-1].score - CLEARLY:
+            if leapt.score > found[-1].score - ADDING.factor_gain:
                 break
             found.append(leapt)
         return found
@@ -217,7 +213,7 @@ class Trials:
 
 def clearly(loss: float, than: float) -> bool:
     """Whether a loss is less by enough not to be by chance."""
-    return loss < min(NEARLY * than, than - LIKELIER)
+    return loss < min(ADDING.max_window_error * than, than - ADDING.likelier)
 
 
 def likeliest(found: Sequence[Tried]) -> Tried:
@@ -339,7 +335,7 @@ def _known(parameters: Parameters, given: Profile, law: Profile) -> tuple[Array,
             prior_std[k] *= size * np.sqrt(len(own.x))  # all together as well known as one number
         elif there is not None and any(there.y) and len(there.y) == len(own.y):
             mean[k] = there.y[slot.index] / scale
-            prior_std[k] *= DOUBT * size / USUAL["values"]
+            prior_std[k] *= ADDING.model_error * size / USUAL["values"]
     return mean, prior_std
 
 

@@ -24,7 +24,7 @@ BLIND = (
 
 def other_unit(measured: Measured) -> str | None:
     """That the force of a curve may be in another unit, a clause; None if not."""
-    if not (times := measured.doubtful_unit):
+    if not (times := measured.unit_factor):
         return None
     return f"{compared(times)}: see to its unit first"
 

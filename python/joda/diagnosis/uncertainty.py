@@ -16,15 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline
-from joda.diagnosis.hypotheses.base import (
-    FREE_CURVE,
-    KNOWN_LAW,
-    KNOWN_SHAPE,
-    everywhere,
-)
+from joda.diagnosis.hypotheses.base import everywhere
 from joda.diagnosis.hypotheses.intervals import GRID
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.diagnosis.impacts import Rebound, best_ratio, ends_of
+from joda.diagnosis.settings import SETTINGS
 from joda.effects.guesses import STRENGTH, TRIAL
 from joda.estimation.estimator import Make, SegmentEstimator
 from joda.estimation.segments import Simulator
@@ -32,50 +28,26 @@ from joda.estimation.unknowns import Unknowns
 from joda.field import merge
 from joda.profile import CHANNELS, Profile
 
+ERRORS = SETTINGS.errors
+
 Array = NDArray[np.float64]
 
 STEPS = (1.0, 2.0, 4.0)
 """How far a number is moved off its best value, in its standard deviations by curvature."""
 ITERATIONS = 3
 """Of the fit of all others there."""
-RISE = 4.0
-"""Rise of the loss, in overdispersions, from which a point is no longer as good (2 standard
-deviations)."""
 DRAWS = 200
 """Bootstrap samples."""
 FEW_RUNS = 5
 """Of fewer runs, segments are drawn instead."""
-
-
-SHAPE = {KNOWN_LAW: 0.01, FREE_CURVE: 0.07, KNOWN_SHAPE: 0.05}
-"""Part of its size by which an effect's law may differ from its kind, by what is known of it;
-these and what follows are calibrated by the bench `hidden cover` (docs/reliability.md)."""
-DEFINITION = 0.08
-"""Part of its interval's width by which what counts as its end may differ."""
-TOLERATED = 0.02
-"""Part of what an effect explains that another law of its shape may fail to."""
-HIDDEN = 0.5
-"""Part of the size that may hide in what is left of the misfit, by the root of its share for each
-part that is not left."""
-FARTHEST = 10.0
-"""Largest doubt of what is there, or is extrapolated, in units of the magnitude: nothing is known
-of how large it is."""
-REACHING, AFAR = 0.5, 30.0
-"""Part of the range over which a pull to an end is felt that is more than a local one's; its doubt
-then, in units of the magnitude, as that may be the far end of a much stronger one."""
-STRETCHED = 0.125
-"""Doubt of an extrapolated effect's ends, by that of its magnitude, in units of the width."""
-PLAUSIBLE = 2.0
-"""How much larger a strength may be than the effect's largest, a priori (one standard
-deviation)."""
-AT_END = 0.02
-"""Doubt of the place of an end that throws back, in normalised position."""
-EDGE = 0.03
-"""How far within what was visited an end must be to be clearly there, in normalised position."""
+SHAPE = {
+    SETTINGS.tolerances.known_law: ERRORS.known_law,
+    SETTINGS.tolerances.free_curve: ERRORS.free_curve,
+    SETTINGS.tolerances.known_shape: ERRORS.known_shape,
+}
+"""Part of its size by which an effect's law may differ from its kind, by what is known of it."""
 UNKNOWN_END = 3**-0.5
 """The same of the interval's other end, where the other end of the range tells nothing."""
-HARDLY = 0.005
-"""Part of the samples at either end of what was visited that do not count as visited."""
 
 
 @dataclass(frozen=True)
@@ -131,18 +103,33 @@ def uncertainty(baseline: Baseline, found: FittedHypothesis, left: float) -> Unc
     fitted = _fitted(baseline, found)
     gain = max(baseline.fit.loss - found.fit.loss, 0.0)
     best = fitted.described(fitted.x)
-    data = from_data(fitted, TOLERATED * gain * (found.hypothesis.misfit_tolerance == KNOWN_SHAPE))
+    data = from_data(
+        fitted,
+        ERRORS.tolerated
+        * gain
+        * (found.hypothesis.misfit_tolerance == SETTINGS.tolerances.known_shape),
+    )
     magnitude, a, b = map(float, best)
     shape = _of_its_law(found)
     left = float(np.clip(left, 0.0, 1.0))
-    part = min(shape + HIDDEN * left**0.5 / max(1.0 - left, 1 / FARTHEST), FARTHEST)
+    part = min(
+        shape + ERRORS.hidden * left**0.5 / max(1.0 - left, 1 / ERRORS.farthest),
+        ERRORS.farthest,
+    )
     seen, visited = _seen(baseline, found)
-    beyond = min(max(magnitude / seen, 1.0) - 1.0 if seen > 0 else FARTHEST, FARTHEST)
-    if from_afar := _at_bound(found) or (_pulls(found) and b - a > REACHING):
-        beyond = AFAR
-    most = FARTHEST * magnitude if _there(found) else np.inf
+    beyond = min(
+        max(magnitude / seen, 1.0) - 1.0 if seen > 0 else ERRORS.farthest,
+        ERRORS.farthest,
+    )
+    if from_afar := _at_bound(found) or (_pulls(found) and b - a > ERRORS.reaching):
+        beyond = ERRORS.from_afar
+    most = ERRORS.farthest * magnitude if _there(found) else np.inf
     size = np.linalg.norm([min(data[0], most), part * magnitude, beyond * magnitude])
-    width = max(DEFINITION, part, STRETCHED * min(beyond, FARTHEST)) * (b - a)
+    width = max(
+        ERRORS.definition,
+        part,
+        ERRORS.stretched * min(beyond, ERRORS.farthest),
+    ) * (b - a)
     free = from_afar or found.hypothesis.ends == 2
     ends = tuple(
         float(np.linalg.norm([spread, width * (free or 0.0 < end < 1.0), gap]))
@@ -184,7 +171,7 @@ def _prior(fitted: _Fitted) -> Array:
     wide = np.full(len(fitted.x), np.inf)
     wide[own] = (unknowns.high - unknowns.low)[own] / np.sqrt(12)
     strengths = own[unknowns.high[own] == STRENGTH[1]]
-    wide[strengths] = PLAUSIBLE * max(np.abs(fitted.x[strengths]).max(initial=0.0), TRIAL)
+    wide[strengths] = ERRORS.plausible * max(np.abs(fitted.x[strengths]).max(initial=0.0), TRIAL)
     return unknowns.known + np.diag(wide**-2.0)
 
 
@@ -194,7 +181,15 @@ def _seen(baseline: Baseline, found: FittedHypothesis) -> tuple[float, tuple[flo
     lo, hi = joint.range
     rows = segments.rows[baseline.estimator.counts]
     s = (segments.position[rows[rows >= 0]] - lo) / (hi - lo)
-    low, high = np.clip(np.quantile(s, (HARDLY, 1 - HARDLY)), 0.0, 1.0) if len(s) else (0.0, 1.0)
+    low, high = (
+        np.clip(
+            np.quantile(s, (ERRORS.unvisited_samples, 1 - ERRORS.unvisited_samples)),
+            0.0,
+            1.0,
+        )
+        if len(s)
+        else (0.0, 1.0)
+    )
     bare = found.hypothesis.write(Profile(joint=joint), found.x)
     magnitude = found.hypothesis.magnitude(found.x)
     drawn = (getattr(bare.channels, name) for name in CHANNELS)
@@ -209,7 +204,7 @@ def _seen(baseline: Baseline, found: FittedHypothesis) -> tuple[float, tuple[flo
 
 def _of_its_law(found: FittedHypothesis) -> float:
     """Part of its size by which the real thing may differ from its law: its own, or its kind's."""
-    own = found.hypothesis.shape_doubt
+    own = found.hypothesis.shape_error
     return SHAPE[found.hypothesis.misfit_tolerance] if own is None else own
 
 
@@ -228,7 +223,10 @@ def _at_bound(found: FittedHypothesis) -> bool:
 
 def _shaped(found: FittedHypothesis) -> bool:
     """Whether the law is known by its shape, and has a scale but no ends."""
-    return found.hypothesis.misfit_tolerance == KNOWN_SHAPE and found.hypothesis.ends == 0
+    return (
+        found.hypothesis.misfit_tolerance == SETTINGS.tolerances.known_shape
+        and found.hypothesis.ends == 0
+    )
 
 
 def _pulls(found: FittedHypothesis) -> bool:
@@ -242,8 +240,8 @@ def _gaps(interval: tuple[float, float], visited: tuple[float, float]) -> list[f
     may be anywhere from there to the end of the range, uniformly."""
     low, high = visited
     lows, highs = (
-        low * np.less(interval, low + EDGE),
-        (1 - high) * np.greater(interval, high - EDGE),
+        low * np.less(interval, low + ERRORS.clearly_visited),
+        (1 - high) * np.greater(interval, high - ERRORS.clearly_visited),
     )
     return [float(gap) / 3**0.5 for gap in lows + highs]
 
@@ -265,7 +263,7 @@ def _restitution(baseline: Baseline, found: FittedHypothesis) -> Uncertainty:
     law = _of_its_law(found) * size
     error = float(np.hypot(best_ratio(whole, segments, base, sides)[1], law))
     known = (side in sides or (side in told and not told[side].may_be(size)) for side in (-1, 1))
-    low, high = (AT_END if there else UNKNOWN_END for there in known)
+    low, high = (ERRORS.at_end if there else UNKNOWN_END for there in known)
     return Uncertainty(error, (low, high))
 
 
@@ -317,6 +315,6 @@ def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Arra
                 rise = max(fit.loss - least, 0.0) / overdispersion
                 moved = np.abs(fitted.described(np.insert(y, k, value)) - best)
                 out = np.maximum(out, moved / np.sqrt(max(rise, 1.0)))
-                if rise > RISE or value in (unknowns.low[k], unknowns.high[k]):
+                if rise > ERRORS.rise or value in (unknowns.low[k], unknowns.high[k]):
                     break
     return out

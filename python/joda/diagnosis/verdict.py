@@ -146,7 +146,7 @@ def _together(
         widths.pop("force_scale", None)
     if not (measured.runs and widths):
         return None
-    free = replace(measured, doubtful=widths)
+    free = replace(measured, loose=widths)
     ranking = rank(fit_baseline(free), exclude, progress, hopeful, Needs(measured).allow)
     if not weigh(ranking).likely:
         return None

@@ -21,7 +21,7 @@ class Backlash(Effect):
     """Play between two parts, of which the joint's own is the one that is measured."""
 
     NAME = "play between what is pushed and what moves"
-    SHAPE_DOUBT = 0.03  # a stiff contact yields a little before it carries
+    SHAPE_ERROR = 0.03  # a stiff contact yields a little before it carries
     DESCRIPTION = (
         "What pushes the joint has play, or what the joint moves has: a loose handle, gears, a "
         "slack linkage."

@@ -65,7 +65,7 @@ class Effect(Frozen):
         LIKE_A_NUMBER: whether a number of the model or of the measurement that is off may look the
             same in runs.
         WRITTEN_AS: the effect that a profile lists for it, as the plugin executes it; None: itself.
-        SHAPE_DOUBT: part of its size by which the real thing may differ from its law; None: as
+        SHAPE_ERROR: part of its size by which the real thing may differ from its law; None: as
             others of its kind (calibrated: `python tests/benchmarks hidden cover`).
         DESCRIPTION: in plain words.
         LAW: the formula; v is the joint's velocity, s its normalised position.
@@ -78,7 +78,7 @@ class Effect(Frozen):
     ON_FRICTION: ClassVar[bool] = False
     LIKE_A_NUMBER: ClassVar[bool] = False
     WRITTEN_AS: ClassVar[str | None] = None
-    SHAPE_DOUBT: ClassVar[float | None] = None
+    SHAPE_ERROR: ClassVar[float | None] = None
     DESCRIPTION: ClassVar[str]
     LAW: ClassVar[str]
     SOURCE: ClassVar[str]

@@ -15,7 +15,7 @@ class PreslidingFriction(Effect):
     NAME = "dry friction that gives way elastically before it slides"
     KIND = "resistance"
     ON_FRICTION = True
-    SHAPE_DOUBT = 0.04  # bristles yield before they slide
+    SHAPE_ERROR = 0.04  # bristles yield before they slide
     DESCRIPTION = (
         "Before dry friction slides it gives way like a spring: small motions come back, reversals "
         "are soft."

@@ -17,16 +17,17 @@ from joda.scenes.native import DAMPING, FRICTION, SPRING
 
 Array = NDArray[np.float64]
 
-BASE_DOUBT = 0.15
+BASE_STD = 0.15
 """How far off (one standard deviation, relative) the model's own strengths may be."""
-DRIVEN_DOUBT = 3.0
+DRIVEN_STD = 3.0
 """The same of joints that an actuator drives, whose friction few models know."""
-GAIN_AT_MOST, GAIN_DOUBT = 7.0, 0.7
-"""Largest logarithm of the factor by which an actuator's gain may be off, and its doubt."""
+GAIN_AT_MOST, GAIN_STD = 7.0, 0.7
+"""Largest logarithm of the factor by which an actuator's gain may be off, and its prior
+standard deviation."""
 HELD = 1e-6
-"""Doubt of a number that is not there."""
-DELAY_AT_MOST, DELAY_DOUBT = 0.1, 0.02
-"""Longest delay of commands, and its doubt, s."""
+"""Prior standard deviation of a number that is not there."""
+DELAY_AT_MOST, DELAY_STD = 0.1, 0.02
+"""Longest delay of commands, and its prior standard deviation, s."""
 FAR_AWAY = ((-4.0, -2.0, 10.0), (-2.0, -1.0, 3.0), (2.0, 1.0, 1.0))
 """Logarithms of gain and damping, and factors of friction, from which fits begin besides."""
 
@@ -135,8 +136,8 @@ def base_of(
         if any(part.y) and (name, number) not in shared
     )
     k = len(places)
-    prior_std, most = (BASE_DOUBT, 20.0) if joint_model.servo is None else (DRIVEN_DOUBT, 100.0)
-    prior_stds = np.array([_doubt(profile, place, trust, prior_std) for place in places])
+    prior_std, most = (BASE_STD, 20.0) if joint_model.servo is None else (DRIVEN_STD, 100.0)
+    prior_stds = np.array([_prior_std(profile, place, trust, prior_std) for place in places])
     unknowns = Unknowns(np.zeros(k), np.full(k, most), np.full(k, 0.01), np.ones(k), prior_stds)
     if joint_model.servo is not None:
         unknowns = unknowns.and_(_of_servo(joint_model.servo, trust))
@@ -151,7 +152,7 @@ def shared_damping(profile: Profile, servo: Servo | None) -> list[tuple[str, int
     return [("damping", number) for number, part in parts if part.label == DAMPING]
 
 
-def _doubt(profile: Profile, place: tuple[str, int], trust: Trust, usual: float) -> float:
+def _prior_std(profile: Profile, place: tuple[str, int], trust: Trust, usual: float) -> float:
     """How far off a component's strength may be: those of a profile as usual."""
     channel, number = place
     label = getattr(profile.channels, channel).components[number].label
@@ -162,11 +163,11 @@ def _doubt(profile: Profile, place: tuple[str, int], trust: Trust, usual: float)
 
 def _of_servo(servo: Servo, trust: Trust) -> Unknowns:
     """Gain, damping and delay of an actuator, of which a model's are rarely right."""
-    damps = trust.width("damping", GAIN_DOUBT) if servo.damping else HELD  # else only the joint's
+    damps = trust.width("damping", GAIN_STD) if servo.damping else HELD  # else only the joint's
     prior_std = (
-        trust.width("actuator_gain", GAIN_DOUBT),
+        trust.width("actuator_gain", GAIN_STD),
         damps,
-        trust.width("time_delay", DELAY_DOUBT),
+        trust.width("time_delay", DELAY_STD),
     )
     return Unknowns(
         low=np.array([-GAIN_AT_MOST, -GAIN_AT_MOST, 0.0]),

@@ -78,8 +78,8 @@ class Linearization:
     Attributes:
         r: shape (m, n).
         J: by the numbers, shape (m, n, k).
-        S: by the starts' doubts, shape (m, n, d).
-        z: how far the starts are from the measured ones, in doubts, shape (m, d).
+        S: by the starts' prior standard deviations, shape (m, n, d).
+        z: how far the starts are from the measured ones, in these, shape (m, d).
         weight: of each segment, shape (m,).
     """
 
@@ -140,7 +140,7 @@ class Linearization:
         return np.asarray((r**2).sum(axis=1) + ((self.z + own) ** 2).sum(axis=1))
 
     def follow(self, move: Array) -> Array:
-        """How the starts move, in doubts, when the numbers do; shape (m, d)."""
+        """How the starts move, in these, when the numbers do; shape (m, d)."""
         return np.asarray(-(self.inverse @ self.start_gradient(self.r + self.J @ move))[:, :, 0])
 
 
@@ -250,7 +250,7 @@ class SegmentEstimator:
             central: see above.
 
         Returns:
-            by the numbers and by the starts' doubts, as in `Linearization`.
+            by the numbers and by the starts' prior standard deviations, as in `Linearization`.
         """
         segments, k = self.segments, len(x)
         off = np.diag(unknowns.step)

@@ -211,10 +211,10 @@ class CorrectedBase(BaseModel):
         return self.nuisances.with_profile(profile, x)
 
 
-def corrected_base(base: BaseModel, doubtful: Mapping[str, float]) -> BaseModel:
+def corrected_base(base: BaseModel, loose: Mapping[str, float]) -> BaseModel:
     """A model whose numbers that were set right may be off by their errors; itself without such."""
-    names = tuple(name for name in USUAL if name in doubtful)
-    return with_numbers(Nuisances(base, names, tuple(map(doubtful.__getitem__, names))))
+    names = tuple(name for name in USUAL if name in loose)
+    return with_numbers(Nuisances(base, names, tuple(map(loose.__getitem__, names))))
 
 
 def with_numbers(own: Nuisances) -> BaseModel:

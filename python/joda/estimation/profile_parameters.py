@@ -49,7 +49,7 @@ LARGEST = {"breakaway": 1.0, "restitution": 0.95, "share": 0.99}
 LEAST_LEFT = 0.02
 """Least part of an effect's number that a fit may leave."""
 
-DOUBT: dict[Kind, float] = {
+PRIOR_STD: dict[Kind, float] = {
     "values": 0.5,
     "intervals": 0.1,
     "strengths": 0.5,
@@ -164,7 +164,7 @@ class Parameters:
         self.start = np.array(start)
         self.scales = np.array([_scale(profile, slot, gravity) for slot in slots])
         seen = [max(_seen(profile, slot, away), UNSEEN) for slot in slots]
-        self.prior_std = np.array([DOUBT[slot.kind] for slot in slots]) * seen
+        self.prior_std = np.array([PRIOR_STD[slot.kind] for slot in slots]) * seen
         farthest = [LOGARITHM if slot.kind == "sizes" else FARTHEST for slot in slots]
         self._farthest = np.array(farthest)
         G = np.zeros((len(rows), len(slots)))

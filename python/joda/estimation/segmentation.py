@@ -183,7 +183,7 @@ def starts(time: Array, position: Array, at: Array, sigma: float) -> tuple[Array
         sigma: noise of the position, rad or m.
 
     Returns:
-        positions and velocities, and their doubts; shape (m, 2) each.
+        positions and velocities, and their standard deviations; shape (m, 2) each.
     """
     begun = smoothing.smooth(time, position, at, sigma)
     start = np.stack([begun.position, begun.velocity], axis=1)

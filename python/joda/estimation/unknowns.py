@@ -17,7 +17,7 @@ class Unknowns:
     Attributes:
         low, high: bounds.
         step: for central differences.
-        mean, prior_std: what is known before the data; infinite doubt for nothing.
+        mean, prior_std: what is known before the data; infinite for nothing.
         constraints: what else must hold.
         widest: to which bounds those may be widened that are only usual, shape (2, k), lows first;
             NaN for what cannot be beyond its bound. None for nothing to widen.

@@ -58,25 +58,25 @@ def understood(
 ) -> tuple[list[Understood], list[str]]:
     """What was understood of each column of the runs, and a sentence for what looks wrong."""
     positions = {one.pick.joint: one.pick.target for one in columns if one.pick.role == "position"}
-    found, doubts = [], []
+    found, warnings = [], []
     for one in columns:
-        row, doubt = _column(model, made, one, positions.get(one.pick.joint))
+        row, more = _column(model, made, one, positions.get(one.pick.joint))
         found.append(row)
-        doubts += doubt
-    return found, doubts
+        warnings += more
+    return found, warnings
 
 
 def _column(
     model: mujoco.MjModel, made: Sequence[Rows], one: Scaled, position: str | None
 ) -> tuple[Understood, list[str]]:
-    pick, doubts = one.pick, []
+    pick, warnings = one.pick, []
     name, target = pick.signal.name, pick.target
     limits, beyond, far = _limits(model, one), 0.0, 0.0
     if limits:
         beyond, far = outside(made, target, limits)
         lo, hi = limits
         if pick.role == "position" and far > FAR * (hi - lo):
-            doubts.append(
+            warnings.append(
                 f"{target}: {100 * beyond:.3g} % of it is outside the model's range, by up to "
                 f"{far:.3g}; if the log has another zero say --zero '{name}=WHAT IT HAS AT THE "
                 f"MODEL'S ZERO', if another direction --unit '{name}=-{_bare(one.unit)}'."
@@ -89,12 +89,12 @@ def _column(
         correlation, ratio = fit
         row |= {"sign": "same" if correlation > 0 else "opposite", "correlation": correlation}
         if ratio < 0:
-            doubts.append(
+            warnings.append(
                 f"{target}: goes against the position of its joint; one of the two has another "
                 f"sign, or leave it out with --without '{name}'."
             )
         elif not 1 / RATIO < ratio < RATIO:
-            doubts.append(
+            warnings.append(
                 f"{target}: is {ratio:.3g} times the differentiated position; check its unit, or "
                 f"leave it out with --without '{name}'."
             )
@@ -105,16 +105,16 @@ def _column(
             "delay_resolution": seen.resolution, "offset": seen.offset,
         }  # fmt: skip
         if seen.sign == "opposite":
-            doubts.append(
+            warnings.append(
                 f"{target}: the joint goes against its command; one of the two has another sign: "
                 f"say --unit '{name}=-{_bare(one.unit)}', or the same of the position."
             )
         elif seen.delay < -LATE * seen.resolution:
-            doubts.append(
+            warnings.append(
                 f"{target}: the joint moves {-1e3 * seen.delay:.3g} ms before its command, as if "
                 "another column were the command, or two clocks were mixed."
             )
-    return Understood(**row), doubts  # type: ignore[arg-type]
+    return Understood(**row), warnings  # type: ignore[arg-type]
 
 
 def _bare(unit: str) -> str:

@@ -159,7 +159,7 @@ def stiffen_friction_row(
     return D, part * bristles.damping * left
 
 
-def offset_force(offset: GravityOffset | None, q: Array) -> tuple[Array, Array]:
+def gravity_force(offset: GravityOffset | None, q: Array) -> tuple[Array, Array]:
     """A gravity offset's force at q (rad), N·m, and its largest stiffness, N·m/rad."""
     if offset is None:
         return jnp.zeros_like(q), jnp.zeros_like(q)
@@ -209,7 +209,7 @@ def remember(own: Learned | None, v: Array, remembered: Array, h: Array | float)
     return remembered - jnp.expm1(-h / own.time) * (toward - remembered)
 
 
-def move_handle(
+def backlash_force(
     handle: Backlash | None, g: Array, w: Array, v: Array, force: Array, h: Array | float
 ) -> tuple[Array, Array, Array]:
     """A step of a handle before the joint.

@@ -147,8 +147,8 @@ def residual_pattern(rows: Array) -> float | None:
         Bonferroni-corrected p-value of the runs tests (Wald and Wolfowitz, Ann. Math. Stat. 11
         (1940) 147) and sign tests; None for fewer than `WINDOWS` windows.
     """
-    force, doubt = rows[:, FORCE], rows[:, FORCE + 1]
-    rows = rows[np.isfinite(force) & np.isfinite(doubt) & (doubt > 0) & (force != 0)]
+    force, force_error = rows[:, FORCE], rows[:, FORCE + 1]
+    rows = rows[np.isfinite(force) & np.isfinite(force_error) & (force_error > 0) & (force != 0)]
     if len(rows) < WINDOWS:
         return None
     sign = rows[:, FORCE] > 0

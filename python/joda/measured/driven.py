@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
-from joda.measured.others import SHORTER, SMOOTHED, doubt_of_others, force_of_others
+from joda.measured.others import SHORTER, SMOOTHED, error_of_others, force_of_others
 from joda.measured.run_files import read_measurement, read_together
 from joda.measured.runs import LEAST, QuasiStatic, Run, evened
 from joda.measured.sensing import RIGHT, Sensing
@@ -140,10 +140,10 @@ def _among_others(
     found, other = (
         force_of_others(model, joint, run.time, positions, over) for over in (SMOOTHED, SHORTER)
     )
-    doubt = doubt_of_others(run.time, found, other)
+    force_std = error_of_others(run.time, found, other)
     inside, pairs = touching(model, joint, positions)
     force = np.where(inside, np.nan, run.force + found)
-    run = replace(run, force=force, forced=True, doubt=doubt, among=True)
+    run = replace(run, force=force, forced=True, force_std=force_std, among=True)
     notes = []
     if inside.any():
         pair = max(pairs, key=lambda one: pairs[one])

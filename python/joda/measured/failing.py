@@ -157,20 +157,21 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
     for run, sigma, path in zip(measured.runs, measured.sigma, paths, strict=True):
         there = np.flatnonzero(~np.isnan(path))
         duration = float(np.ptp(run.time))
-        force = doubt = float("nan")
+        force = force_error = float("nan")
         squares = np.zeros(2)
         if duration <= LONGEST and len(there) == len(run.time):
             whole = measured.replayer.windows(run, sigma, duration)
             if len(whole) == 1:
-                force, doubt, squares = whole[0].force, whole[0].doubt, np.array(whole[0].squares)
-            if abs(force) < max(BLIND * doubt, SLIGHT * _usual_force(measured, run)):
+                force, force_error = whole[0].force, whole[0].force_error
+                squares = np.array(whole[0].squares)
+            if abs(force) < max(BLIND * force_error, SLIGHT * _usual_force(measured, run)):
                 continue  # it drifts, but no force on the whole makes it
         off = measured.replayer.scatter(run, measured.replayer.start(run, sigma))
         for samples in np.array_split(there, PIECES):
             if len(samples) > 1:
                 misfit = path[samples] - run.position[samples]
                 part = squares * len(samples) / len(there)
-                piece = Window(samples, misfit, force, doubt, pushed=off, squares=tuple(part))
+                piece = Window(samples, misfit, force, force_error, pushed=off, squares=tuple(part))
                 rows.append([*_row(measured, run, sigma, piece), 0.0])
     return np.array(rows).reshape(-1, COLUMNS)
 
@@ -186,14 +187,14 @@ def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[flo
     lo, hi = measured.profile.joint.range
     ends = window.samples[[0, -1]]
     middle = float(run.position[window.samples].mean())
-    speed, doubt = _speed(run.time[window.samples], run.position[window.samples], sigma)
-    direction = 0.5 * float(np.sign(speed)) if abs(speed) > SURE * doubt else 0.0
+    speed, speed_error = _speed(run.time[window.samples], run.position[window.samples], sigma)
+    direction = 0.5 * float(np.sign(speed)) if abs(speed) > SURE * speed_error else 0.0
     load = float(measured.load(run.part(window.samples)).mean())
     square = float(np.sum(window.misfit**2) / (sigma**2 + window.pushed**2))
     place = (middle - lo) / (hi - lo)
     row = [place, speed, direction, float(run.time[ends].mean()), load]
     size = rms(window.misfit), len(window.misfit), square
-    return [*row, *size, window.force, window.doubt, *window.squares]
+    return [*row, *size, window.force, window.force_error, *window.squares]
 
 
 def _speed(time: Array, position: Array, sigma: float) -> tuple[float, float]:
@@ -244,16 +245,16 @@ def _uneven(rows: Array) -> bool:
     return without > CLEAR * (2 * count) ** 0.5 and with_force > LEFT * without
 
 
-def _force(force: Array, doubt: Array) -> float | None:
+def _force(force: Array, force_error: Array) -> float | None:
     """Mean residual force, weighted by how well it is known; None if it may be 0.
 
     Most of the evidence has its sign, and it is several standard deviations of the mean.
     """
-    known = np.isfinite(force) & np.isfinite(doubt) & (doubt > 0)
+    known = np.isfinite(force) & np.isfinite(force_error) & (force_error > 0)
     if not known.any():
         return None
-    force, least = force[known], doubt[known].min()
-    weight = (doubt[known] / least) ** -2.0
+    force, least = force[known], force_error[known].min()
+    weight = (force_error[known] / least) ** -2.0
     mean = float(np.average(force, weights=weight))
     evidence = weight * np.abs(force)
     alike = float(evidence[np.sign(force) == np.sign(mean)].sum())

@@ -121,8 +121,8 @@ def shade(axes: "Axes", intervals: Sequence[Interval]) -> None:
 
 def _map(axes: "Axes", rows: Array, x: int) -> None:
     """Forces of windows with two standard deviations over one of the columns of the rows."""
-    doubt = rows[:, FORCE + 1]
-    clear = rows[doubt < UNCLEAR * np.median(doubt)] if len(rows) else rows
+    force_error = rows[:, FORCE + 1]
+    clear = rows[force_error < UNCLEAR * np.median(force_error)] if len(rows) else rows
     for sign, name, way in WAYS:
         some = clear[np.sign(clear[:, 1]) == sign]
         style: dict[str, Any] = {

@@ -43,7 +43,7 @@ class Measured:
         barred: the note on where the scene would not have let the joint; empty if there is none.
         trust: how far off its numbers, and those of the measurement, may be.
         templates: of effects that may be missing, by name.
-        doubtful: numbers that have been set right, and the errors that are left of them.
+        loose: numbers that have been set right, and the standard errors that are left of them.
     """
 
     context: Context
@@ -61,7 +61,7 @@ class Measured:
     barred: str
     trust: Trust = USUAL
     templates: Mapping[str, Template] = field(default_factory=read_templates)
-    doubtful: Mapping[str, float] = field(default_factory=dict)
+    loose: Mapping[str, float] = field(default_factory=dict)
 
     def trusting(self, trust: Trust) -> "Measured":
         """The same joint and runs, whose numbers may be so far off."""
@@ -121,11 +121,12 @@ class Measured:
         return joint.unit if self.runs else joint.force_unit
 
     @property
-    def doubtful_unit(self) -> float:
+    def unit_factor(self) -> float:
         """How many times the model's largest force that of a curve is, where that is so much or so
-        little that its unit is in doubt; else 0, and where there are runs, beside which curves are
-        not used."""
-        return next((c.doubtful for c in self.curves if c.doubtful and not self.runs), 0.0)
+        little that its unit is in question; else 0, and where there are runs, beside which curves
+        are not used."""
+        factors = [] if self.runs else [curve.unusual_factor for curve in self.curves]
+        return next(filter(None, factors), 0.0)
 
     def load(self, run: Run) -> Array:
         """What loads the joint at a run's samples, N·m or N, shape (n,): gravity and what is

@@ -98,7 +98,7 @@ def _needed(model: mujoco.MjModel, motions: Mapping[int, Motion]) -> Array:
     return out
 
 
-def doubt_of_others(time: Array, force: Array, shorter: Array) -> Array:
+def error_of_others(time: Array, force: Array, shorter: Array) -> Array:
     """Standard deviation of that force, as white noise from sample to sample, shape (n,).
 
     What another smoothing makes of it tells its error; that is the same over the time smoothed, so

@@ -35,7 +35,7 @@ SAME = 0.1
 """Distance of two samples that are at the same place, in usual distances of one way's samples."""
 SCALED, ALIKE = 4.0, 0.2
 """By which factor a measured force may be the model's, and what part of it may be left over then,
-before its unit is in doubt."""
+before its unit is asked for."""
 OTHER_UNIT = 20.0
 """How many times the model's largest force the measured one is that may be in another unit."""
 CAUTION = 2.0
@@ -52,7 +52,7 @@ class QuasiStaticComparison:
         blur: noise of the measured position, rad or m.
         force: the model's in that direction, N·m or N; NaN where the direction is not known.
         sigma: noise of the measured force, N·m or N.
-        doubt: of the difference: that noise, and what the position's noise makes of the model's.
+        error: of the difference: that noise, and what the position's noise makes of the model's.
     """
 
     curve: QuasiStatic
@@ -60,7 +60,7 @@ class QuasiStaticComparison:
     blur: float
     force: Array
     sigma: float
-    doubt: Array
+    error: Array
 
     def against(self, profile: Profile, context: Context) -> "QuasiStaticComparison":
         """The same curve beside another model's."""
@@ -69,12 +69,12 @@ class QuasiStaticComparison:
             static_force(profile, context, position + off, self.direction)
             for off in (-self.blur, 0.0, self.blur)
         )
-        doubt = np.hypot(self.sigma, (high - low) / 2)
-        return replace(self, force=np.where(known, force, np.nan), doubt=doubt)
+        error = np.hypot(self.sigma, (high - low) / 2)
+        return replace(self, force=np.where(known, force, np.nan), error=error)
 
     def noisier(self, factor: float) -> "QuasiStaticComparison":
         """The same curve, of which less is known."""
-        return replace(self, sigma=factor * self.sigma, doubt=factor * self.doubt)
+        return replace(self, sigma=factor * self.sigma, error=factor * self.error)
 
     def part(self, samples: NDArray[np.bool_]) -> "QuasiStaticComparison":
         """Some samples of the curve."""
@@ -84,7 +84,7 @@ class QuasiStaticComparison:
             curve=QuasiStatic(self.curve.name, position, force),
             direction=self.direction[samples],
             force=self.force[samples],
-            doubt=self.doubt[samples],
+            error=self.error[samples],
         )
 
     @property
@@ -100,9 +100,9 @@ class QuasiStaticComparison:
         return float(np.abs(self.curve.force).max()) / own if own > 0 else 0.0
 
     @property
-    def doubtful(self) -> float:
-        """The same where it is so much or so little that the unit is in doubt, else 0: also where
-        the measured force is the model's times one factor, but for little."""
+    def unusual_factor(self) -> float:
+        """The same where it is so much or so little that the unit is in question, else 0: also
+        where the measured force is the model's times one factor, but for little."""
         times = self.times_the_model
         if not 1 / OTHER_UNIT < times < OTHER_UNIT:
             return times
@@ -122,9 +122,9 @@ class QuasiStaticComparison:
 
     @property
     def cautious(self) -> Array:
-        """The doubt of each excess, where the noise is more than it was estimated."""
-        doubt = self.doubt[self.direction != 0]
-        return np.asarray(doubt * (1 + CAUTION / np.sqrt(len(doubt))))
+        """The standard error of each excess, where the noise is more than it was estimated."""
+        error = self.error[self.direction != 0]
+        return np.asarray(error * (1 + CAUTION / np.sqrt(len(error))))
 
 
 def compared(times: float) -> str:
@@ -346,7 +346,7 @@ def beside_model(
     found = QuasiStaticComparison(curve, direction, blur, empty, sigma, empty).against(
         profile, context
     )
-    if times := found.doubtful:
+    if times := found.unusual_factor:
         arm = ", times the gauge's lever arm" if unit == "N·m" else ""
         notes.append(
             f"{curve.name}: {compared(times)}; is it in another unit (grams, m{unit}, k{unit})? It "

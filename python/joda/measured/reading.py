@@ -23,7 +23,7 @@ from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow_runs import as_curve
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
-from joda.scenes.angles import range_doubt
+from joda.scenes.angles import implausible_range
 from joda.scenes.besides import acting_besides
 from joda.scenes.context import Context, context
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
@@ -62,17 +62,19 @@ def checked(read: Sequence[Run | QuasiStatic], found: Context, timestep: float) 
     Raises:
         JodaError: they cannot be of this joint as they stand, or cannot be replayed.
     """
-    doubts = [doubt for run in read for doubt in data_checks(run, found)]
-    for doubt in doubts:
-        if doubt.fatal:
-            raise JodaError(" ".join(filter(None, (doubt.sentence, range_doubt(found.joint)))))
+    checks = [check for run in read for check in data_checks(run, found)]
+    for check in checks:
+        if check.fatal:
+            raise JodaError(
+                " ".join(filter(None, (check.sentence, implausible_range(found.joint))))
+            )
     for run in read:
         if isinstance(run, Run) and (steps := np.ptp(run.time) / timestep) > STEPS:
             raise JodaError(
                 f"{run.name}: {np.ptp(run.time):.4g} s are {steps:.2g} of the scene's timesteps of "
                 f"{timestep:g} s, which is too long to replay; cut the run into shorter ones."
             )
-    return [*found.doubts, *(doubt.sentence for doubt in doubts)]
+    return [*found.warnings, *(check.sentence for check in checks)]
 
 
 def read_measured(

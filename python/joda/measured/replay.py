@@ -82,8 +82,8 @@ class Window:
         misfit: predicted minus measured positions, rad or m, shape (n,), from the start that suits
             best within its measurement's error.
         force: how much force the model has too much on the whole, N·m or N; 0 where it is unknown.
-        doubt: its standard deviation from the noise of position and force; infinite where a force
-            makes no motion, as the joint sticks.
+        force_error: its standard deviation from the noise of position and force; infinite where
+            a force makes no motion, as the joint sticks.
         scatter: RMS by which errors of the start alone move the replay, rad or m.
         pushed: the same of errors of the recorded force.
         squares: sums of squared misfits, in noises, from the best start, and with that force too.
@@ -92,7 +92,7 @@ class Window:
     samples: NDArray[np.intp]
     misfit: Array
     force: float
-    doubt: float
+    force_error: float
     scatter: float = 0.0
     pushed: float = 0.0
     squares: tuple[float, float] = (0.0, 0.0)
@@ -407,20 +407,20 @@ class Replayer:
         at = np.array(kept)
         begun = smoothing.smooth(run.time, run.position, at, sigma)
         starts = np.stack([begun.position, begun.velocity], axis=1)
-        doubts = np.stack([begun.position_error, begun.velocity_error], axis=1)
+        errors = np.stack([begun.position_error, begun.velocity_error], axis=1)
         # starts are tried so near that the path does not meet an end, or rest, because of that
-        near_by = np.minimum(doubts, NEAR_BY * sigma * np.array([1, 1 / length]))
+        near_by = np.minimum(errors, NEAR_BY * sigma * np.array([1, 1 / length]))
         force = np.where(np.isnan(run.force), 0.0, run.force)
         forces = np.interp(at[:, None] + self.h * np.arange(steps), run.time, force)
         command, edges = _command(run, len(run.time)), at[:, None] + self.h * np.arange(steps + 1)
         own = [self._commanded(command, row - run.time[0]) for row in edges]
         push = 6 * self.inertia * sigma / length**2  # moves the joint by three times the noise
         near, step = np.zeros_like(starts), np.zeros_like(starts)
-        at_rest = np.stack([np.zeros(len(kept)), -starts[:, 1] / doubts[:, 1]], axis=1)
+        at_rest = np.stack([np.zeros(len(kept)), -starts[:, 1] / errors[:, 1]], axis=1)
         least, best = np.full(len(kept), np.inf), dict[int, Window]()
         for number in range(TRIES + 1):
             tried = np.clip(at_rest if number == 1 else near + step, -START, START)
-            nearby = self._nearby(starts + doubts * tried, near_by, forces, own, push)
+            nearby = self._nearby(starts + errors * tried, near_by, forces, own, push)
             for k, (samples, paths) in enumerate(zip(pieces, nearby, strict=True)):
                 place = (run.time[samples] - at[k]) / self.h
                 path = np.stack([np.interp(place, np.arange(steps + 1), p) for p in paths])
@@ -428,7 +428,7 @@ class Replayer:
                 square = np.sum((misfit / sigma) ** 2) + np.sum(tried[k] ** 2)
                 if k not in best or square < least[k]:
                     slopes = (path[1:] - path[0]).T / sigma
-                    slopes[:, :2] *= doubts[k] / near_by[k]
+                    slopes[:, :2] *= errors[k] / near_by[k]
                     least[k], near[k] = square, tried[k]
                     step[k], best[k] = _fitted(samples, misfit, slopes, near[k], sigma, push)
                 elif number > 1:
@@ -513,12 +513,13 @@ def _fitted(
     sigma: float,
     push: float,
 ) -> tuple[Array, Window]:
-    """The step to a better start of a window, in units of its doubt, and the window.
+    """The step to a better start of a window, in prior standard deviations, and the window.
 
     Args:
         samples: indices of the run's samples, shape (n,).
         misfit: predicted minus measured, from the start as it is, shape (n,).
-        slopes: of the misfit in noises, by the start's doubts and the push, shape (n, 3).
+        slopes: of the misfit in noises, by the start's standard deviations and the push, shape
+            (n, 3).
         moved: how far the start is from the measured one.
         sigma: noise of the position.
         push: the force to which the last slope belongs.
@@ -535,14 +536,14 @@ def _fitted(
         samples=samples,
         misfit=misfit,
         force=float(-push * all_three[2]) if moves else 0.0,
-        doubt=float(push * np.sqrt(inverse[2, 2])) if moves else np.inf,
+        force_error=float(push * np.sqrt(inverse[2, 2])) if moves else np.inf,
         scatter=float(sigma * np.sqrt(np.mean(np.sum(slopes[:, :2] ** 2, axis=1)))),
         squares=(float(two @ two), float(three @ three)),
     )
 
 
 def _with_force(window: Window, run: Run, inertia: float) -> Window:
-    """The window, with what errors of the recorded force add to its doubt, and how they move it.
+    """The window, with what errors of the recorded force add to its error, and how they move it.
 
     White noise of acceleration moves a free joint by a random walk of its velocity: a variance of
     noise² gap t³ / 3 after a time t.
@@ -553,6 +554,6 @@ def _with_force(window: Window, run: Run, inertia: float) -> Window:
     moved = off / inertia * float(np.sqrt(length**4 / (12 * max(count - 1, 1))))
     return replace(
         window,
-        doubt=float(np.hypot(window.doubt, off / np.sqrt(count))),
+        force_error=float(np.hypot(window.force_error, off / np.sqrt(count))),
         pushed=moved,
     )

@@ -37,8 +37,8 @@ class Run:
         force: applied to the joint from outside, N·m or N; NaN where it is not known, zero where
             the file has no such column.
         forced: whether the file has the column.
-        doubt: standard deviation of the force besides what its samples show, shape (n,); None for
-            none.
+        force_std: standard deviation of the force besides what its samples show, shape (n,);
+            None for none.
         command: of the actuators on the joint (`joda.scenes.actuators.Drive`), held from its sample
             to the next, N·m or N; None where none acted.
         among: whether other joints moved meanwhile, and contacts were looked for along that.
@@ -52,7 +52,7 @@ class Run:
     velocity: Array | None
     force: Array
     forced: bool
-    doubt: Array | None = None
+    force_std: Array | None = None
     command: Array | None = None
     among: bool = False
     origin: float = 0.0
@@ -66,14 +66,14 @@ class Run:
             position=self.position[samples],
             velocity=None if self.velocity is None else self.velocity[samples],
             force=self.force[samples],
-            doubt=None if self.doubt is None else self.doubt[samples],
+            force_std=None if self.force_std is None else self.force_std[samples],
             command=None if self.command is None else self.command[samples],
         )
 
     def force_error(self) -> Array:
         """Standard deviations of the force, N·m or N, shape (n,); it must be known."""
         own = smoothing.force_error(self.time, self.force, self.forced)
-        return own if self.doubt is None else np.hypot(own, self.doubt)
+        return own if self.force_std is None else np.hypot(own, self.force_std)
 
     @property
     def pushed(self) -> bool:

@@ -49,9 +49,9 @@ class Sensing:
             return replace(run, position=position)
         at, late = run.time - self.time_delay, self.time_delay
         logged = np.interp(at, run.time, run.force)  # beside a gap it is unknown too
-        doubt = None if run.doubt is None else abs(self.force_scale) * run.doubt
+        force_std = None if run.force_std is None else abs(self.force_scale) * run.force_std
         force = self.force_scale * logged + self.force_offset
-        right = replace(run, position=position, force=force, doubt=doubt)
+        right = replace(run, position=position, force=force, force_std=force_std)
         if whole or not late:
             return right
         inside = (at >= run.time[0]) & (at <= run.time[-1])

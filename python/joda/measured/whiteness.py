@@ -103,9 +103,9 @@ def drift(residual: Array, position: Array, step: float, moved: float = 0.0) -> 
     if told.sum() < FEW:
         return 1.0
     means, sizes = np.array([(own.mean(), len(own)) for own in blocks])[told].T
-    doubt = max(long_run_variance(blocks), 1.0) / sizes + TOLERATED**2 + moved**2
-    doubt += step**2 / 12 / levels[told]
-    return float(chi2.sf(np.sum(means**2 / doubt), told.sum() - 2))
+    variance = max(long_run_variance(blocks), 1.0) / sizes + TOLERATED**2 + moved**2
+    variance += step**2 / 12 / levels[told]
+    return float(chi2.sf(np.sum(means**2 / variance), told.sum() - 2))
 
 
 def long_run_variance(blocks: list[Array]) -> float:

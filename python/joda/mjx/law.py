@@ -46,7 +46,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     s = (q - lo) * per_range
     order = dict(zip(CHANNELS, prepared.orders, strict=True))
 
-    force, descent = jax.vmap(laws.offset_force)(own.gravity_offset, q)
+    force, descent = jax.vmap(laws.gravity_force)(own.gravity_offset, q)
     near, damping, dry = (jnp.zeros_like(v) for _ in range(3))
     if spring:
         stacks = prepared.conservative
@@ -121,7 +121,7 @@ def act(m: mjx.Model, d: mjx.Data, last: Last, prepared: Prepared) -> tuple[mjx.
     force = force + shift - jnp.sign(v) * limited
     force = force + passage.force + (passage.scale - 1) * external
     applied = d.qfrc_applied[dof]
-    push = jax.vmap(laws.move_handle, in_axes=(0, 0, 0, 0, 0, None))
+    push = jax.vmap(laws.backlash_force, in_axes=(0, 0, 0, 0, 0, None))
     pushed, g, w = push(own.backlash, g, w, v, applied, h)
     d = rows.write(d)
     d = d.replace(qfrc_passive=d.qfrc_passive.at[dof].add(force + pushed - applied))

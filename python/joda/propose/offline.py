@@ -23,7 +23,7 @@ from joda.propose.archetype_effects import ArchetypeEffect
 from joda.propose.checks import FELT, SOFT, share
 from joda.propose.complaints import revise
 from joda.propose.plausible import forces
-from joda.propose.recognise import Recognition, recognise, scale_doubt
+from joda.propose.recognise import Recognition, recognise, scale_warning
 from joda.propose.requirements import REQUIREMENTS, Requirement, read_requirements, state, unmet
 from joda.scenes.context import Context
 
@@ -60,9 +60,9 @@ class Offline:
         """See `joda.propose.Proposer`."""
         kind, found = recognise(task.context, task.description, task.archetypes)
         if not turns:
-            doubt = scale_doubt(kind, task.context, task.description)
+            warning = scale_warning(kind, task.context, task.description)
             first = self._first(task, kind, found)
-            return Answer(first, notes=(doubt,) if doubt else (), recognised=found)
+            return Answer(first, notes=(warning,) if warning else (), recognised=found)
         last = turns[-1]
         if last.complaint:
             return Answer(self._revised(task, last), recognised=found)

@@ -139,7 +139,7 @@ def recognise(
     )
 
 
-def scale_doubt(one: Archetype, context: Context, description: str = "") -> str:
+def scale_warning(one: Archetype, context: Context, description: str = "") -> str:
     """A sentence where names say that it is one of these, and its size that the scale is wrong.
 
     Args:

@@ -52,7 +52,7 @@ PICTURES, NONE = Pictures(5), Pictures(0)
 """For a proposer that looks at them, and for nobody."""
 
 SURE = 0.5
-"""How sure it must be what a joint is, before somebody's proposal is doubted for its force."""
+"""How sure it must be what a joint is, before somebody's proposal is questioned for its force."""
 
 Progress = Callable[[str], None]
 
@@ -95,7 +95,7 @@ class Session:
         self.notes: list[str] = []
         self.model = self._path(history.model)
         self.context: Context = context(self.model, history.joint)
-        self.notes += self.context.doubts
+        self.notes += self.context.warnings
         self._around = surroundings(self.model, history.joint)
         if self._around:
             self.notes.append(
@@ -314,13 +314,13 @@ class Session:
             return ()
         asked = read_requirements(self.history.description)  # the user knows better where it holds
         told = found.force.wanted(CLOSING if asked else CLOSING | STAYING, self.context)
-        doubts = [
+        warnings = [
             f"which {requirement.sentence} ({found.force.by(requirement.name)}), but {instead}"
             for requirement in told
             if (instead := requirement.instead(behaved, self.context))
         ]
-        looks = f"It looks like a {found.title} ({found.likely:.0%}), {'; and '.join(doubts)}."
-        return (looks,) if doubts else ()
+        looks = f"It looks like a {found.title} ({found.likely:.0%}), {'; and '.join(warnings)}."
+        return (looks,) if warnings else ()
 
     def _hindered(
         self, profile: Profile, every: Sequence[Requirement], lacking: Mapping[str, str]

@@ -85,7 +85,7 @@ def in_turn(paths: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class SceneJudge(SegmentEstimator):
+class SceneEstimator(SegmentEstimator):
     """Fits a scene to segments: slopes are the motion's derivatives, but differences by the places
     of jumps, which no motion along them shows."""
 
@@ -191,9 +191,9 @@ class SceneEngine:
             self._cut[length] = self._together(length)
         return self._cut[length]
 
-    def estimator(self, segments: Segments, counts: NDArray[np.bool_]) -> SceneJudge:
+    def estimator(self, segments: Segments, counts: NDArray[np.bool_]) -> SceneEstimator:
         """See `Engine`."""
-        return SceneJudge(segments, counts)
+        return SceneEstimator(segments, counts)
 
     def _together(self, length: float) -> Segments:
         """Segments of the fitted joint, with the other joints' samples after its own."""

@@ -8,8 +8,8 @@ TURNS, SMALL = 2.0, 0.11
 """A range of more turns, or of less (rad: 2π taken for degrees), may be in the wrong unit."""
 
 
-def range_doubt(joint: Joint) -> str:
-    """A sentence where the unit of a hinge's range is in doubt; else nothing.
+def implausible_range(joint: Joint) -> str:
+    """A sentence where the unit of a hinge's range is in question; else nothing.
 
     MJCF has angles in degrees, or with <compiler angle="radian"/> in radians; URDF in radians.
     """

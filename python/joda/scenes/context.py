@@ -11,10 +11,10 @@ from pydantic import BaseModel, ConfigDict
 from joda.plain import line
 from joda.profile import Joint
 from joda.scenes.actuators import actuators_on
-from joda.scenes.angles import range_doubt
+from joda.scenes.angles import implausible_range
 from joda.scenes.elements import Elements, elements
 from joda.scenes.engine import inertia_at
-from joda.scenes.masses import mass_doubts
+from joda.scenes.masses import implausible_mass
 from joda.scenes.model import describe_joint, find_joint, load_model, moves_with
 from joda.scenes.motion import gravity_force
 from joda.scenes.outline import own_geoms, surface
@@ -60,7 +60,7 @@ class Context(BaseModel):
         shape: features of the part and its object; None of a part without geoms.
         twin: the first joint of the object whose part is of equal shape; else the joint itself.
             What is drawn for one is drawn for the other.
-        doubts: what cannot be meant of its range, mass or inertia, a sentence each.
+        warnings: what cannot be meant of its range, mass or inertia, a sentence each.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -88,7 +88,7 @@ class Context(BaseModel):
     around: tuple[str, ...]
     shape: Shape | None = None
     twin: str = ""
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def describe(self) -> str:
         """The context in a few lines for a person."""
@@ -177,9 +177,9 @@ def context(model: str | Path, joint: str) -> Context:
         around=_around(m, j),
         shape=seen.shape,
         twin=seen.twin,
-        doubts=(
-            *filter(None, [range_doubt(described)]),
-            *mass_doubts(m, j, float(inertia.mean()), bool(acting)),
+        warnings=(
+            *filter(None, [implausible_range(described)]),
+            *implausible_mass(m, j, float(inertia.mean()), bool(acting)),
         ),
     )
 

@@ -33,7 +33,9 @@ ARMATURE = 0.5
 """Share of the joint's inertia from which armature dominates it."""
 
 
-def mass_doubts(model: mujoco.MjModel, joint: int, inertia: float, driven: bool) -> tuple[str, ...]:
+def implausible_mass(
+    model: mujoco.MjModel, joint: int, inertia: float, driven: bool
+) -> tuple[str, ...]:
     """What cannot be true of the mass and the inertia that a joint moves, a sentence each.
 
     Args:

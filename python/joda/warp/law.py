@@ -424,7 +424,7 @@ def act(
     next_speed = float(passage.speed)
     inertia_before = n[int(Number.BACKLASH_HANDLE)]
     if inertia_before > 0.0:
-        moved = laws.move_handle(play, inertia_before, h, applied, v, gap, speed)
+        moved = laws.backlash_force(play, inertia_before, h, applied, v, gap, speed)
         force += moved[0] - applied
         next_gap = moved[1]
         next_speed = moved[2]

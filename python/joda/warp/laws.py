@@ -157,7 +157,7 @@ def settle(play: float, h: float, side: float, gap: float, speed: float, v: floa
 
 
 @wp.func
-def move_handle(
+def backlash_force(
     play: float, inertia: float, h: float, applied: float, v: float, gap: float, speed: float
 ) -> wp.vec3:
     """A step of the handle before the joint: its force on the joint, its gap and its speed."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.diagnosis.settings import SETTINGS
 from joda.effects.guesses import AnyDirection, Number
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
@@ -18,9 +19,6 @@ Array = NDArray[np.float64]
 Write = Callable[[Profile, Array], Profile]
 Bounds = list[Number]
 """Of each number."""
-
-KNOWN_LAW, FREE_CURVE, KNOWN_SHAPE = 0.01, 0.12, 0.2
-"""Part of the excess misfit that a true effect may leave, by what is known of it."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ class Hypothesis:
             where only the rough shape of its curve is known.
         like_a_number: whether a number of the model or of the measurement that is off may look the
             same in runs.
-        shape_doubt: part of its size by which the real thing may differ from its law; None: as
+        shape_error: part of its size by which the real thing may differ from its law; None: as
             others of its kind.
         wells: how many wells its force has, of which a motion may have seen some only; 0 for none.
         itself: whether it is, with these numbers, what its name says: more than a simpler effect
@@ -63,9 +61,9 @@ class Hypothesis:
     unit: str
     ends: int = 0
     neg_log_prior: float = 0.0
-    misfit_tolerance: float = KNOWN_LAW
+    misfit_tolerance: float = SETTINGS.tolerances.known_law
     like_a_number: bool = False
-    shape_doubt: float | None = None
+    shape_error: float | None = None
     wells: int = 0
     itself: Callable[[Array], bool] = lambda x: True
     kept: int = 1

@@ -7,16 +7,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from joda.component import Component
-from joda.diagnosis.hypotheses.base import (
-    FREE_CURVE,
-    KNOWN_LAW,
-    KNOWN_SHAPE,
-    Array,
-    Hypothesis,
-    everywhere,
-    unknowns_of,
-)
-from joda.diagnosis.hypotheses.intervals import GRID, WHOLE, felt
+from joda.diagnosis.hypotheses.base import Array, Hypothesis, everywhere, unknowns_of
+from joda.diagnosis.hypotheses.intervals import GRID, felt
+from joda.diagnosis.settings import SETTINGS
 from joda.effects import CHANNEL_EFFECTS, EFFECTS, CurveEffect, Effect, written_as
 from joda.effects.guesses import STRENGTH, TINY, TRIAL, InitialGuess, Units
 from joda.errors import JodaError
@@ -27,12 +20,6 @@ Interval = tuple[float, float]
 
 KNOTS = 9
 """Control points of a free curve."""
-RAISED = 0.1
-"""Part of its rise above its least value from which a free curve is told to act."""
-VARIED = 0.5
-"""How much a curve varies at least that differs along the way, in units of its mean."""
-LEVEL = 0.25
-"""By how much it is off its median where it is level, in units of that."""
 BENDS = 2.0
 """How much a free curve bends at a control point (one standard deviation), in usual forces: where
 no segment has been, what is beside tells it."""
@@ -65,14 +52,20 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
     def raised(x: Array) -> tuple[float, float]:
         """Where the curve is above its least value."""
         y = tuple(padded(x - np.min(x) + TINY))
-        return felt(Component(label=effect, interval=(0, 1), x=knots, y=y), RAISED, to_ends=False)
+        return felt(
+            Component(label=effect, interval=(0, 1), x=knots, y=y),
+            SETTINGS.naming.min_rise,
+            to_ends=False,
+        )
 
     def level(x: Array) -> bool:
         """Whether it is the same on so much of the range that it is called constant."""
         y = np.interp(np.linspace(0, 1, GRID), knots, padded(x))
         usual = float(np.median(y))
-        near = np.abs(y - usual) <= LEVEL * usual
-        return usual > VARIED * float(y.max()) and bool(np.mean(near) >= WHOLE)
+        near = np.abs(y - usual) <= SETTINGS.naming.level_deviation * usual
+        return usual > SETTINGS.naming.min_variation * float(y.max()) and bool(
+            np.mean(near) >= SETTINGS.naming.whole_range
+        )
 
     return Hypothesis(
         effect,
@@ -83,8 +76,10 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
         raised,
         lambda x: unit * float(np.ptp(x)),
         units.of_force(power),
-        misfit_tolerance=FREE_CURVE,
-        itself=lambda x: bool(np.ptp(x) > VARIED * np.mean(x)) and not level(x),
+        misfit_tolerance=SETTINGS.tolerances.free_curve,
+        itself=lambda x: (
+            bool(np.ptp(x) > SETTINGS.naming.min_variation * np.mean(x)) and not level(x)
+        ),
     )
 
 
@@ -133,9 +128,11 @@ def _hypothesis(name: str, card: type[Effect], guess: InitialGuess) -> Hypothesi
         lambda x: guess.magnitude(x.tolist()),
         guess.unit,
         neg_log_prior=0.0 if guess.direction == "both" else ONE_OF_TWO,
-        misfit_tolerance=KNOWN_LAW if guess.exact else KNOWN_SHAPE,
+        misfit_tolerance=SETTINGS.tolerances.known_law
+        if guess.exact
+        else SETTINGS.tolerances.known_shape,
         like_a_number=card.LIKE_A_NUMBER,
-        shape_doubt=card.SHAPE_DOUBT,
+        shape_error=card.SHAPE_ERROR,
         itself=lambda x: guess.itself(x.tolist()),
         kept=guess.kept,
     )
@@ -173,7 +170,7 @@ def _uneven(
         trials=np.zeros((0, len(guess.numbers) + count)),
         write=write,
         magnitude=lambda x: float(curve(x).max()),
-        misfit_tolerance=max(flat.misfit_tolerance, FREE_CURVE),
+        misfit_tolerance=max(flat.misfit_tolerance, SETTINGS.tolerances.free_curve),
         uneven=finer,
         factors=count,
     )

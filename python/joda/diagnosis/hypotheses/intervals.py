@@ -4,6 +4,7 @@ import numpy as np
 
 from joda.component import Component
 from joda.diagnosis.hypotheses.base import Array, Bounds
+from joda.diagnosis.settings import SETTINGS
 from joda.field import merge
 from joda.profile import Channel
 
@@ -11,11 +12,6 @@ WIDTHS = (0.08, 0.13, 0.2, 0.3, 0.42, 0.6)
 """Of the intervals that are tried, in normalised position."""
 NARROWEST, AT_STOP = 0.02, 0.01
 """Interval; and how near an end of the range it ends at that."""
-FELT = 0.2
-"""Part of its largest force from which a force is felt: where an effect that runs out slowly
-ends."""
-WHOLE = 0.8
-"""Part of the range from which on a resistance is called constant."""
 GRID = 401
 """Points on which that is looked for."""
 END = (0.0, 1.0, 0.004)
@@ -56,7 +52,9 @@ def places(place: str, widest: float = 1.0) -> tuple[Bounds, list[tuple[float, .
     return [END, END], [(a, a + w) for a, w in begins]
 
 
-def felt(part: Component, level: float = FELT, to_ends: bool = True) -> tuple[float, float]:
+def felt(
+    part: Component, level: float = SETTINGS.naming.felt_force, to_ends: bool = True
+) -> tuple[float, float]:
     """Where a curve is at least so large a part of its largest value, in normalised position.
 
     Args:

@@ -6,20 +6,14 @@ from itertools import product
 import numpy as np
 
 from joda.component import Component
-from joda.diagnosis.hypotheses.base import (
-    FREE_CURVE,
-    KNOWN_SHAPE,
-    Array,
-    Bounds,
-    Hypothesis,
-    everywhere,
-    known,
-    unknowns_of,
-)
-from joda.diagnosis.hypotheses.intervals import FELT, WHOLE, ends, felt, places
+from joda.diagnosis.hypotheses.base import Array, Bounds, Hypothesis, everywhere, known, unknowns_of
+from joda.diagnosis.hypotheses.intervals import ends, felt, places
+from joda.diagnosis.settings import SETTINGS
 from joda.effects.guesses import STRENGTH, TRIAL, Units
 from joda.profile import CHANNELS, Profile
 from joda.template import Template, read_templates
+
+TOLERANCES = SETTINGS.tolerances
 
 WELLS = {"detent_internal": 1, "bistable_mechanism_internal": 2}
 """How many wells each of these has."""
@@ -34,10 +28,10 @@ otherwise where it is a hump, and of a force."""
 CATCH = (0.0, 0.3, 0.01, np.nan, 0.9)
 """Dry friction of a catch, in units of its force."""
 LEAN, USUAL_LEAN = (-1.2, 1.2, 0.03), 0.4
-"""Logarithm of the ratio of a well's flanks: bounds and step; its doubt before the data."""
+"""Logarithm of the ratio of a well's flanks: bounds and step; its prior standard deviation."""
 TOP, USUAL_TOP = (0.05, 0.8, 0.02), (0.33, 0.12)
-"""Where a latch is hardest to pass, in units of its barrier: bounds and step; its mean and doubt
-before the data."""
+"""Where a latch is hardest to pass, in units of its barrier: bounds and step; its prior mean and
+standard deviation."""
 BARRIER = (0.2, 3.0, 0.02, 0.05, 12.0)
 """Of a latch, in units of its hold."""
 RATIO = (0.0, 3.0, 0.02)
@@ -48,17 +42,14 @@ LOCAL = {
     "constant_friction_hinge": "position_dependent_friction",
     "constant_damping_hinge": "position_dependent_damping",
 }
-"""What a constant resistance is called that acts on less than `WHOLE` of the range."""
+"""What a constant resistance is called that does not act on most of the range."""
 WELL_WIDTH = (0.3, 0.7, 0.01)
 """Of each of two wells, in units of their interval: they overlap, or are apart."""
 USUAL_END = (0.8, 0.5)
-"""What is left of an over-centre mechanism's largest force at an end of the range, and its doubt,
-before the data."""
+"""What is left of an over-centre mechanism's largest force at an end of the range, and its prior
+standard deviation."""
 TAIL = 0.5
 """Force halfway between a well's largest and its end, in units of that."""
-RARE = 3.0
-"""Rarity of magnets, latches and clicks beside what rubs in every joint, and of a constant force
-all over a slide's range: a tilt is the same, and more usual."""
 GAP = (0.004, 0.4, 0.002, 0.001, 1.2)
 """Of a magnet, in normalised position."""
 NEAR = np.array((0.0, 0.2, 0.5, 1.0, 1.7, 2.7, 4.2, 6.0))
@@ -69,7 +60,7 @@ SPRUNG = np.linspace(0, 1, 5)
 """Control points of a spring."""
 BEND, USUAL_BEND = (-2.0, 2.0, 0.05), 0.7
 """How much a spring at a lever, or of two rates, is off a straight line, in units of its force at
-the far end: four times that in the middle; and its doubt before the data."""
+the far end: four times that in the middle; and its prior standard deviation."""
 PULLING = (-1.0, 2.0, 0.05)
 """The same of one that does not reach all over the range: it pulls wherever it reaches, else it is
 a force somewhere else."""
@@ -132,8 +123,8 @@ def _wells(units: Units, template: Template) -> Iterator[Hypothesis]:
         lambda x: units.force * float(x[0] * np.exp(0.5 * np.abs(x[3 : 3 + wells]).sum())),
         units.of_force(),
         len(bounds),
-        neg_log_prior=RARE,
-        misfit_tolerance=KNOWN_SHAPE,
+        neg_log_prior=TOLERANCES.rare,
+        misfit_tolerance=TOLERANCES.known_shape,
         wells=wells,
     )
 
@@ -176,8 +167,8 @@ def _magnet(units: Units, template: Template) -> Iterator[Hypothesis]:
         near,
         lambda x: units.force * float(x[0]),
         units.of_force(),
-        neg_log_prior=RARE,
-        misfit_tolerance=KNOWN_SHAPE,
+        neg_log_prior=TOLERANCES.rare,
+        misfit_tolerance=TOLERANCES.known_shape,
     )
 
 
@@ -212,7 +203,7 @@ def _spring(units: Units, template: Template) -> Iterator[Hypothesis]:
             lambda x: units.force * float(x[0]),
             units.of_force(),
             len(bounds),
-            misfit_tolerance=FREE_CURVE,
+            misfit_tolerance=TOLERANCES.free_curve,
         )
 
     yield one("whole")
@@ -242,7 +233,9 @@ def _snap(units: Units, template: Template) -> Iterator[Hypothesis]:
         return _caught(drawn, name, ends(place, x), rubs)
 
     def reach(x: Array) -> tuple[float, float]:
-        return felt(part(np.array([TRIAL, *x[1:]])), FELT * min(1.0, float(x[1])))
+        return felt(
+            part(np.array([TRIAL, *x[1:]])), SETTINGS.naming.felt_force * min(1.0, float(x[1]))
+        )
 
     bounds, tries = places(place, WIDEST)
     own: Bounds = [STRENGTH, BARRIER, (0.0, 1.0, 0.02)]
@@ -259,8 +252,8 @@ def _snap(units: Units, template: Template) -> Iterator[Hypothesis]:
         lambda x: units.force * float(x[0]) * max(1.0, float(x[1])),
         units.of_force(),
         len(bounds),
-        neg_log_prior=RARE,
-        misfit_tolerance=KNOWN_SHAPE,
+        neg_log_prior=TOLERANCES.rare,
+        misfit_tolerance=TOLERANCES.known_shape,
     )
 
 
@@ -290,8 +283,8 @@ def _bistable(units: Units, template: Template) -> Iterator[Hypothesis]:
         everywhere,
         lambda x: units.force * float(x[0] * np.exp(0.5 * abs(x[6])) * max(1.0, *x[4:6])),
         units.of_force(),
-        misfit_tolerance=KNOWN_SHAPE,
-        shape_doubt=GROWING,
+        misfit_tolerance=TOLERANCES.known_shape,
+        shape_error=GROWING,
     )
 
 
@@ -329,8 +322,8 @@ def _drawn(units: Units, template: Template) -> Iterator[Hypothesis]:
         lambda x: unit(first) * float(x[0]) * max(map(abs, curves[first].y)),
         units.of_force(int(first == "damping")),
         len(bounds),
-        neg_log_prior=RARE,
-        misfit_tolerance=KNOWN_SHAPE,
+        neg_log_prior=TOLERANCES.rare,
+        misfit_tolerance=TOLERANCES.known_shape,
         kept=3,
     )
 
@@ -363,7 +356,7 @@ def _constant(units: Units, template: Template) -> Iterator[Hypothesis]:
         def itself(x: Array) -> bool:
             """Whether it is called so where it acts."""
             a, b = between(x)
-            return name not in LOCAL or (b - a >= WHOLE) == (label == name)
+            return name not in LOCAL or (b - a >= SETTINGS.naming.whole_range) == (label == name)
 
         def between(x: Array) -> tuple[float, float]:
             """From the middle of one edge to that of the other."""
@@ -384,7 +377,7 @@ def _constant(units: Units, template: Template) -> Iterator[Hypothesis]:
             lambda x: abs(float(unit)) * float(x[0]),
             units.of_force(int(channel == "damping")),
             len(bounds),
-            RARE if same else 0.0,
+            TOLERANCES.rare if same else 0.0,
             like_a_number=channel == "conservative",
             itself=itself,
         )

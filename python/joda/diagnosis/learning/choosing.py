@@ -9,20 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from joda.diagnosis.adding import (
-    NO_LESS,
-    NO_MORE,
-    NOTHING_LEFT,
-    AddedEffect,
-    fallen,
-    replayed,
-)
+from joda.diagnosis.adding import NO_LESS, NOTHING_LEFT, AddedEffect, fallen, replayed
 from joda.diagnosis.coverage import at_rest
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import LABEL, Terms
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.paired_test import worse
 from joda.diagnosis.plausible import Needs, implausible
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import Likelihood, clearly
 from joda.estimation.estimator import excess
 from joda.measured.measured_joint import Measured
@@ -32,12 +26,6 @@ LENGTHS = (0.12, 0.05, 0.025)
 """Over which a force over position changes, normalised."""
 TIMES = (0.05, 0.3)
 """From which a memory's time is sought, in lengths of the longest run."""
-
-LITTLE = 0.02
-"""Excess of the loss per sample, beyond what noise makes, that no term need explain."""
-WORTH = 0.9
-"""Part of the loss to which one of several more terms must bring runs held out: the best of many
-that say nothing brings it to less, too."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +83,10 @@ class Learning:
 
     def nothing_left(self, found: Tried) -> bool:
         """Whether what was held out is missed by no more than noise."""
-        return excess(found.unseen, max(self.unseen.estimator.samples, 1.0)) < LITTLE
+        return (
+            excess(found.unseen, max(self.unseen.estimator.samples, 1.0))
+            < SETTINGS.learning.negligible_excess
+        )
 
     def _positions(self, terms: Terms) -> Iterator[Terms]:
         for length in LENGTHS:
@@ -132,7 +123,9 @@ class Learning:
 
 def _worth(more: Tried, less: Tried) -> bool:
     """Whether a law is better by so much that its further terms are worth it."""
-    return more.unseen < WORTH * less.unseen and clearly(more.unseen, less.unseen)
+    return more.unseen < SETTINGS.learning.max_loss * less.unseen and clearly(
+        more.unseen, less.unseen
+    )
 
 
 @one_blas_thread
@@ -162,7 +155,9 @@ def learn(
     best = Learning(train.changed(anew), held.changed(anew), progress).chosen()
     profile = best.learned.profile
     if best.terms == Terms() or not clearly(best.unseen, loss):
-        return refused(NOTHING_LEFT if before.window < NO_MORE * held.floor else NO_LESS)
+        return refused(
+            NOTHING_LEFT if before.window < SETTINGS.adding.silent * held.floor else NO_LESS
+        )
     if reason := implausible(Needs(train), profile, LABEL) or "":
         return refused(reason)
     after, later = replayed(held, profile)

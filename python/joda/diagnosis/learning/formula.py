@@ -18,15 +18,12 @@ from joda.diagnosis.learning.ensemble import drawn, one_digit
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import Law
 from joda.diagnosis.learning.library import DRY, Term, of_position, of_speed
+from joda.diagnosis.settings import SETTINGS
 from joda.measured.measured_joint import Measured
 
 Array = NDArray[np.float64]
 Terms = tuple[Term, ...]
 
-AS_GOOD = 1.1
-"""Largest error on runs held out, in the learned law's, with which a formula is told."""
-SPREAD = 1 / 3
-"""Largest standard deviation of a factor over the ensemble, in the factor, of a stable term."""
 WAVES = 600
 """Periods that are tried, up to that of a wave in two lengths of the law's."""
 MOST = 2
@@ -161,7 +158,7 @@ def formula(
         terse = Terse(law.terms, law.interval, law.span, law.fastest, law.force, lo, made_of)
         for found in learner.learned(terse):
             ratio = error(held, found.profile).window / unseen
-            if ratio <= AS_GOOD:
+            if ratio <= SETTINGS.learning.formula_error:
                 return Formula(_coefficients(learner, found, terse), ratio)
     return None
 
@@ -243,7 +240,7 @@ def _stable(
         waves = np.array(["q)" in one.text for one in own])
         if waves.any():
             sizes[waves] = np.linalg.norm(sizes[waves])
-        if np.any(found.std(axis=0) > SPREAD * sizes):
+        if np.any(found.std(axis=0) > SETTINGS.learning.term_spread * sizes):
             return False
     return True
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from joda.component import Component
 from joda.diagnosis.learning.smooth import modes_of, nearness
+from joda.diagnosis.settings import SETTINGS
 from joda.effects import LearnedForce
 from joda.estimation.least_squares import Inequalities
 from joda.estimation.unknowns import Unknowns
@@ -32,8 +33,6 @@ SPEED_LENGTH, ALONG_LENGTH = 0.5, 0.15
 """Over which root of the speed, and which part of the range, a resistance changes."""
 ROWS = 9
 """Positions of a table that differs along the way."""
-ALIKE = 0.8
-"""Correlation of the resistances of both directions."""
 SLOWER = 2.0
 """Largest logarithm of a memory's time in that from which it is sought."""
 NO_FRICTION = 1e-6
@@ -215,7 +214,7 @@ class Law:
         if not self.terms.speed:
             return np.zeros((2 * len(SPEEDS) * len(self._rows), 0))
         u = np.concatenate([-SPEEDS[::-1], SPEEDS])
-        either = np.where(u[:, None] * u > 0, 1.0, ALIKE)
+        either = np.where(u[:, None] * u > 0, 1.0, SETTINGS.learning.directions_alike)
         size = np.abs(u)
         speed = either * size[:, None] * size * nearness(size, SPEED_LENGTH)
         along = 1 + nearness(self._rows, ALONG_LENGTH) if self.terms.along else np.ones((1, 1))

@@ -38,8 +38,8 @@ def driven(run: Run, position: Array, sigma: float, unit: str) -> str:
         speed, error = np.abs(found.velocity), found.velocity_error
         first = np.array([int(np.argmin(speed[: k + 1])) for k in range(len(speed))])
         slowest = speed[first]
-        doubt = np.hypot(error, error[first])
-        gain = speed - np.maximum(FASTER * slowest, slowest + CLEARLY * doubt)
+        error_of_speed = np.hypot(error, error[first])
+        gain = speed - np.maximum(FASTER * slowest, slowest + CLEARLY * error_of_speed)
         k = int(np.argmax(gain))
         if gain[k] > 0:
             i = first[k]
