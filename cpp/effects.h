@@ -198,7 +198,7 @@ struct Loose {
 // Moves the handle, on which `applied` acts, by a step beside the part that moves at v; returns the
 // force that it exerts on the part.
 inline double BacklashForce(const Backlash& backlash, double h, double applied, double v,
-                         Loose* handle) {
+                            Loose* handle) {
   const double half = 0.5 * backlash.play;
   const double gap = std::clamp(handle->gap, -half, half);  // the profile may have been replaced
   const double free = handle->velocity + h * applied / backlash.handle;

@@ -163,7 +163,7 @@ double JointDynamics::PushThroughPlay(const mjData* d, const mjtNum* state, doub
   joint->handle = {state[1], state[2]};
   const double pushed = joint->applied + state[3];
   return BacklashForce(joint->profile.effects->backlash, h, pushed, d->qvel[joint->dof],
-                    &joint->handle) -
+                       &joint->handle) -
          pushed;
 }
 

@@ -140,6 +140,28 @@ def test_context_is_printed_and_written(folder):
     assert content["joint"]["name"] == "door"
     again = ("context", "microwave.xml", "--joint", "door", "--json", "c.json")
     assert "c.json: exists already" in fails(*again, cwd=folder)
+    printed = joda("context", "microwave.xml", "--joint", "door", "--json", "-", cwd=folder)
+    assert json.loads(printed.stdout) == content and not (folder / "-").exists()
+
+
+@pytest.mark.parametrize("joints", [["door"], ["door", "door2"]])
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_numbers_are_printed_for_scripts(tmp_path, command, joints):
+    """As in the file, and nothing else."""
+    rows = [f"{t / 50},0.5,0.5" for t in range(40)]
+    names = [f"position:{joint}" for joint in joints] if len(joints) > 1 else ["position", "force"]
+    (tmp_path / "run.csv").write_text("\n".join([",".join(["time", *names]), *rows]) + "\n")
+    box = '<geom type="box" size=".3 .01 .2" mass="2"/>'
+    doors = (f'<body><joint name="{joint}" range="0 1.5"/>{box}</body>' for joint in joints)
+    scene = f"<mujoco><compiler angle='radian'/><worldbody>{''.join(doors)}</worldbody></mujoco>"
+    (tmp_path / "scene.xml").write_text(scene)
+    options = [word for joint in joints for word in ("--joint", joint)]
+    line = command, "scene.xml", "run.csv", *options
+    written = joda(*line, "--json", "out.json", cwd=tmp_path)
+    assert written.returncode == 0, written.stderr
+    printed = joda(*line, "--json", "-", cwd=tmp_path)
+    assert json.loads(printed.stdout) == json.loads((tmp_path / "out.json").read_text())
+    assert not (tmp_path / "-").exists()
 
 
 def test_mistakes_are_one_sentence_and_leave_nothing(folder):

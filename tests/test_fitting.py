@@ -32,7 +32,7 @@ def test_a_planted_profile_with_a_barrier_is_recovered():
 
 @pytest.mark.long
 def test_a_profile_that_sizes_nearby_do_not_find_is_found_from_farther_off():
-    """A mechanism with two barriers, all about half a barrier off: short windows alone end at 2.4
+    """A mechanism with two barriers, all about half a barrier off: short segments alone end at 2.4
     noises from there, and unseen runs were missed by eight times what the truth misses."""
     _, (before, after, _), _ = robust(61130096)
     assert before > 50 and after < 1.5

@@ -148,7 +148,7 @@ def test_both_engines_find_the_same_numbers(both):
     for one in shootings:
         theta = one.parameters.start
         for length in (0.1, 0.4, 0.4):
-            theta = one.fit_windows(one.estimator(length), theta, one.parameters.prior_std, 20)
+            theta = one.fit_segments(one.estimator(length), theta, one.parameters.prior_std, 20)
         found.append(theta)
     np.testing.assert_allclose(found[1], found[0], atol=1e-3)
     truth = [1 / factors[slot.channel] for slot in shootings[0].parameters.slots[:-1]]

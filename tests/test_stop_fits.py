@@ -1,6 +1,7 @@
 """How stiff the ends of a range are, and how far they yield to a force, is found by runs that come
 to them, and written."""
 
+import json
 from dataclasses import replace
 
 import mujoco
@@ -151,6 +152,10 @@ def test_improve_writes_it_and_says_so(tmp_path, rng):
     assert stiffness_of(written.jnt_solref[0], STEP) == pytest.approx(1 / 0.06**2, rel=0.15)
     new, old = (error(read_measured(scene, "slide", files)).whole for scene in (found.scene, model))
     assert new < 0.5 * old
+    printed = json.loads(json.dumps(found.as_json()))  # as `--json` prints it
+    assert printed["scene"] == str(found.scene) and printed["why"] == found.why
+    assert len(printed["steps"]) == len(found.steps) - 1
+    assert printed["error"]["whole"] == found.steps[0].error.whole
 
 
 def test_whole_runs_that_another_stop_explains_leave_the_model_adequate(tmp_path, rng):

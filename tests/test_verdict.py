@@ -368,7 +368,7 @@ def test_a_ripple_that_is_another_on_the_way_back_clears_no_curve(period, tmp_pa
         ("laboratory", "asymmetric_friction", 2010171645),
         # a button of 3 g, whose held-out windows the errors of the force move by more than noise
         ("switches", "constant_damping_hinge", 1689445993),
-        # the windows held out happen to be quiet
+        # the held-out segments happen to be quiet
         ("machinery", "constant_damping_hinge", 2072185723),
     ],
 )

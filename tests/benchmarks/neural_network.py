@@ -20,7 +20,7 @@ from joda.measured.replay import Replayer
 WIDTH = 32
 """Units of a layer."""
 ROUNDS = ((600, 1e-2), (100, 3e-3))
-"""Iterations and first learning rate: in short windows, and in longer ones at the scene's step."""
+"""Iterations and first learning rate: in short segments, and in longer ones at the scene's step."""
 EVERY = 50
 """Iterations after which the runs held out are looked at; they divide all."""
 

@@ -2,17 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from json import loads
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from joda.cli.options import (
+    STDOUT,
     Corrections,
     Force,
     Joint,
     Joints,
     Json,
+    JsonFile,
     Model,
     Passive,
     Runs,
@@ -105,9 +108,7 @@ def compare(
     model: Model,
     runs: Runs,
     joint: Joints = None,
-    as_json: Annotated[
-        Path | None, typer.Option("--json", help="Write all numbers to this file.")
-    ] = None,
+    as_json: JsonFile = None,
     report: Annotated[
         Path | None, typer.Option(help="Write an HTML page with pictures to this file.")
     ] = None,
@@ -127,15 +128,19 @@ def compare(
     from joda import compare as run
     from joda.measured.comparison import sentences
 
+    written = None if as_json == STDOUT else as_json
     if several(joint):
         one_joint_only(report, output)
         from joda import compare_all
 
         with spinner("compare") as progress:
             every = compare_all(
-                model, runs, joint or (), passive=passive, corrections=corrections, json=as_json,
+                model, runs, joint or (), passive=passive, corrections=corrections, json=written,
                 force=force, progress=progress,
             )  # fmt: skip
+        if as_json == STDOUT:
+            print_json(loads(every.to_json()))
+            return
         tell_joints(every)
         if as_json:
             say(as_json)
@@ -143,9 +148,12 @@ def compare(
     assert joint
     with spinner("compare") as progress:
         found = run(
-            model, joint[0], runs, passive=passive, corrections=corrections, json=as_json,
+            model, joint[0], runs, passive=passive, corrections=corrections, json=written,
             report=report, picture=output, force=force, progress=progress,
         )  # fmt: skip
+    if as_json == STDOUT:
+        print_json(loads(found.to_json()))
+        return
     for sentence in (*found.notes, *sentences(found)):
         say(sentence)
     for path in filter(None, (as_json, report, output)):

@@ -1,16 +1,19 @@
 """Commands that find what a model lacks, and add it."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from joda.cli.options import (
+    STDOUT,
     Effects,
     Force,
     Joint,
     Joints,
     Json,
+    JsonFile,
     Model,
     Passive,
     Runs,
@@ -30,9 +33,7 @@ def diagnose(
     model: Model,
     runs: Runs,
     joint: Joints = None,
-    as_json: Annotated[
-        Path | None, typer.Option("--json", help="Write the diagnosis to this file, for joda add.")
-    ] = None,
+    as_json: JsonFile = None,
     report: Report = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
@@ -47,7 +48,7 @@ def diagnose(
 ) -> None:
     """Tell which effect a model lacks, where, and how much of it.
 
-    Example:
+    What --json writes is for joda add. Example:
 
         joda diagnose hidden/model.xml hidden/run?.csv --joint joint --json diagnosis.json
     """
@@ -55,6 +56,7 @@ def diagnose(
     from joda.commands.diagnose import sentences
     from joda.measured.trust import read_trust
 
+    written = None if as_json == STDOUT else as_json
     if several(joint):
         one_joint_only(report, output)
         from joda import diagnose_all
@@ -62,9 +64,12 @@ def diagnose(
         with progress_bar() as bar:
             every = diagnose_all(
                 model, runs, joint or (), exclude=exclude or (), passive=passive,
-                trust=read_trust(trust or ()), templates=templates or (), json=as_json,
+                trust=read_trust(trust or ()), templates=templates or (), json=written,
                 force=force, progress=bar,
             )  # fmt: skip
+        if as_json == STDOUT:
+            print_json({"joints": {name: asdict(one) for name, one in every.items()}})
+            return
         for name, one in every.items():
             say(f"{name}:")
             for sentence in sentences(one):
@@ -75,14 +80,17 @@ def diagnose(
     assert joint
     with progress_bar() as bar:
         found = run(
-            model, joint[0], runs, exclude=exclude or (), json=as_json, report=report,
+            model, joint[0], runs, exclude=exclude or (), json=written, report=report,
             picture=output, passive=passive, trust=read_trust(trust or ()),
             templates=templates or (), force=force,
             progress=bar,
         )  # fmt: skip
+    if as_json == STDOUT:
+        print_json(asdict(found))
+        return
     for sentence in sentences(found):
         say(sentence)
-    for path in filter(None, (as_json, report, output)):
+    for path in filter(None, (written, report, output)):
         say(path)
 
 
@@ -140,6 +148,7 @@ def improve(
     trust: Trust = None,
     templates: Effects = None,
     force: Force = False,
+    as_json: Json = False,
 ) -> None:
     """Diagnose and add until the data support nothing more.
 
@@ -163,6 +172,9 @@ def improve(
                 trust=read_trust(trust or ()), templates=templates or (),
                 force=force, progress=progress,
             )  # fmt: skip
+        if as_json:
+            print_json({"joints": {name: one.as_json() for name, one in every.items()}})
+            return
         for name, one in every.items():
             say(f"{name}:")
             for sentence in sentences(one):
@@ -177,6 +189,9 @@ def improve(
             trust=read_trust(trust or ()), templates=templates or (), force=force,
             progress=progress,
         )  # fmt: skip
+    if as_json:
+        print_json(result.as_json())
+        return
     for sentence in sentences(result):
         say(sentence)
     written = result.scene, result.composed, result.picture, result.corrections, report

@@ -5,17 +5,16 @@ from typing import Annotated
 
 import typer
 
-from joda.cli.options import Folder, Force, Joint, Model
+from joda.cli.options import STDOUT, Folder, Force, Joint, JsonFile, Model
 from joda.cli.progress import spinner
 from joda.cli.say import say
+from joda.cli.tell import print_json
 
 
 def context(
     model: Model,
     joint: Joint,
-    as_json: Annotated[
-        Path | None, typer.Option("--json", help="Write the whole context to this file.")
-    ] = None,
+    as_json: JsonFile = None,
     force: Force = False,
 ) -> None:
     """Tell what the model knows of a joint: axes, range, inertia.
@@ -28,9 +27,12 @@ def context(
     from joda.files import check_target, write_text
     from joda.plain import plain
 
-    if as_json:
+    if as_json and as_json != STDOUT:
         check_target(as_json, force)
     found = run(model, joint)
+    if as_json == STDOUT:
+        print_json(found.model_dump(mode="json"))
+        return
     if as_json:
         write_text(as_json, plain(found.model_dump_json(indent=2)) + "\n")
     say(*found.describe().split("\n"), *found.warnings)

@@ -10,6 +10,12 @@ from joda.errors import JodaError
 
 Force = Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for scripts.")]
+JsonFile = Annotated[
+    Path | None,
+    typer.Option("--json", help="Write all numbers to this file; to -, print nothing else."),
+]
+STDOUT = Path("-")
+"""As a `JsonFile`: what would be written is printed, for scripts."""
 Model = Annotated[Path, typer.Argument(help="MJCF or URDF file.", show_default=False)]
 Runs = Annotated[
     list[Path],

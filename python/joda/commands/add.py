@@ -252,7 +252,7 @@ def _no_help(told: dict[str, Any], effect: str) -> str | None:
         known = isinstance(before, float) and isinstance(after, float)
         if one["effect"] == effect and known and after >= before:
             return (
-                "the diagnosis found windows held out of its fit missed by no less with it "
+                "the diagnosis found held-out segments of its fit missed by no less with it "
                 f"({before:.2g} → {after:.2g})"
             )
     return None

@@ -1,10 +1,10 @@
 """Diagnoses and mends a model until the data support no more, and tells the story."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from joda.pictures.style import COLOURS, house_style, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
+
+
+FILES = "scene", "composed", "picture", "corrections"
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,28 @@ class Improved:
     departures: tuple[str, ...]
     changes: tuple[str, ...]
     notes: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """What was found and written, for JSON: of each step its effect and corrections, and the
+        errors on what was held out, before and after it."""
+        paths = {name: getattr(self, name) for name in FILES}
+        errors = [asdict(step.error) for step in self.steps]
+        steps = [
+            {
+                "effect": step.added and asdict(step.added),
+                "corrections": [asdict(one) for one in step.corrections],
+                "before": before,
+                "after": after,
+            }
+            for step, before, after in zip(self.steps[1:], errors[:-1], errors[1:], strict=True)
+        ]
+        told = "joint", "why", "noise_floor", "unit", "held_out", "departures", "changes", "notes"
+        return {
+            **{name: path and str(path) for name, path in paths.items()},
+            **{name: getattr(self, name) for name in told},
+            "error": errors[0],
+            "steps": steps,
+        }
 
 
 def improve(

@@ -230,7 +230,7 @@ def by_all(
 
 def fallen(before: Error, after: Error) -> bool:
     """Whether windows are missed by less, or whole runs where windows are too short to show it."""
-    windows = after.window < SETTINGS.adding.max_window_error * before.window
+    windows = after.window < SETTINGS.adding.max_segment_error * before.window
     if before.whole is None or after.whole is None:
         return windows
     return windows or (

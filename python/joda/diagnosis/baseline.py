@@ -123,7 +123,8 @@ class Baseline:
         sure = {
             side
             for side, own in self.rebounds.items()
-            if own.bouncier and all(self.impacts[side].rebound(o).bouncier for o in others)
+            if own.clearly_larger
+            and all(self.impacts[side].rebound(o).clearly_larger for o in others)
         }
         there = [self._thrown_back(end) for end in ends if sure.issuperset(ends_of(end))]
         return [candidate for candidate in there if candidate]

@@ -74,7 +74,7 @@ def too_little(measured: Measured) -> str:
     needed = SETTINGS.naming.motions
     if (moving := _moving(measured, segments)) < needed:
         return (
-            f"The joint moves in {moving} windows of {segments.length:.2g} s; {needed} are needed."
+            f"The joint moves in {moving} segments of {segments.length:.2g} s; {needed} are needed."
         )
     return ""
 

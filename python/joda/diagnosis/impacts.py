@@ -80,7 +80,7 @@ class Rebound:
         return self.own - float(self.losses.min())
 
     @property
-    def bouncier(self) -> bool:
+    def clearly_larger(self) -> bool:
         """Whether a restitution that is larger than the model's is clearly better."""
         return self.gain > max(IMPACTS.min_gain, IMPACTS.min_share * self.own)
 

@@ -34,7 +34,7 @@ def worse(before: Errors, after: Errors) -> str | None:
         for one in zip(pairs[2][:, None], pairs[3][:, None], strict=True)
     )
     if not improves(pairs[0], pairs[1]) and not (shows_late and not improves(pairs[1], pairs[0])):
-        return "windows held out of the fit are not missed by clearly less with it (paired test)"
+        return "held-out segments are not missed by clearly less with it (paired test)"
     if risen(pairs[2], pairs[3]) > ADDING.max_rise:
         return MISSED_MORE
     return None
@@ -53,7 +53,7 @@ def improves(before: Array, after: Array) -> bool:
     before, after = (np.minimum(x[finite], 1e6) for x in (before, after))
     every = np.log1p(before**2) - np.log1p(after**2)
     gain = every[np.abs(before - after) > ADDING.changed]
-    if len(gain) < ADDING.few_windows:
+    if len(gain) < ADDING.min_segments:
         return bool(every.sum() > 0 and (gain > 0).all())
     if len(gain) <= EXACT:
         signs = np.array(list(product((-1.0, 1.0), repeat=len(gain))))

@@ -25,11 +25,11 @@ UNEVEN = (
     "trembles makes one too."
 )
 DRIFTING = (
-    "Something is missing that no known effect explains: windows show nothing beyond the noise, "
+    "Something is missing that no known effect explains: segments show nothing beyond the noise, "
     "but whole runs are missed by up to {:.0f} times what noise, start and force explain."
 )
 SLOWLY = (
-    "Something is missing that no known effect explains: windows show nothing beyond the noise, "
+    "Something is missing that no known effect explains: segments show nothing beyond the noise, "
     "but of runs in which no force acted as a whole more is left than noise makes, whatever the "
     "model's own strengths."
 )

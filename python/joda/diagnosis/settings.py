@@ -359,14 +359,14 @@ class AddingSettings:
     Attributes:
         chance: largest probability of as clear an improvement by chance (probability).
         changed: by how much a window's error must change to count (noises).
-        few_windows: of fewer that change none may become worse, and all together must be better
+        min_segments: of fewer that change none may become worse, and all together must be better
             (windows).
         max_rise: how many times the geometric mean of the errors of whole runs may become.
         whole_run_fall: to what part that must fall, in every one, where windows are too short to
             show an effect.
         silent: error before, up to which what was held out tells nothing (noises).
-        max_window_error: part of the error before, and of the loss, to which an effect must bring
-            windows held out.
+        max_segment_error: part of the error before, and of the loss, to which an effect must bring
+            held-out segments.
         likelier: how much less twice the negative log-likelihood of these must be: a model that was
             not fitted to data makes them 20 times likelier than the true one does in one of 20
             cases at most (2 ln 20).
@@ -387,11 +387,11 @@ class AddingSettings:
 
     chance: float = 0.05
     changed: float = 0.5
-    few_windows: int = 5
+    min_segments: int = 5
     max_rise: float = 1.05
     whole_run_fall: float = 0.5
     silent: float = 1.1
-    max_window_error: float = 0.95
+    max_segment_error: float = 0.95
     likelier: float = 2 * log(20)
     control_point: float = 2.0
     factor_gain: float = 10.0

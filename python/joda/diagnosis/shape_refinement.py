@@ -59,13 +59,13 @@ class Likelihood:
     """Of measured runs, as MuJoCo would move the joint at the scene's own step, or of curves."""
 
     def __init__(
-        self, measured: Measured, bounces: bool = False, moved_by: Profile | None = None
+        self, measured: Measured, with_impacts: bool = False, moved_by: Profile | None = None
     ) -> None:
         """Cuts the runs into segments.
 
         Args:
             measured: the joint and its runs or curves.
-            bounces: whether segments count that tell of an end of the range alone; so they do
+            with_impacts: whether segments count that tell of an end of the range alone; so they do
                 where there are no others.
             moved_by: profile with which the joint can be followed to the end of each segment; None:
                 its own.
@@ -74,7 +74,7 @@ class Likelihood:
         self.joint_model = as_it_is(measured)
         self.segments = segments_for(followed, LONGEST, fine=False)
         self.estimator = SegmentEstimator(
-            self.segments, _counted(self.segments, bounces or not self.segments.usable.any())
+            self.segments, _counted(self.segments, with_impacts or not self.segments.usable.any())
         )
         self.given = measured.profile
         self.own = replace(self.joint_model, friction_row=measured.joint_model.friction_row)
@@ -108,13 +108,13 @@ class Trials:
         self,
         train: Measured,
         held: Measured,
-        bounces: bool = False,
+        with_impacts: bool = False,
         moved_by: Profile | None = None,
     ) -> None:
         """Args: the joint and runs to fit; the same with runs held out; see `Likelihood`."""
         self.train = train
-        bounces = bounces or has_restitution(train.profile)
-        self.seen, self.unseen = (Likelihood(one, bounces, moved_by) for one in (train, held))
+        with_impacts = with_impacts or has_restitution(train.profile)
+        self.seen, self.unseen = (Likelihood(one, with_impacts, moved_by) for one in (train, held))
         longer = LONGER if train.runs else (1.0,)  # curves' segments are all alike
         usual_length = segments_for(train).length
         self.lengths = [factor * usual_length for factor in longer]
@@ -213,7 +213,7 @@ class Trials:
 
 def clearly(loss: float, than: float) -> bool:
     """Whether a loss is less by enough not to be by chance."""
-    return loss < min(ADDING.max_window_error * than, than - ADDING.likelier)
+    return loss < min(ADDING.max_segment_error * than, than - ADDING.likelier)
 
 
 def likeliest(found: Sequence[Tried]) -> Tried:
@@ -311,9 +311,9 @@ def has_restitution(profile: Profile) -> bool:
     return any(isinstance(effect, EndStopRestitution) for effect in profile.effects)
 
 
-def _counted(segments: Segments, bounces: bool) -> NDArray[np.bool_]:
-    """Which segments count: without knocks and rests at the ends, unless `bounces`."""
-    return segments.long_enough if bounces else segments.usable
+def _counted(segments: Segments, with_impacts: bool) -> NDArray[np.bool_]:
+    """Which segments count: without impacts and rests at the ends, unless `with_impacts`."""
+    return segments.long_enough if with_impacts else segments.usable
 
 
 def _known(parameters: Parameters, given: Profile, law: Profile) -> tuple[Array, Array]:

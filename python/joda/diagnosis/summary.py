@@ -10,14 +10,14 @@ from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import compared
 from joda.template import Template
 
-STILL = " With it windows held out of the fit are still missed by {:.0f} times the noise."
+STILL = " With it held-out segments are still missed by {:.0f} times the noise."
 SAME = (
     ": the joint was moved in one direction only, or nearly so, where a resistance and a force "
     "over position are the same"
 )
 ENDS_LEFT = "The ends of the range throw the joint back more than the model's: not explained."
 BLIND = (
-    " With its own numbers fitted the model misses windows held out by less than what was taken "
+    " With its own numbers fitted the model misses held-out segments by less than what was taken "
     "for noise, part of which may be what the joint does between two samples: record faster."
 )
 
@@ -63,7 +63,7 @@ def summarised(
     if not helps(first, floor):
         return (
             f"Something is missing that no known effect explains. Best guess: {name} ({likely}); "
-            "but with it windows held out of the fit are missed as much."
+            "but with it held-out segments are missed as much."
         )
     after = first.held_out_error_after
     far = far_off(first, floor)

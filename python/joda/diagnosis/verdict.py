@@ -432,7 +432,7 @@ def _suffices(measured: Measured, numbers_off: str, left: float, denied: bool, s
     adrift = not numbers_off and strays(measured) < SETTINGS.whole_runs.drift_probability
     where = "With the numbers below the model" if same else "The model"
     where = (
-        "In windows the model"
+        "In segments the model"
         if adrift or (loose and left > SETTINGS.whole_runs.said_multiple)
         else where
     )

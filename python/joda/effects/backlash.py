@@ -33,8 +33,8 @@ class Backlash(Effect):
     )
     SOURCE = "Nordin and Gutman, Automatica 38 (2002) 1633"
     SIDES: ClassVar[Mapping[str, str]] = {
-        "load": "after each reversal of the force nothing happens for a moment, then a knock",
-        "motor": "after each reversal the joint is light for a moment, then a knock slows it",
+        "load": "after each reversal of the force nothing happens for a moment, then an impact",
+        "motor": "after each reversal the joint is light for a moment, then an impact slows it",
     }
     SHOWS = f"Side load: {SIDES['load']}. Side motor: {SIDES['motor']}."
 
@@ -61,7 +61,7 @@ class Backlash(Effect):
     @classmethod
     def guesses(cls, joint: Units) -> Iterator[InitialGuess]:
         """A play before the joint, where something pushes it through that, and behind it; how its
-        contact yields and knocks is not known."""
+        contact yields in an impact is not known."""
         M, unit = joint.inertia, "rad" if joint.hinge else "m"
 
         def play(x: Trial) -> float:

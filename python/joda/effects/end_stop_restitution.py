@@ -21,11 +21,11 @@ class EndStopRestitution(Effect):
     DESCRIPTION = "The ends of the range, or one of them, bounce more, or less, than the model's."
     LAW = "speed after / speed before = restitution; the limit's solver parameters are set so"
     SOURCE = "Newton's coefficient of restitution"
-    SHOWS = "After a knock at an end the speed is another one than simulated."
+    SHOWS = "After an impact at an end the speed is another one than simulated."
 
     effect: Literal["end_stop_restitution"] = "end_stop_restitution"
     restitution: float = parameter(
-        "speed after a knock per speed before", "1", "1", (0, 0.8), ge=0, lt=1
+        "speed after an impact per speed before", "1", "1", (0, 0.8), ge=0, lt=1
     )
     end: End = Field(
         default="both", description="of the range that does so; the other one stays the scene's"

@@ -66,15 +66,15 @@ def curve_segments(
     for number, gauged in enumerate(curves):
         known = np.flatnonzero(gauged.direction)
         pieces = max(len(known) // SAMPLES, 1)
-        window = np.minimum(np.arange(len(known)) // SAMPLES, pieces - 1) + count
+        segment = np.minimum(np.arange(len(known)) // SAMPLES, pieces - 1) + count
         curve = gauged.curve.position[known], gauged.curve.force[known]
         own = np.full(len(known), number)
-        parts.append((*curve, gauged.direction[known], gauged.cautious, window, own))
+        parts.append((*curve, gauged.direction[known], gauged.cautious, segment, own))
         count += pieces
-    at, force, direction, prior_std, window, run = (
+    at, force, direction, prior_std, segment, run = (
         np.concatenate(x) for x in zip(*parts, strict=True)
     )
-    rows = rows_of(window, count)
+    rows = rows_of(segment, count)
     n = len(force)
     weight = gravity(found, at)
 

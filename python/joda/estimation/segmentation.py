@@ -122,8 +122,8 @@ def segments_of(
                     thrown = limit_rate * spread[left] / gaps / np.sqrt(len(gaps))
                     push[left] = np.hypot(push[left], inertia * thrown)
             many = len(begins)
-            window = np.searchsorted(begins, index, side="right") - 1
-            enough = np.bincount(window, minlength=many) >= smoothing.LEAST
+            segment = np.searchsorted(begins, index, side="right") - 1
+            enough = np.bincount(segment, minlength=many) >= smoothing.LEAST
             start, prior_std = starts(time, position, time[0] + h * begins, sigma)
             seen = np.minimum(np.searchsorted(index, begins), len(index) - 1)
             clear = _inside(*place_noise)[seen] > BEYOND  # not beyond the end that threw it back
@@ -135,21 +135,21 @@ def segments_of(
             given = np.zeros(len(time)) if run.command is None else run.command[piece]
             command = held(time, given, edges)
             parts.append((force, command, step + begins, fresh, start, prior_std, same))
-            counts = enough[window]
+            counts = enough[segment]
             if thinned:
                 acted = run.command is not None or bool(np.any(run.force[piece]))
                 counts &= _thinned(index // chunk, position / spread, not acted)
-            window = np.where(counts, window + count, -1)
-            own = position, time, window, hits, spread, push
+            segment = np.where(counts, segment + count, -1)
+            own = position, time, segment, hits, spread, push
             samples.append((step + index, place - index, *own))
             step, count = step + steps, count + many
     force, command, at, fresh, start, prior_stds, run_of = (
         np.concatenate(x) for x in zip(*parts, strict=True)
     )
-    index, share, position, time, window, hits, spread, push = (
+    index, share, position, time, segment, hits, spread, push = (
         np.concatenate(x) for x in zip(*samples, strict=True)
     )
-    rows = rows_of(window, count)
+    rows = rows_of(segment, count)
     place, noise = (position - lo) / span, spread / span
     return Segments(
         h=h,
@@ -169,7 +169,7 @@ def segments_of(
         shared=_shared(rows, time, spread, push / inertia, nearby(position).rate),
         impacts=_with_impact(rows, place, noise, hits) if cut_at_ends else np.zeros(count, bool),
         rests=_rests(rows, place, noise) if cut_at_ends else np.zeros(count, bool),
-        stays=_stays(rows, place, noise) * np.array([run.forced for run in runs])[run_of[window]],
+        stays=_stays(rows, place, noise) * np.array([run.forced for run in runs])[run_of[segment]],
         command=command if driven else None,
     )
 

@@ -50,7 +50,7 @@ class Segments:
 
     Attributes:
         h: step, s.
-        length: of a usual segment, s; knocks and jolts make some shorter.
+        length: of a usual segment, s; impacts and jolts make some shorter.
         force: at each step, N·m or N, shape (steps,); of a scene all that is put into it, shape
             (steps, inputs).
         command: of an actuator there, see `Servo`; None where none acted.

@@ -42,7 +42,7 @@ def failing_intervals(
 def significant(rows: Array) -> bool:
     """Whether the rows' sum of squares is beyond what noise makes, and the error noticeable.
 
-    Without the worst row: a window that begins in a knock may have a wrong start.
+    Without the worst row: a window that begins in an impact may have a wrong start.
     """
     if len(rows) < LEAST:
         return False

@@ -55,7 +55,7 @@ STUCK = 1e-9
 START = 3.0
 """How far a start may be from the measured one, in its standard deviations."""
 WIDER, SOUGHT = 3.0, np.linspace(-START, START, 25)
-"""Where a joint that knocks at an end is followed poorly from there: by how much less well the
+"""Where a joint that impacts at an end is followed poorly from there: by how much less well the
 start is known, and other velocities that are tried."""
 FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 APPLIED = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)

@@ -89,7 +89,7 @@ def pooled_noise(signals: Sequence[tuple[Array, Array]]) -> float:
     """Standard deviation of one sensor's noise, from what a local cubic cannot follow.
 
     Fourth divided differences, scaled to that of white noise; the root mean square of the smaller
-    ones, so that knocks and stops hardly count. Stretches in which a quantised position does not
+    ones, so that impacts and stops hardly count. Stretches in which a quantised position does not
     change tell nothing. At least the steps' own, a twelfth of their square.
 
     Args:

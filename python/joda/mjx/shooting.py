@@ -29,7 +29,7 @@ Numbers = tuple[Fields, dict[str, NDArray[Any]]]
 """Of profiles and of the model."""
 
 PIECE, BATCH, WAYS = 20, 32, 8
-"""Steps that are compiled as one, windows side by side, and directions of derivatives: all are
+"""Steps that are compiled as one, segments side by side, and directions of derivatives: all are
 filled up to multiples of these."""
 STATE = ("qpos", "qvel", "qacc_warmstart", "qfrc_constraint", "qfrc_actuator", "userdata")
 FORCE = "_impl.efc_force"
@@ -105,13 +105,13 @@ class Scene:
 
         Args:
             numbers: see there.
-            start: of each window, positions and velocities (rad or m, and per s) joint by joint;
+            start: of each segment, positions and velocities (rad or m, and per s) joint by joint;
                 shape (m, 2 joints).
-            inputs: of each window, actuators' commands and forces on all degrees of freedom; shape
+            inputs: of each segment, actuators' commands and forces on all degrees of freedom; shape
                 (steps, nu + nv).
 
         Returns:
-            of each window, rad or m, shape (steps + 1, joints).
+            of each segment, rad or m, shape (steps + 1, joints).
         """
         begun = self._begun(start)
         found = _run(lambda state, piece: self._go(numbers, state, piece), begun, inputs)
@@ -134,7 +134,8 @@ class Scene:
             turns: directions of the starts, shape (m, d, 2 joints).
 
         Returns:
-            along the ones and then the others; of each window, shape (steps + 1, ways + d, joints).
+            along the ones and then the others; of each segment, shape (steps + 1, ways + d,
+            joints).
         """
         count, (many, own) = len(ways), turns.shape[:2]
         filled = count + -(-(count + own) // WAYS) * WAYS - count
@@ -165,7 +166,7 @@ class Scene:
         return out
 
     def _piece(self, numbers: Numbers, state: Any, inputs: Any) -> tuple[Any, Any]:
-        """A window's next steps: the state then, and the positions after each."""
+        """A segment's next steps: the state then, and the positions after each."""
         fields, own = numbers
         m, prepared = self._m.replace(**own), prepare(fields)
 
@@ -211,13 +212,13 @@ def _unpacked(d: mjx.Data, state: Any) -> mjx.Data:
 def _run(
     go: Callable[[Any, Array], tuple[Any, Any]], begun: Array, inputs: Sequence[Array]
 ) -> list[Array]:
-    """What `go` makes of each window, piece by piece, windows of like length side by side.
+    """What `go` makes of each segment, piece by piece, segments of like length side by side.
 
     Args:
         go: states and inputs, shapes (BATCH, ...) and (BATCH, PIECE, inputs), to the states then
             and what is kept, shape (BATCH, PIECE, ...).
         begun: states at first, shape (m, ...).
-        inputs: of each window, shape (steps, inputs).
+        inputs: of each segment, shape (steps, inputs).
     """
     out: list[Any] = [None] * len(inputs)
     order = sorted(range(len(inputs)), key=lambda k: len(inputs[k]))

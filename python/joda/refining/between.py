@@ -94,11 +94,11 @@ class Between:
     def held(
         self, estimator: SegmentEstimator, theta: Array, iterations: int, report: Progress
     ) -> Array:
-        """Gauss-Newton over segments with the jumps held, see `Shooting.fit_windows`."""
+        """Gauss-Newton over segments with the jumps held, see `Shooting.fit_segments`."""
         held = np.isin(np.arange(len(theta)), self._ends(theta))
         mean = np.where(held, theta, self.parameters.start)
         prior_std = np.where(held, HELD, 1.0) * self.parameters.prior_std
-        return self.shooting.fit_windows(estimator, theta, prior_std, iterations, report, mean)
+        return self.shooting.fit_segments(estimator, theta, prior_std, iterations, report, mean)
 
     def _moved(self, theta: Array, move: float, length: float, report: Progress) -> Array:
         """Each jump in turn where segments over it are missed least, in steps of one size."""

@@ -214,7 +214,7 @@ class Problem:
 
         def run(name: str, estimator: SegmentEstimator, most: int, prior_std: Array = free) -> None:
             if count := min(most, iterations - len(history)):
-                self.shooting.fit_windows(
+                self.shooting.fit_segments(
                     estimator, self._best, prior_std, count, partial(heard, name)
                 )
 
@@ -226,7 +226,7 @@ class Problem:
         def whole() -> bool:
             """Whether some misfit is left."""
             before = self._best
-            stages = [("longer windows", one) for one in self.longer]
+            stages = [("longer segments", one) for one in self.longer]
             for name, estimator in (*stages, ("whole runs", self.whole)):
                 if count := min(WHOLE, iterations - len(history)):
                     self.between.held(estimator, self._best, count, partial(heard, name))
@@ -246,7 +246,7 @@ class Problem:
         try:
             if sizes != "none":
                 sized(self.shooting, self.short, FIRST, size, sizes == "far")
-            run("short windows, intervals held", self.short, min(FIRST, iterations // 3), held)
+            run("short segments, intervals held", self.short, min(FIRST, iterations // 3), held)
             follows = self.rms(self._best) < FOLLOWS * self.span
             if not follows:
                 segments()
@@ -269,8 +269,8 @@ class Problem:
         the other gets stuck, at jumps and where the joint sticks. Keeps the best."""
         best, least = self._best, np.inf
         for _ in range(TURNS):
-            run("short windows", self.short, max(iterations // 12, 1))
-            run("long windows", self.long, max(iterations // 6, 1))
+            run("short segments", self.short, max(iterations // 12, 1))
+            run("long segments", self.long, max(iterations // 6, 1))
             misfits = [
                 self.shooting.rms(estimator, self._best) for estimator in (self.short, self.long)
             ]

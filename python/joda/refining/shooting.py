@@ -74,7 +74,7 @@ class Shooting:
         start = np.where(better[:, None], anew.start, found.start)
         return replace(found, start=start, squares=squares, loss=estimator.loss(squares))
 
-    def fit_windows(
+    def fit_segments(
         self,
         estimator: SegmentEstimator,
         theta: Array,

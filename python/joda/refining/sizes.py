@@ -73,7 +73,7 @@ def sized(
             starts = _starts(shooting, estimator, [parameters.about(one, kinds) for one in bases])
         least = np.inf
         for other, start in starts:
-            x = other.fit_windows(estimator, start, other.parameters.prior_std, iterations)
+            x = other.fit_segments(estimator, start, other.parameters.prior_std, iterations)
             x = _inside(other.parameters, x)
             loss = _loss(estimator, other, x)
             if loss < least:
@@ -105,7 +105,7 @@ def _farther(shooting: Shooting, estimator: SegmentEstimator, weak: Profile) -> 
         if _feasible(placed, place):
             own = placed.about(placed.written(place, exact=True), SIZES)
             sizes = shooting.about(own)
-            x = sizes.fit_windows(estimator, own.start, own.prior_std, FEW)
+            x = sizes.fit_segments(estimator, own.start, own.prior_std, FEW)
             found.append((_loss(estimator, sizes, x), own.written(x, exact=True)))
     found.sort(key=lambda one: one[0])
     return [profile for _, profile in found[:MOST]]

@@ -18,8 +18,8 @@ from joda._core import stop_damping
 from joda.scenes.mjcf import quoted
 
 IMPACT_STEPS = 16
-"""How many timesteps a knock at a stop with a restitution lasts without damping: as kImpactSteps in
-cpp/end_stop.h."""
+"""How many timesteps an impact at a stop with a restitution lasts without damping: as kImpactSteps
+in cpp/end_stop.h."""
 STIFFNESS = (np.pi / IMPACT_STEPS) ** 2
 """Of such a stop, times the timestep squared: as kStopStiffness there."""
 IMPEDANCE = 0.99
@@ -113,8 +113,8 @@ def rebounding(restitution: float, timestep: float) -> tuple[float, float]:
     """The attribute solreflimit of a joint, with the constant impedance `IMPEDANCE`.
 
     Args:
-        restitution: speed after a knock divided by the speed before, 0 <= restitution < 1.
-        timestep: s; a knock lasts `IMPACT_STEPS` of these without damping.
+        restitution: speed after an impact divided by the speed before, 0 <= restitution < 1.
+        timestep: s; an impact lasts `IMPACT_STEPS` of these without damping.
     """
     # documented: the stiffness is multiplied by d / d^2 and the damping by 1 / d; then, with the
     # impedance d, the row makes the share d of the acceleration
@@ -126,7 +126,7 @@ def limit_parameters(restitution: float, timestep: float) -> tuple[str, str]:
     """The attributes solreflimit and solimplimit of a joint.
 
     Args:
-        restitution: speed after a knock divided by the speed before, 0 <= restitution < 1.
+        restitution: speed after an impact divided by the speed before, 0 <= restitution < 1.
         timestep: s; for another one the restitution is another one too.
     """
     stiffness, damping = rebounding(restitution, timestep)

@@ -155,7 +155,7 @@ def at_home(model: mujoco.MjModel) -> mujoco.MjData:
 def leaning(model: mujoco.MjModel, joint: int, position: float) -> float:
     """Where the joint comes to rest (rad or m) if it is pressed against the stop that it is at.
 
-    A stop yields a little; what begins at its very surface would knock on it at first.
+    A stop yields a little; what begins at its very surface would hit it at first.
     """
     lo, hi = model.jnt_range[joint]
     if not model.jnt_limited[joint] or lo < position < hi:

@@ -148,7 +148,7 @@ def release(now: Motion | None, before: Motion | None, joint: Joint) -> dict[str
 def hand(now: Motion | None, before: Motion | None, joint: Joint) -> dict[str, Any]:
     """The chart of a hand that opens and shuts a joint: its force over position.
 
-    A knock at an end of the range leaves the frame, else it would squeeze all the rest.
+    An impact at an end of the range leaves the frame, else it would squeeze all the rest.
     """
     shown = _both(now, before)
     factor, prefix = _prefix([{"y": m.force} for m, _ in shown] or [{"y": [0.0]}])
@@ -161,7 +161,7 @@ def hand(now: Motion | None, before: Motion | None, joint: Joint) -> dict[str, A
 
 
 def _off_the_stops(motion: Motion, joint: Joint) -> NDArray[np.bool_]:
-    """Where the joint is off the ends of its range by more than what a stop yields in a knock."""
+    """Where the joint is off the ends of its range by more than what a stop yields in an impact."""
     lo, hi = joint.range
     return np.abs(motion.position - (lo + hi) / 2) < (0.5 - IMPACT) * (hi - lo)
 

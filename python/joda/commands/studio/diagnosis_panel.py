@@ -83,7 +83,7 @@ class DiagnosisPanel:
                     before, after = found["held_out_error_before"], found["held_out_error_after"]
                     unit = diagnosis["unit"]
                     ui.label(f"{before:.2g} → {after:.2g} {unit}").classes("number").tooltip(
-                        "error on windows held out of the fit, without and with it"
+                        "error on held-out segments, without and with it"
                     )
                     add = ui.button(
                         "Add", on_click=lambda name=found["effect"]: self._add(name)

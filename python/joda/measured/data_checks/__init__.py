@@ -1,6 +1,6 @@
 """What looks wrong in a measurement, each as a sentence for a person, before anything is fitted.
 
-A check speaks only when it is sure: what good measurements do too (knocks, latches, noise, coarse
+A check speaks only when it is sure: what good measurements do too (impacts, latches, noise, coarse
 encoders, slow pulls) is no suspicion.
 """
 
