@@ -198,11 +198,16 @@ class _Fitted:
         return self.fit.loss / max(self.estimator.samples, 1.0)
 
     @property
+    def left(self) -> float:
+        """What is left beyond noise, per sample, be the model's own strengths as far off as they
+        may."""
+        loss = self.estimator.loss(self.fit.squares)
+        return excess(loss, max(self.estimator.samples, 1.0))
+
+    @property
     def calm(self) -> bool:
-        """Whether hardly more than noise is left, so that nothing else is missing, be the model's
-        own strengths as far off as they may."""
-        left = self.estimator.loss(self.fit.squares)
-        return excess(left, max(self.estimator.samples, 1.0)) < SETTINGS.search.stepping_excess
+        """Whether hardly more than noise is left, so that nothing else is missing."""
+        return self.left < SETTINGS.search.stepping_excess
 
 
 def _fitted(
@@ -213,8 +218,7 @@ def _fitted(
     row: Row | None = None,
 ) -> _Fitted:
     """The model in steps that stand for none or in MuJoCo's, with a row of friction that yields."""
-    estimator, plain = posed(measured, segments, accurate, row)
-    base = corrected_base(plain, measured.loose)
+    estimator, base = _posed(measured, segments, accurate, row)
     as_it_is = base.unknowns.mean
     given = estimator.begun(base.simulator, as_it_is)
     tried = [(as_it_is, segments.start), (as_it_is, given.start)]
@@ -227,18 +231,42 @@ def _fitted(
     return _Fitted(estimator, base, fit, given)
 
 
+def _posed(
+    measured: Measured, segments: Segments, accurate: bool, row: Row | None
+) -> tuple[SegmentEstimator, BaseModel]:
+    estimator, plain = posed(measured, segments, accurate, row)
+    return estimator, corrected_base(plain, measured.loose)
+
+
+def _may_be_so(
+    measured: Measured, segments: Segments, accurate: bool, row: Row | None, usual: _Fitted
+) -> bool:
+    """Whether a first fit in such steps, with such a friction, from the strengths as they were
+    fitted, leaves so little that more fits might leave hardly more than noise."""
+    estimator, base = _posed(measured, segments, accurate, row)
+    start = estimator.started(base.simulator(usual.fit.x)).start
+    fit = estimator.fit(base.simulator, base.unknowns, usual.fit.x, start)
+    return _Fitted(estimator, base, fit, fit).left < SETTINGS.search.stepping_tried
+
+
 def _as_made(measured: Measured, cut: Cut, near: Array | None, usual: _Fitted) -> _Fitted:
     """The model as MuJoCo moves it, in the scene's steps, or with a friction that yields as its own
     does, where hardly more than noise is left then, and clearly less than of accurate steps that
     are as short; else as it was fitted."""
-    segments, alike = usual.estimator.segments, usual
+    segments = usual.estimator.segments
     if stepped := FINER * measured.timestep >= segments.h:
         segments = cut(fine=False)
-        alike = _fitted(measured, segments, near)
     own = measured.own_row if measured.profile.channels.friction.components else None
     rows = (*((None,) if stepped else ()), *((own,) if own else ()))
-    made = [_fitted(measured, segments, near, not stepped, row) for row in rows]
-    best = min((one for one in made if one.calm), key=lambda one: one.loss, default=usual)
+    made = [
+        _fitted(measured, segments, near, not stepped, row)
+        for row in rows
+        if _may_be_so(measured, segments, not stepped, row, usual)
+    ]
+    if not (calm := [one for one in made if one.calm]):
+        return usual
+    best = min(calm, key=lambda one: one.loss)
+    alike = _fitted(measured, segments, near) if stepped else usual
     clearly = SETTINGS.search.stepping_gain / max(usual.estimator.samples, 1.0)
     return best if best.loss < min(usual.loss, alike.loss) - clearly else usual
 

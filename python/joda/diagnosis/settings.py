@@ -272,6 +272,8 @@ class SearchSettings:
         stepping_gain: from which runs tell that MuJoCo made them, in its steps or with a friction
             that yields as its own does (loss).
         stepping_excess: what that leaves at most beyond noise (per sample).
+        stepping_tried: what a first fit in such steps leaves at most, for more of them to be made
+            (per sample).
     """
 
     noise_loss: float = 1.5
@@ -286,6 +288,7 @@ class SearchSettings:
     no_strength: float = 0.1
     stepping_gain: float = 10.0
     stepping_excess: float = 0.1
+    stepping_tried: float = 1.0
 
 
 @dataclass(frozen=True)

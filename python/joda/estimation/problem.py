@@ -29,7 +29,18 @@ def segments_for(
     *,
     cut_at_ends: bool = True,
 ) -> Segments:
-    """Runs in segments of some length (s), see `segments_of`; curves where there are no runs."""
+    """Runs in segments of some length (s), see `segments_of`; curves where there are no runs. They
+    are cut once for each joint and its runs."""
+    key = length, fine, cut_at_ends
+    if key not in measured.cut:
+        measured.cut[key] = _segments_for(measured, *key)
+    found: Segments = measured.cut[key]
+    return found
+
+
+def _segments_for(
+    measured: Measured, length: float | None, fine: bool, cut_at_ends: bool
+) -> Segments:
     if not measured.runs:
         return curve_segments(measured.curves, measured.context, measured.timestep)
     lo, hi = measured.profile.joint.range

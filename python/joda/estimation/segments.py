@@ -215,12 +215,12 @@ class Segments:
         Returns:
             shape (m, most samples) or (m, most samples, k).
         """
-        found = self.selection(misfit)
+        found = self.whitened(misfit)
         np.clip(found, -HUGE, HUGE, out=found)
         np.copyto(found, HUGE, where=np.isnan(found))
         return found
 
-    def selection(self, misfit: Array) -> Array:
+    def whitened(self, misfit: Array) -> Array:
         """The same, however large: of misfits, or of their derivatives."""
         each = misfit.reshape(len(misfit), -1)
         own = self.sharpness[:, :, None] * each[self.rows]

@@ -1,7 +1,8 @@
 """A joint of a model with what was measured of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ class Measured:
         trust: how far off its numbers, and those of the measurement, may be.
         templates: of effects that may be missing, by name.
         loose: numbers that have been set right, and the standard errors that are left of them.
+        cut: the runs in segments, as they were cut so far (`joda.estimation.problem`).
     """
 
     context: Context
@@ -62,6 +64,7 @@ class Measured:
     trust: Trust = USUAL
     templates: Mapping[str, Template] = field(default_factory=read_templates)
     loose: Mapping[str, float] = field(default_factory=dict)
+    cut: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def trusting(self, trust: Trust) -> "Measured":
         """The same joint and runs, whose numbers may be so far off."""

@@ -114,14 +114,14 @@ class SceneEstimator(SegmentEstimator):
             in_turn(np.concatenate([one[a:b] for one in found]) / simulator.units)
             for a, b in ((None, -1), (1, None))
         )
-        slopes = segments.selection(segments.sampled(before, after))
+        slopes = segments.whitened(segments.sampled(before, after))
         slopes = np.nan_to_num(np.clip(slopes, -STEEP, STEEP))
         J = np.zeros((*r.shape, k))
         J[:, :, smooth] = slopes[:, :, : len(smooth)]
         for number in jumps:
             off = unknowns.step[number] * np.eye(k)[number]
             up, down = (segments.misfit(make(x + way * off), start) for way in (1, -1))
-            J[:, :, number] = segments.selection(up - down) / (2 * unknowns.step[number])
+            J[:, :, number] = segments.whitened(up - down) / (2 * unknowns.step[number])
         return J, slopes[:, :, len(smooth) :]
 
 
