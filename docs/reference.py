@@ -131,7 +131,11 @@ def effects() -> str:
         rows = [(f"`{key}`", _cell(one.description), _default(one)) for key, one in fields]
         out += [f"## {name}", cls.DESCRIPTION, f"    {cls.LAW}"]
         out += [_table(("number", "meaning", "default"), rows)]
-        out += [f"In measurements: {cls.SHOWS}", f"Source: {cls.SOURCE}."]
+        out += [f"In measurements: {cls.SHOWS}"]
+        if cls.CONFUSED_WITH:
+            others = ", ".join(f"`{other}`" for other in cls.CONFUSED_WITH)
+            out += [f"Measurements may not tell it from {others}."]
+        out += [f"Source: {cls.SOURCE}."]
     out += ["## Free curves in a channel", "These effects are one more component of a channel:"]
     return _page([*out, _table(("effect", "channel"), CHANNEL_EFFECTS.items())])
 

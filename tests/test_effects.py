@@ -13,6 +13,7 @@ from scenes import write
 
 from joda import JodaError, Profile, attach, read_profiles
 from joda.component import Component
+from joda.diagnosis.phrases import effect_names
 from joda.effects import (
     CHANNEL_EFFECTS,
     EFFECTS,
@@ -108,6 +109,8 @@ def test_the_page_lists_what_the_catalogue_holds():
         section = page.split(f"### {name}\n")[1].split("\n### ")[0]
         for text in (cls.DESCRIPTION, cls.LAW, cls.SOURCE, cls.SHOWS):
             assert text in section
+        for other in cls.CONFUSED_WITH:
+            assert other in effect_names() and f"`{other}`" in section
         for key in (*cls.parameters(), *({"y"} & set(cls.model_fields))):
             assert f"`{key}`: {cls.model_fields[key].description}" in section
 

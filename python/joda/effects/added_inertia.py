@@ -16,6 +16,7 @@ class AddedInertia(Effect):
 
     NAME = "more inertia than the model has"
     LIKE_A_NUMBER = True
+    CONFUSED_WITH = ("gravity_offset",)
     DESCRIPTION = "The joint is harder to set in motion than its bodies' masses make it."
     LAW = "force -inertia dv/dt"
     SOURCE = "Newton's second law; `armature` of the joint in the scene"

@@ -17,6 +17,11 @@ class AsymmetricFriction(CurveEffect):
     KIND = "resistance"
     ON_FRICTION = True
     LIKE_A_NUMBER = True
+    CONFUSED_WITH = (
+        "constant_positive_conservative_hinge",
+        "constant_negative_conservative_hinge",
+        "stribeck_friction",
+    )
     DESCRIPTION = "Dry friction is larger while moving in one direction than in the other."
     LAW = "f = f_max(s) + y(s) while v has the direction, f_max(s) otherwise"
     SOURCE = "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083"

@@ -22,6 +22,10 @@ class Backlash(Effect):
 
     NAME = "play between what is pushed and what moves"
     SHAPE_ERROR = 0.03  # a stiff contact yields a little before it carries
+    CONFUSED_WITH = (
+        "presliding_friction",
+        "end_stop_restitution",
+    )
     DESCRIPTION = (
         "What pushes the joint has play, or what the joint moves has: a loose handle, gears, a "
         "slack linkage."

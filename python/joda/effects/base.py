@@ -67,6 +67,7 @@ class Effect(Frozen):
         WRITTEN_AS: the effect that a profile lists for it, as the plugin executes it; None: itself.
         SHAPE_ERROR: part of its size by which the real thing may differ from its law; None: as
             others of its kind (calibrated: `python tests/benchmarks hidden cover`).
+        CONFUSED_WITH: effects and templates that measurements may not tell from it.
         DESCRIPTION: in plain words.
         LAW: the formula; v is the joint's velocity, s its normalised position.
         SOURCE: where the formula is from.
@@ -79,6 +80,7 @@ class Effect(Frozen):
     LIKE_A_NUMBER: ClassVar[bool] = False
     WRITTEN_AS: ClassVar[str | None] = None
     SHAPE_ERROR: ClassVar[float | None] = None
+    CONFUSED_WITH: ClassVar[tuple[str, ...]] = ()
     DESCRIPTION: ClassVar[str]
     LAW: ClassVar[str]
     SOURCE: ClassVar[str]

@@ -15,6 +15,10 @@ class DirectionDependentDamping(CurveEffect):
 
     NAME = "more damping in one direction than in the other"
     KIND = "resistance"
+    CONFUSED_WITH = (
+        "asymmetric_friction",
+        "quadratic_damping",
+    )
     DESCRIPTION = "Damping is larger in one direction: a soft-close damper, a door closer."
     LAW = "force -y(s) v while v has the direction, 0 otherwise"
     SOURCE = "Janot, Young and Gautier, Control Eng. Practice 73 (2018) on the EMPS drive"

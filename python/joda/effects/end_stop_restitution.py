@@ -18,6 +18,7 @@ class EndStopRestitution(Effect):
 
     NAME = "ends of the range that throw the joint back"
     SHAPE_ERROR = 0.12  # an impact lies between two samples
+    CONFUSED_WITH = ("backlash",)
     DESCRIPTION = "The ends of the range, or one of them, bounce more, or less, than the model's."
     LAW = "speed after / speed before = restitution; the limit's solver parameters are set so"
     SOURCE = "Newton's coefficient of restitution"

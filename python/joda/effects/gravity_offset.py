@@ -19,6 +19,12 @@ class GravityOffset(Effect):
     NAME = "another pull of gravity (tilt, or another centre of mass)"
     KIND = "force"
     LIKE_A_NUMBER = True
+    CONFUSED_WITH = (
+        "constant_positive_conservative_hinge",
+        "constant_negative_conservative_hinge",
+        "spring_return_to_low_end",
+        "spring_return_to_high_end",
+    )
     DESCRIPTION = "The axis is tilted, or the centre of mass is elsewhere than in the model."
     LAW = "force sin sin(q) + cos cos(q) on a hinge, force on a slide"
     SOURCE = "torque of a weight on an arm"

@@ -17,6 +17,10 @@ class LoadDependentFriction(Effect):
     NAME = "dry friction that grows with the load"
     KIND = "resistance"
     ON_FRICTION = True
+    CONFUSED_WITH = (
+        "position_dependent_friction",
+        "constant_friction_hinge",
+    )
     DESCRIPTION = "Dry friction grows with the load that the joint carries."
     LAW = (
         "f = f_max(s) + coefficient |load|; load: what its gear transmits, the actuator's force "

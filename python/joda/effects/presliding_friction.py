@@ -16,6 +16,7 @@ class PreslidingFriction(Effect):
     KIND = "resistance"
     ON_FRICTION = True
     SHAPE_ERROR = 0.04  # bristles yield before they slide
+    CONFUSED_WITH = ("backlash",)
     DESCRIPTION = (
         "Before dry friction slides it gives way like a spring: small motions come back, reversals "
         "are soft."

@@ -15,6 +15,10 @@ class QuadraticDamping(CurveEffect):
 
     NAME = "drag that grows with the square of speed"
     KIND = "resistance"
+    CONFUSED_WITH = (
+        "constant_damping_hinge",
+        "direction_dependent_damping",
+    )
     DESCRIPTION = "Drag grows with the square of speed: air, oil through an orifice."
     LAW = "force -y(s) v |v|"
     SOURCE = "Newton's drag; Blevins, Applied Fluid Dynamics Handbook (1984)"

@@ -15,6 +15,10 @@ class StribeckFriction(CurveEffect):
     NAME = "more dry friction at rest than in motion (Stribeck)"
     KIND = "resistance"
     ON_FRICTION = True
+    CONFUSED_WITH = (
+        "constant_friction_hinge",
+        "asymmetric_friction",
+    )
     DESCRIPTION = "Dry friction is larger at rest and falls off with speed: it breaks away."
     LAW = "f = f_max(s) + y(s) exp(-(|v| / velocity)^exponent)"
     SOURCE = "Stribeck 1902; Bo and Pavelescu, Wear 82 (1982) 277"
