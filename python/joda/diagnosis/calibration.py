@@ -19,7 +19,13 @@ from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.diagnosis.settings import SETTINGS
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
-from joda.estimation.nuisance import NuisanceName, Nuisances, nuisances_of, with_numbers
+from joda.estimation.nuisance import (
+    NuisanceName,
+    Nuisances,
+    nuisances_of,
+    with_numbers,
+    zeros_at_ends,
+)
 from joda.estimation.problem import posed, segments_for
 from joda.measured.instability import longest_followed
 from joda.measured.measured_joint import Measured
@@ -282,9 +288,28 @@ class _Search:
             own, estimator = self.every.coarser().only(names), self._estimator
             none = np.append(self.baseline.base.unknowns.mean, np.zeros(len(names)))
             fits = [self.at_most(names), self._from(own, none, estimator.segments.start)]
+            fits += self._with_zeros(own)
             refits = (estimator.refit(own.make, own.unknowns, one) for one in fits)
             self.fits[names] = min(refits, key=_loss)
         return self.fits[names]
+
+    def _with_zeros(self, own: Nuisances) -> list[Fit]:
+        """The same from where an end of the range is where the joint was stopped: until the
+        position's zero is right, no small step of it changes where that happens."""
+        if "position_offset" not in own.names:
+            return []
+        place = self.baseline.base.count + own.names.index("position_offset")
+        estimator = self._estimator
+        as_it_is = np.append(self.baseline.fit.x, np.zeros(len(own.names)))
+        least = estimator.started(own.make(as_it_is)).loss - SETTINGS.corrections.number_loss
+        fits = []
+        for zero in zeros_at_ends(self.measured):
+            x = as_it_is.copy()
+            x[place] = np.clip(zero, own.unknowns.low[place], own.unknowns.high[place])
+            begun = estimator.started(own.make(x))
+            if begun.loss < least:
+                fits.append(self._from(own, x, begun.start))
+        return fits
 
     def near(
         self, names: Sequence[NuisanceName], near: tuple[Sequence[NuisanceName], Fit] | None = None

@@ -130,7 +130,13 @@ def diagnosed(
         repaired = _together(measured, baseline.base, exclude, progress) or repaired
     if repaired:
         return _set_right(measured, *repaired, exclude, progress)
-    return replace(_concluded(measured, plain), looks=plain.evidence)
+    out = replace(_concluded(measured, plain), looks=plain.evidence)
+    denied = plain.selection.verdict == "adequate" and out.diagnosis.verdict == "unexplained"
+    if calibrate and denied and (found := calibrator.numbers(plain.ranking.baseline, beside=True)):
+        looks = looked(found.of(measured), exclude, progress)
+        right = _set_right(measured, found, looks, exclude, progress)
+        return right if right.diagnosis.verdict != "unexplained" else out
+    return out
 
 
 def _together(

@@ -241,6 +241,7 @@ def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:
     )
     usual["position_offset"] *= float(np.ptp(joint.range))
     weight = max(map(abs, measured.context.gravity_force))
+    near_end = bool(zeros_at_ends(measured))
     shaped = any(len(set(part.y)) > 1 for part in measured.profile.channels.conservative.components)
     told: dict[NuisanceName, bool] = {
         "mass": bool(force.any()) and weight > 0,
@@ -250,7 +251,7 @@ def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:
         "force_scale": bool(force.any()),
         "force_offset": bool(force.any()),
         "time_delay": bool(force.any()),
-        "position_offset": (weight > 0 and joint.type == "hinge") or shaped or _near_end(measured),
+        "position_offset": (weight > 0 and joint.type == "hinge") or shaped or near_end,
     }
     if measured.joint_model.servo or any(run.among for run in measured.runs):
         told = dict.fromkeys(told, False)
@@ -259,11 +260,11 @@ def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:
     return Nuisances(base, names, tuple(widths[name] for name in names))
 
 
-def _near_end(measured: Measured) -> bool:
-    """Whether runs came near an end of the range."""
+def zeros_at_ends(measured: Measured) -> list[float]:
+    """By how much a position's zero is off (rad or m) if an end of the range is where runs came
+    nearest to it; none for an end that they did not come near."""
     lo, hi = measured.profile.joint.range
+    first = min(float(run.position.min()) for run in measured.runs)
+    last = max(float(run.position.max()) for run in measured.runs)
     far = NEAR_END * (hi - lo)
-    return any(
-        float(run.position.min()) < lo + far or float(run.position.max()) > hi - far
-        for run in measured.runs
-    )
+    return [first - lo] * (first < lo + far) + [last - hi] * (last > hi - far)
