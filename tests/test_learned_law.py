@@ -21,6 +21,7 @@ from joda.diagnosis.learning.law import Law, Terms
 from joda.diagnosis.learning.library import of_speed
 from joda.diagnosis.learning.nearest import Nearest
 from joda.diagnosis.learning.smooth import modes_of, nearness
+from joda.diagnosis.phrases import named
 from joda.diagnosis.split import parted
 from joda.hidden import draw, write
 from joda.measured.reading import read_measured
@@ -29,7 +30,8 @@ from joda.measured.reading import read_measured
 def diagnosed(verdict, *effects):
     """A diagnosis, as far as the demo looks at it."""
     return SimpleNamespace(
-        verdict=verdict, effects=[SimpleNamespace(effect=effect) for effect in effects]
+        verdict=verdict,
+        effects=[SimpleNamespace(effect=effect, name=named(effect)) for effect in effects],
     )
 
 
@@ -210,7 +212,7 @@ def test_errors_are_told_by_one_digit():
 @pytest.mark.parametrize("times", [0.98, 3.4])
 def test_the_nearest_known_effect_is_told_with_what_it_misses(times):
     none = dict.fromkeys(("position", "speed", "gain", "time", "formula", "next_experiment"))
-    nearest = Nearest("constant_damping_hinge", times)
+    nearest = Nearest("constant_damping_hinge", named("constant_damping_hinge"), times)
     told = Account(**none, along=False, memory="none", nearest=nearest, unit="rad", force_unit="")
     last = account_sentences(told)[-1]
     assert last.startswith("Nearest of what has a name: viscous damping; with it")
