@@ -1,4 +1,4 @@
-"""Mistakes in measurements are found and named; good measurements raise no suspicion.
+"""Mistakes in measurements are found and named; good measurements raise none.
 
 Every share is measured on fresh random runs; the seed is printed where a test fails.
 """
@@ -380,15 +380,15 @@ def test_a_mistake_is_found_and_named(kind, rng):
         if (wrong := mistake(one, run, rng)) is not None:
             named.append([s for s in data_checks(wrong, one.found) if s.kind == kind])
     assert np.mean([len(s) == 1 for s in named]) >= 0.95
-    for suspicion in chain(*named):
-        assert suspicion.sentence.startswith("run.csv: ")
-        assert suspicion.sentence.endswith(".")
-        assert "\n" not in suspicion.sentence and "nan" not in suspicion.sentence
-        assert suspicion.fatal == (kind in FATAL) or kind == "outside"
+    for check in chain(*named):
+        assert check.sentence.startswith("run.csv: ")
+        assert check.sentence.endswith(".")
+        assert "\n" not in check.sentence and "nan" not in check.sentence
+        assert check.fatal == (kind in FATAL) or kind == "outside"
 
 
 @pytest.mark.slow
-def test_a_good_run_raises_no_suspicion(rng):
+def test_a_good_run_passes_every_check(rng):
     raised = []
     for _ in range(5 * COUNT):
         one, run = good(rng)
@@ -414,6 +414,13 @@ def test_a_shift_is_told_by_how_much_at_least(rng):
     shift = float(re.search(r"shifted by (-[0-9.]+)", told.sentence)[1])
     assert shift == pytest.approx(-0.85, abs=0.001)
     assert "the range 0 to 1.5 rad" in told.sentence
+
+
+def test_a_run_whose_zero_is_a_little_off_is_told_so_and_used(rng):
+    found, run = swinging(rng)
+    told = the_one(replace(run, position=run.position + 0.225), found, "zero")
+    assert not told.fatal and "their zero may be off, which joda diagnose tells" in told.sentence
+    assert float(re.search(r"shifted by (-[0-9.]+)", told.sentence)[1]) == pytest.approx(-0.075)
 
 
 def test_a_shift_in_degrees_is_told_as_both(rng):
@@ -556,8 +563,8 @@ def test_whatever_the_numbers_are_something_readable_is_said(rng):
         velocity = rng.integers(2) * rng.normal(size=n)
         curve = QuasiStatic("odd.csv", position, np.nan_to_num(force))
         for run in (Run("odd.csv", time, position, velocity, force, True), curve):
-            for suspicion in data_checks(run, found):
-                assert "nan" not in suspicion.sentence
+            for check in data_checks(run, found):
+                assert "nan" not in check.sentence
 
 
 # --- real joints

@@ -1,7 +1,7 @@
 """What looks wrong in a measurement, each as a sentence for a person, before anything is fitted.
 
 A check speaks only when it is sure: what good measurements do too (impacts, latches, noise, coarse
-encoders, slow pulls) is no suspicion.
+encoders, slow pulls) is none.
 """
 
 from joda.measured.data_checks.base import DataCheck, Kind, suspect
@@ -28,7 +28,7 @@ def data_checks(run: Run | QuasiStatic, context: Context) -> list[DataCheck]:
         context: of the joint; its range, inertia and gravity are compared with the measurement.
 
     Returns:
-        the suspicions; none where nothing looks wrong.
+        what looks wrong; none where nothing looks wrong.
     """
     timed, unit = isinstance(run, Run), context.joint.unit
     n, least = len(run.position), LEAST_RUN if timed else LEAST_CURVE

@@ -1,4 +1,4 @@
-"""What a check says: a suspicion of one kind, as a sentence."""
+"""What a check says: something that looks wrong, of one kind, as a sentence."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -52,5 +52,5 @@ class DataCheck:
 
 
 def suspect(run: Run | QuasiStatic, kind: Kind, told: str) -> DataCheck:
-    """A suspicion of a file; fatal by its kind."""
+    """What looks wrong in a file; fatal by its kind."""
     return DataCheck(kind, f"{run.name}: {told}.", kind in FATAL)

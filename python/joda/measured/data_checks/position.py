@@ -15,6 +15,9 @@ STILL = 2e-3
 ROOM, SOFTNESS, MOST_ROOM = 0.02, 0.015, 0.1
 """How far beyond its range a joint may be: a share of the range, and as far as it goes in so many
 seconds at its highest speed, for a soft stop; as a share of the range, at most."""
+OFF = 0.06
+"""Part of the range up to which a zero may be off and the runs be used: three times what it usually
+is, see `joda.estimation.nuisance`."""
 FEW = 0.02
 """Share of samples, beyond the range, that may be single wrong values."""
 STRAY, APART, FAR = 5.0, 20.0, 0.02
@@ -50,6 +53,14 @@ def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[DataCheck], A
     lo, hi = context.joint.range
     unit, at = context.joint.unit, _range(context)
     visited = f"positions {_from_to(position)} {unit}"
+    shift = hi - position.max() if position.max() > hi else lo - position.min()
+    fits = np.ptp(position) <= hi - lo + _room(run, position, context)
+    if fits and abs(shift) <= OFF * (hi - lo):
+        told = (
+            f"{run.name}: {visited} fit into {at} only if shifted by {shift:.4g} {unit} or more; "
+            "their zero may be off, which joda diagnose tells, or the model's range"
+        )
+        return [*found, DataCheck("zero", f"{told}.", fatal=False)], position + shift
     if _fits(run, -position, context):
         told = (
             f"{visited} lie in minus {at}; turn their sign, or if only their zero is elsewhere, "
@@ -57,8 +68,7 @@ def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[DataCheck], A
             "correct the model's range"
         )
         return [*found, suspect(run, "sign", told)], -position
-    if np.ptp(position) <= hi - lo + _room(run, position, context):
-        shift = hi - position.max() if position.max() > hi else lo - position.min()
+    if fits:
         told = (
             f"{visited} fit into {at} only if shifted by {shift:.4g} {unit} or more; measure them "
             "from the joint's zero, or correct the model's range"
@@ -161,11 +171,11 @@ def _outside(
         f"{first} by up to {beyond.max():.3g} {unit}; {few}, or correct the model's range."
     )
     fatal = bool(beyond.max() > MOST_ROOM * (hi - lo))
-    suspicion = DataCheck("outside", told, fatal)
+    check = DataCheck("outside", told, fatal)
     if wrong.all():
-        return [suspicion], position
+        return [check], position
     before = position[~wrong][np.maximum(np.cumsum(~wrong) - 1, 0)]
-    return [suspicion], np.where(wrong, before, position)
+    return [check], np.where(wrong, before, position)
 
 
 def _fits(run: Run | QuasiStatic, position: Array, context: Context) -> bool:
