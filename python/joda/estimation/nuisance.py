@@ -264,7 +264,7 @@ def zeros_at_ends(measured: Measured) -> list[float]:
     """By how much a position's zero is off (rad or m) if an end of the range is where runs came
     nearest to it; none for an end that they did not come near."""
     lo, hi = measured.profile.joint.range
-    first = min(float(run.position.min()) for run in measured.runs)
-    last = max(float(run.position.max()) for run in measured.runs)
+    first = min((float(run.position.min()) for run in measured.runs), default=np.inf)
+    last = max((float(run.position.max()) for run in measured.runs), default=-np.inf)
     far = NEAR_END * (hi - lo)
     return [first - lo] * (first < lo + far) + [last - hi] * (last > hi - far)
