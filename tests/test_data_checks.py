@@ -420,7 +420,9 @@ def test_a_run_whose_zero_is_a_little_off_is_told_so_and_used(rng):
     found, run = swinging(rng)
     told = the_one(replace(run, position=run.position + 0.225), found, "zero")
     assert not told.fatal and "their zero may be off, which joda diagnose tells" in told.sentence
-    assert float(re.search(r"shifted by (-[0-9.]+)", told.sentence)[1]) == pytest.approx(-0.075, abs=0.001)
+    assert float(re.search(r"shifted by (-[0-9.]+)", told.sentence)[1]) == pytest.approx(
+        -0.075, abs=0.001
+    )
 
 
 def test_a_shift_in_degrees_is_told_as_both(rng):

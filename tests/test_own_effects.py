@@ -1,12 +1,14 @@
 """An effect whose card is written outside of the package: it is found, and told in its words."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from wheel import SCENE, pushed
 
 from joda import JodaError, diagnose
+from joda.diagnosis.hypotheses import hypotheses
 from joda.diagnosis.hypotheses.effects import from_effects
 from joda.diagnosis.overlap import divided, places
 from joda.diagnosis.plausible import Needs
@@ -78,6 +80,38 @@ def test_it_exerts_no_more_than_the_runs_can_need(measured):
     assert own.effects == little.effects and not others.effects
 
 
+def test_a_memory_exerts_force_too(measured):
+    """Of a place that the joint was at most as far from as it goes, or goes until it forgets."""
+    needs, (one,) = Needs(measured), dragged(measured, 1e-6).effects
+    drawn = one.model_copy(update={"memory": "position", "time": 0.1, "gain": 50.0})
+    exerted = needs.exerted(measured.profile.with_effect(drawn), NAME)
+    assert exerted == pytest.approx(50 * min(0.1 * needs.speed, needs.travel), rel=1e-3)
+
+
+def test_only_speeds_that_the_joint_had_count(measured):
+    needs, size = Needs(measured), 0.1
+    exerted = needs.exerted(dragged(measured, size), NAME)
+    units = units_of(segments_for(measured), measured)
+    root = units.force * size * (needs.speed / units.speed) ** 0.5
+    assert exerted == pytest.approx(root, rel=0.1)  # as a line between two points of the table
+
+
+def test_it_is_there_once_whichever_way_it_acts(measured, monkeypatch):
+    """A profile has one table: a second one would take its place."""
+
+    def both(cls, joint):
+        (guess,) = RootDrag.guesses(joint)
+        yield from (replace(guess, direction=way) for way in ("positive", "negative"))
+
+    monkeypatch.setitem(EFFECTS, NAME, type("Ways", (RootDrag,), {"guesses": classmethod(both)}))
+    units = units_of(segments_for(measured), measured)
+    offered = [
+        [h for h in hypotheses(units, {}, profile) if h.effect == NAME]
+        for profile in (measured.profile, dragged(measured, 0.1))
+    ]
+    assert [len(some) for some in offered] == [2, 0]
+
+
 def test_where_it_acts_is_where_its_table_is(measured):
     (one,) = dragged(measured, 0.1).effects
     part = measured.profile.with_effect(one.model_copy(update={"interval": (0.2, 0.6)}))
@@ -90,7 +124,12 @@ def test_where_it_acts_is_where_its_table_is(measured):
         ({"WRITTEN_AS": None}, "its guesses make 'learned_force', but a profile lists it as"),
         (
             {"guesses": classmethod(lambda cls, joint: iter([GAINING]))},
-            "the first trial of its guesses makes no effect: y must not have the sign opposite",
+            "a trial of its guesses makes no effect: y must not have the sign opposite",
+        ),
+        ({"KIND": "friction"}, "the KIND on its card is 'friction', not one of force, resistance"),
+        (
+            {"guesses": classmethod(lambda cls, joint: iter([replace(GAINING, trials=[[]])]))},
+            "each trial of a guess needs 1 values",
         ),
     ],
 )

@@ -129,6 +129,10 @@ def test_where_windows_held_out_tell_nothing_all_are_in_turn(tmp_path, rng):
     assert np.array_equal(np.any(held.folds, axis=0), baseline.estimator.counts)
 
 
+def test_where_nothing_was_held_out_nothing_is_missed():
+    assert robust_rms([], 1e-3) == robust_rms([np.zeros(0)], 1e-3) == 0.0
+
+
 def test_of_windows_held_out_one_that_goes_astray_does_not_decide(rng):
     """As a window in which the joint goes over a barrier, and did not: all others are nearer."""
     count, noise = rng.integers(12, 20), 10 ** rng.uniform(-5, -2)

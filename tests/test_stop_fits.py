@@ -10,8 +10,8 @@ import pytest
 from scenes import write
 
 from joda import diagnose, improve
-from joda.diagnosis import verdict
-from joda.diagnosis.adding import error
+from joda.diagnosis import adding, verdict
+from joda.diagnosis.adding import Error, better_stops, error
 from joda.diagnosis.end_stops import OtherEnds, _visits, fitted_stops
 from joda.diagnosis.free_runs import Worst
 from joda.diagnosis.split import parted
@@ -156,6 +156,29 @@ def test_improve_writes_it_and_says_so(tmp_path, rng):
     assert printed["scene"] == str(found.scene) and printed["why"] == found.why
     assert len(printed["steps"]) == len(found.steps) - 1
     assert printed["error"]["whole"] == found.steps[0].error.whole
+
+
+@pytest.mark.slow
+def test_what_is_right_is_not_improved(tmp_path, rng):
+    """Ends that fit the runs a little better do not what was held out."""
+    model, files = pushed(tmp_path, rng, "", count=4)
+    found = improve(model, "slide", files, tmp_path / "new.xml")
+    assert found.scene is None and not found.changes
+    assert all(one.stops is None for one in found.steps)
+
+
+@pytest.mark.parametrize("held", ["none", "worse"])
+def test_ends_are_kept_only_if_what_was_held_out_confirms_them(tmp_path, rng, monkeypatch, held):
+    model, files = pushed(tmp_path, rng, 'solreflimit="0.05 0.7"')
+    train, judge = parted(read_measured(model, "slide", files))
+    assert better_stops(train, judge)
+    if held == "none":  # no visit to an end
+        middle = replace(judge.runs[0], position=0.25 + 0 * judge.runs[0].position)
+        judge = replace(judge, runs=(middle,), sigma=judge.sigma[:1])
+    else:
+        rises = iter((Error(1e-3, 1e-3), Error(1.2e-3, 0.9e-3)))
+        monkeypatch.setattr(adding, "error", lambda *_, **__: next(rises))
+    assert better_stops(train, judge) is None
 
 
 def test_whole_runs_that_another_stop_explains_leave_the_model_adequate(tmp_path, rng):

@@ -92,6 +92,7 @@ def test_another_folder_adds_and_replaces(tmp_path):
             {"channels": {"friction": {"x": [0, 1], "y": [2, 0]}}},
             "the largest magnitude in y must be 1",
         ),
+        ({"channels": {}}, "give at least one of conservative, friction and damping"),
         ({"channels": {"friction": {"x": [0, 0], "y": [1, 0]}}}, "x must begin at 0 and end at 1"),
     ],
 )

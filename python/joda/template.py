@@ -35,6 +35,12 @@ class Curves(Frozen):
     damping: Curve | None = None
 
     @model_validator(mode="after")
+    def _some(self) -> Self:
+        if not any((self.conservative, self.friction, self.damping)):
+            raise ValueError("give at least one of conservative, friction and damping")
+        return self
+
+    @model_validator(mode="after")
     def _nonnegative(self) -> Self:
         for name in ("friction", "damping"):
             curve = getattr(self, name)

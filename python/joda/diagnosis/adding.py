@@ -196,9 +196,23 @@ def add_effect(
 def with_stop(added: AddedEffect, train: Measured, held: Measured) -> AddedEffect:
     """What was added to these, with ends of the range that suit the runs there."""
     own, judged = (one.changed(added.profile) for one in (train, held))
-    if not (stops := fitted_stops(own, judged)):
+    if not (found := better_stops(own, judged)):
         return added
-    return replace(added, after=error(judged.stopped(stops)), stops=stops)
+    stops, after = found
+    return replace(added, after=after, stops=stops)
+
+
+def better_stops(train: Measured, held: Measured) -> tuple[Stops, Error] | None:
+    """Ends of the range that suit the runs there, and the error held out with them; None where the
+    model's own do as well on what was held out."""
+    if not (stops := fitted_stops(train, held)):
+        return None
+    before, after = error(held, within=False), error(held.stopped(stops), within=False)
+    most = SETTINGS.adding.max_rise
+    risen = after.window > most * before.window
+    if before.whole is not None and after.whole is not None:
+        risen |= after.whole > most * before.whole
+    return None if risen else (stops, error(held.stopped(stops)))
 
 
 @one_blas_thread

@@ -28,9 +28,6 @@ GAIN, DRAG, DELAY = "gain of the actuator", "damping of joint and actuator", "de
 STEP = 1e-3
 """Finite-difference step of a force, of how large it may be."""
 
-SPREAD, USUALLY = 0.3, 10.0
-"""How far numbers of models usually are off, the standard deviation of a factor's logarithm; and
-how many times as often they are as the inertia is, and they are not."""
 ZERO = 1e-9
 """A factor that is as good as none."""
 
@@ -341,10 +338,11 @@ def heavier(found: Sequence[Number]) -> float:
         return 0.0
     errors = np.diag([(one.error / one.value) ** 2 for one in told])
     n, apart, alike = np.zeros(len(told)), np.eye(len(told)), np.ones((len(told), len(told)))
+    usual = SETTINGS.corrections.usual_spread**2
     one, each = (
-        multivariate_normal.logpdf(off, n, SPREAD**2 * prior + errors) for prior in (alike, apart)
+        multivariate_normal.logpdf(off, n, usual * prior + errors) for prior in (alike, apart)
     )
-    return float(expit(one - each - np.log(USUALLY)))
+    return float(expit(one - each - np.log(SETTINGS.corrections.as_often)))
 
 
 def _determined(found: Sequence[Number]) -> list[Number]:

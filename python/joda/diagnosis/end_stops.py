@@ -55,7 +55,8 @@ def fitted_stops(train: Measured, held: Measured | None = None) -> Stops | None:
 
     Args:
         train: the joint with a profile, and runs to fit.
-        held: the same with runs held out; None where none are.
+        held: the same with runs held out, which must be clearly likelier by themselves; None where
+            none are.
     """
     if has_restitution(train.profile):  # whose ends are its own
         return None
@@ -80,7 +81,9 @@ def fitted_stops(train: Measured, held: Measured | None = None) -> Stops | None:
             total = priced(apart, SETTINGS.whole_runs.end_numbers) if apart else np.inf
             if apart and clearly(total, least):
                 best, least = apart, total
-    return None if best is own else best
+    if best is own or (held and not (judge and clearly(judge.loss(best), judge.loss(own)))):
+        return None
+    return best
 
 
 def _apart(fit: "_Visits", own: Stops, end: int) -> Stops | None:

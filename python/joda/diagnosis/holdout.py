@@ -19,8 +19,6 @@ from joda.measured.misfit import rms
 Array = NDArray[np.float64]
 
 
-FEW = 6
-"""Of fewer segments held out, all are in turn."""
 FOLDS = 4
 """In so many parts."""
 
@@ -40,7 +38,8 @@ class Holdout:
         every = np.flatnonzero(counts)
         count = max(int(baseline.estimator.segments.count[self.folds[0]].sum()), 1)
         noise = self.floor * np.sqrt(1 + SETTINGS.naming.shown_errors * np.sqrt(2 / count))
-        silent = self.before < noise or np.count_nonzero(self.folds[0]) < FEW
+        few = np.count_nonzero(self.folds[0]) < SETTINGS.naming.held_out_segments
+        silent = self.before < noise or few
         if silent and len(every) > 1:
             parts = (every[k::FOLDS] for k in range(min(FOLDS, len(every))))
             self.folds = [np.isin(np.arange(len(counts)), part) for part in parts]
@@ -87,7 +86,12 @@ def robust_rms(missed: Sequence[Array], noise: float) -> float:
     Args:
         missed: of each segment its samples' misfits, rad or m.
         noise: standard deviation of a position, rad or m.
+
+    Returns:
+        rad or m; 0 where there is none.
     """
+    if not any(map(len, missed)):  # nothing tells
+        return 0.0
     scale = np.sqrt(CAUCHY_SCALE) * noise
     logs = [np.log1p((rms(one) / scale) ** 2) for one in missed]
     mean = np.average(logs, weights=[len(one) for one in missed])

@@ -3,12 +3,11 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from joda.diagnosis.adding import Error, add_effect, by_all, error, fallen
+from joda.diagnosis.adding import Error, add_effect, better_stops, by_all, error, fallen
 from joda.diagnosis.applied_corrections import AppliedCorrections
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.corrections import Corrected, corrected, corrections, numbers
 from joda.diagnosis.departures import FAITHFUL, Departures
-from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.findings import Correction, Diagnosis, Finding
 from joda.diagnosis.overlap import divided
 from joda.diagnosis.pair_search import pairs
@@ -137,9 +136,10 @@ def _stopped(parts: Parts, steps: list[Step]) -> list[Step]:
     """The stairs, the last one with ends of the range that suit the runs there; one more where
     nothing else was missing."""
     train, held = _with(parts, steps[-1].profile)
-    if not (stops := fitted_stops(train, held)):
+    if not (found := better_stops(train, held)):
         return steps
-    last = replace(steps[-1], stops=stops, error=error(held.stopped(stops)))
+    stops, after = found
+    last = replace(steps[-1], stops=stops, error=after)
     return [*steps[: max(len(steps) - 1, 1)], last]
 
 

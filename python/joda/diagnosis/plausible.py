@@ -113,6 +113,7 @@ class Needs:
         acceleration: rad/s² or m/s².
         force: what the runs can need: inertia times acceleration, the recorded force, gravity, and
             what the model has already; N·m or N.
+        travel: from the lowest position to the highest, rad or m.
         visited: from where to where runs have been, in normalised position.
         resistance: of the model, at half the speed; N·m or N.
         forced: whether a force is recorded in any run.
@@ -126,6 +127,7 @@ class Needs:
         position = np.concatenate([log.position for log in logs])
         first, last = np.clip((np.array([position.min(), position.max()]) - lo) / (hi - lo), 0, 1)
         self.visited = float(first), float(last)
+        self.travel = float(np.ptp(position))
         self.speed = max((_speed(run.time, run.position) for run in measured.runs), default=0.0)
         self.acceleration = _acceleration(measured, self.speed) if measured.runs else 0.0
         applied = max(float(np.nanmax(np.abs(log.force), initial=0.0)) for log in logs)
@@ -150,7 +152,7 @@ class Needs:
             if channel.components:
                 most = float(np.abs(merge(channel)(grid)[0]).max())
                 total += most * (self.speed if name == "damping" else 1.0)
-        motion = Motion(self.speed, self.acceleration, self.force)
+        motion = Motion(self.speed, self.acceleration, self.force, self.travel)
         return total + sum(one.largest_force(motion) for one in profile.effects)
 
     def exceeded(self, force: float) -> bool:

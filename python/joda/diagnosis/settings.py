@@ -1,7 +1,8 @@
 """Every number that decides a diagnosis, each with its unit and meaning.
 
-What only costs time (grids, starts, iterations) stands beside its algorithm; bounds and priors of
-an effect's numbers stand on its card or law.
+Those of the loss, the noise and how far a model's strengths may be off are the estimation's
+(`joda.estimation`, `joda.measured`). What only costs time (grids, starts, iterations) stands beside
+its algorithm; bounds and priors of an effect's numbers stand on its card or law.
 
 Those of the selection are calibrated on simulated joints that hide an effect, and judged on
 families of these that were left out (`python tests/benchmarks calibrate ROWS`; docs/diagnose.md);
@@ -97,6 +98,8 @@ class NamingSettings:
             must tell of it.
         held_out_noises: by which segments held out may be missed with what is said to be
             missing; or `held_out_share` (noises).
+        held_out_segments: of fewer held out every one is held out of one of several fits instead
+            (segments).
         held_out_share: of what they are missed by without it.
         shown_errors: of a mean square beyond noise, from which segments held out show
             anything (standard errors).
@@ -128,6 +131,7 @@ class NamingSettings:
     something_else: float = 50.0
     held_out_left: float = 0.95
     held_out_noises: float = 10.0
+    held_out_segments: int = 6
     held_out_share: float = 0.1
     shown_errors: float = 3.0
     force_times: float = 10.0
@@ -212,6 +216,9 @@ class CorrectionSettings:
         surprising: a number may be off where something is left: a zero that is far off
             looks like a force beside a spring (widths).
         unusual: the same where an effect explains as much in its place (widths).
+        usual_spread: how far numbers of models usually are off (standard deviation of a factor's
+            logarithm).
+        as_often: how many times as often they are as the inertia is, and they are not.
     """
 
     min_off: float = 0.05
@@ -230,6 +237,8 @@ class CorrectionSettings:
     body_errors: float = 3.0
     surprising: float = 4.0
     unusual: float = 2.0
+    usual_spread: float = 0.3
+    as_often: float = 10.0
 
 
 @dataclass(frozen=True)
@@ -272,6 +281,8 @@ class SearchSettings:
         stepping_gain: from which runs tell that MuJoCo made them, in its steps or with a friction
             that yields as its own does (loss).
         stepping_excess: what that leaves at most beyond noise (per sample).
+        runaway: what the best effect leaves at the least, for all to be asked in shorter segments
+            (per sample).
         stepping_tried: what a first fit in such steps leaves at most, for more of them to be made
             (per sample).
     """
@@ -289,6 +300,7 @@ class SearchSettings:
     stepping_gain: float = 10.0
     stepping_excess: float = 0.1
     stepping_tried: float = 1.0
+    runaway: float = 1.0
 
 
 @dataclass(frozen=True)

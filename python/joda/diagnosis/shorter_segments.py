@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from joda.diagnosis.baseline import Baseline, fit_segments
 from joda.diagnosis.ranking import Ranking, evidence, hopeful
 from joda.diagnosis.selection import Evidence, Selection, decide
+from joda.diagnosis.settings import SETTINGS
 from joda.estimation.problem import posed, segments_for
 from joda.estimation.segmentation import shortest
 from joda.estimation.segments import Segments
@@ -22,14 +23,13 @@ Array = NDArray[np.float64]
 SHORTER, FOLLOWED = 9.0, (2.0, 3.0)
 """How much shorter those are in which what is unexplained is asked first, and how much longer than
 these those in which what they tell must hold."""
-RUNAWAY, TELLING = 1.0, 50
-"""What the best effect leaves per sample, from which it is; and of how many segments that are
-missed most, and how many others."""
+TELLING = 50
+"""Of how many segments that are missed most, and of how many others all is asked there."""
 
 
 def runs_away(found: Evidence, selection: Selection) -> bool:
     """Whether no effect follows the joint in usual segments, by what they leave there."""
-    return selection.verdict == "unexplained" and found.left[:1] >= (RUNAWAY,)
+    return selection.verdict == "unexplained" and found.left[:1] >= (SETTINGS.search.runaway,)
 
 
 def in_shorter(

@@ -11,6 +11,7 @@ from joda.component import Curve, Frozen, Points, numbers
 from joda.effects.guesses import STRENGTH, TRIAL, AnyDirection, InitialGuess, Number, Trial, Units
 
 Direction = Literal["positive", "negative"]
+Kind = Literal["force", "resistance"]
 DIRECTIONS: tuple[Direction, ...] = "positive", "negative"
 
 PLACES = ("direction", "end")
@@ -40,17 +41,19 @@ def parameter(
 
 @dataclass(frozen=True)
 class Motion:
-    """How fast and under what force a joint moves at most.
+    """How fast, how far and under what force a joint moves at most.
 
     Attributes:
         speed: rad/s or m/s.
         acceleration: rad/s² or m/s².
         force: N·m or N.
+        travel: from one place to the farthest, rad or m.
     """
 
     speed: float
     acceleration: float
-    force: float = 0.0
+    force: float
+    travel: float
 
 
 class Effect(Frozen):
@@ -75,7 +78,7 @@ class Effect(Frozen):
     """
 
     NAME: ClassVar[str]
-    KIND: ClassVar[Literal["force", "resistance"] | None] = None
+    KIND: ClassVar[Kind | None] = None
     ON_FRICTION: ClassVar[bool] = False
     LIKE_A_NUMBER: ClassVar[bool] = False
     WRITTEN_AS: ClassVar[str | None] = None

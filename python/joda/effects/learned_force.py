@@ -3,6 +3,8 @@
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from joda.component import MAX_VALUE, MIN_WIDTH, numbers
@@ -109,8 +111,16 @@ class LearnedForce(Effect):
         return self
 
     def largest_force(self, motion: Motion) -> float:
-        """In such a motion, N·m or N."""
-        return max(abs(y) for row in self.y for y in row)
+        """Of the table up to its speed, and of the memory, N·m or N."""
+        table = max(float(np.abs(self._up_to(row, motion.speed)).max()) for row in self.y)
+        if self.memory == "position":
+            return table + self.gain * min(motion.speed * self.time, motion.travel)
+        return table * max(1.0, 1.0 + self.gain * motion.speed * (self.memory == "speed"))
+
+    def _up_to(self, row: Row, speed: float) -> NDArray[np.float64]:
+        """A row's resistances at speeds up to one, the outermost ones beyond its own."""
+        inside = [v for v in self.velocities if abs(v) < speed]
+        return np.interp([-speed, *inside, speed], self.velocities, row)
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:

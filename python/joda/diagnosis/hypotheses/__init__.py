@@ -24,6 +24,6 @@ def hypotheses(
 
 def _there(h: Hypothesis, present: set[str]) -> bool:
     listed = written_as(h.effect)
-    if h.direction == "both":
+    if h.direction == "both" or listed != h.effect:
         return any(key.split()[0] == listed for key in present)
     return bool({f"{listed} {h.direction}", f"{listed} both"} & present)

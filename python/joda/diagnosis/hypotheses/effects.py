@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 from pydantic import ValidationError
@@ -11,7 +12,8 @@ from joda.diagnosis.hypotheses.base import Array, Hypothesis, everywhere, unknow
 from joda.diagnosis.hypotheses.intervals import GRID, felt
 from joda.diagnosis.settings import SETTINGS
 from joda.effects import CHANNEL_EFFECTS, EFFECTS, CurveEffect, Effect, written_as
-from joda.effects.guesses import STRENGTH, TINY, TRIAL, InitialGuess, Units
+from joda.effects.base import Kind
+from joda.effects.guesses import STRENGTH, TINY, TRIAL, AnyDirection, InitialGuess, Units
 from joda.errors import JodaError
 from joda.estimation.unknowns import Unknowns
 from joda.profile import Profile
@@ -95,25 +97,43 @@ def from_effects(units: Units) -> Iterator[Hypothesis]:
     """The effects beyond the channels that can show in such a joint's motion."""
     for name, card in EFFECTS.items():
         for guess in card.guesses(units):
-            _check(name, guess)
+            _check(name, card, guess)
             found = _hypothesis(name, card, guess)
             yield _along(units, found, guess) if issubclass(card, CurveEffect) else found
 
 
-def _check(name: str, guess: InitialGuess) -> None:
-    """Raises JodaError if what a card's guess makes is not what a profile lists for it."""
-    try:
-        made = guess.effect(list(guess.trials[0]))
-    except ValidationError as error:
-        said = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise JodaError(
-            f"effect '{name}': the first trial of its guesses makes no effect: {said}."
-        ) from None
-    if made.effect != (listed := written_as(name)):
-        raise JodaError(
-            f"effect '{name}': its guesses make '{made.effect}', but a profile lists it as "
-            f"'{listed}'; give its card WRITTEN_AS = '{made.effect}'."
-        )
+def _check(name: str, card: type[Effect], guess: InitialGuess) -> None:
+    """Raises JodaError if a card, or what its guess makes, is not what the diagnosis needs."""
+    if why := _wrong(card, guess):
+        raise JodaError(f"effect '{name}': {why}.")
+    for trial in guess.trials:
+        try:
+            made = guess.effect(list(trial))
+        except ValidationError as error:
+            said = error.errors()[0]["msg"].removeprefix("Value error, ")
+            raise JodaError(
+                f"effect '{name}': a trial of its guesses makes no effect: {said}."
+            ) from None
+        if made.effect != (listed := written_as(name)):
+            raise JodaError(
+                f"effect '{name}': its guesses make '{made.effect}', but a profile lists it as "
+                f"'{listed}'; give its card WRITTEN_AS = '{made.effect}'."
+            )
+
+
+def _wrong(card: type[Effect], guess: InitialGuess) -> str | None:
+    """What is wrong with a card, a clause."""
+    if missing := [key for key in ("NAME", "SHOWS") if not hasattr(card, key)]:
+        return f"its card has no {missing[0]}"
+    for key, value, choices in (
+        ("KIND", card.KIND, (*get_args(Kind), None)),
+        ("direction of a guess", guess.direction, get_args(AnyDirection)),
+    ):
+        if value not in choices:
+            return f"the {key} on its card is '{value}', not one of {', '.join(map(str, choices))}"
+    if not len(guess.trials) or any(len(trial) != len(guess.numbers) for trial in guess.trials):
+        return f"each trial of a guess needs {len(guess.numbers)} values, and there must be one"
+    return None
 
 
 def _hypothesis(name: str, card: type[Effect], guess: InitialGuess) -> Hypothesis:
