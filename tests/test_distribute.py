@@ -17,7 +17,7 @@ from distributed_cases import make
 import joda
 import joda.distributed.folder as folder_module
 from joda import distribute
-from joda.distributed.pool import by_processes, by_ray
+from joda.distributed.pool import _deferred, by_processes, by_ray
 from joda.distributed.task import Task
 
 
@@ -258,6 +258,21 @@ def test_ctrl_c_begins_nothing_more_and_no_worker_outlives_its_pool(tmp_path, ho
     waited_for(lambda: not any(Path(f"/proc/{worker}").exists() for worker in workers))
     if how == signal.SIGINT:
         assert errors.count("Traceback") <= 3 and errors.rstrip().endswith("KeyboardInterrupt")
+
+
+def test_ctrl_c_waits_until_it_may_act():
+    """Else it would leave a lock of the pool locked, and the pool would never end."""
+    before, reached = signal.getsignal(signal.SIGINT), []
+    with pytest.raises(KeyboardInterrupt), _deferred() as act:
+        signal.raise_signal(signal.SIGINT)
+        reached.append("it went on")
+        act()
+        reached.append("and on")
+    with pytest.raises(KeyboardInterrupt), _deferred():
+        signal.raise_signal(signal.SIGINT)
+        reached.append("up to the end")
+    assert reached == ["it went on", "up to the end"]
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def waited_for(condition, seconds=30.0):

@@ -6,7 +6,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
@@ -29,6 +29,8 @@ DIED = Result(
 """What a task comes to whose process dies."""
 AHEAD = 4
 """Tasks per worker of a cluster that are handed out before one is done: their files wait there."""
+POLL = 0.2
+"""How often Ctrl-C is looked for while tasks are waited for, s."""
 GRACE = 5.0
 """For a task whose pool is gone to leave nothing behind, s."""
 TOKEN = ".ray/auth_token"
@@ -111,9 +113,32 @@ def _interruptible(task: Task) -> Result:
         return run(task)
 
 
+@contextmanager
+def _deferred() -> Iterator[Callable[[], None]]:
+    """Ctrl-C acts where the function is called, and at the end: within a lock of the pool it would
+    leave that locked, and the pool would never end."""
+    usual, came = signal.getsignal(signal.SIGINT), list[int]()
+    if threading.current_thread() is not threading.main_thread() or not callable(usual):
+        yield lambda: None
+        return
+    handler: Callable[..., Any] = usual
+
+    def act() -> None:
+        if came:
+            came.clear()
+            handler(signal.SIGINT, None)
+
+    signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    try:
+        yield act
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    act()
+
+
 def _submitted(pool: ProcessPoolExecutor, task: Task) -> Future[Result]:
     try:
-        with _interrupts("SIG_BLOCK"):
+        with _deferred(), _interrupts("SIG_BLOCK"):
             return pool.submit(_interruptible, task)
     except BrokenProcessPool as error:
         gone: Future[Result] = Future()
@@ -122,7 +147,10 @@ def _submitted(pool: ProcessPoolExecutor, task: Task) -> Future[Result]:
 
 
 def _next(waiting: dict[Future[Result], Task]) -> tuple[Task, Result]:
-    first = next(as_completed(waiting))
+    with _deferred() as act:
+        while not (done := wait(waiting, POLL, FIRST_COMPLETED).done):
+            act()
+    first = done.pop()
     result = first.result()
     return waiting.pop(first), result
 
