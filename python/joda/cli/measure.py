@@ -156,7 +156,7 @@ def compare(
         return
     for sentence in (*found.notes, *sentences(found)):
         say(sentence)
-    for path in filter(None, (as_json, report, output)):
+    for path in filter(None, (written, report, output)):
         say(path)
 
 

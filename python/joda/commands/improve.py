@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from joda.commands.add import FILES
 from joda.diagnosis.end_stops import stops_described
 from joda.diagnosis.improvement import Step, improved
 from joda.diagnosis.outcome import (
@@ -33,9 +34,6 @@ from joda.pictures.style import COLOURS, house_style, png
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
-
-
-FILES = "scene", "composed", "picture", "corrections"
 
 
 @dataclass(frozen=True)

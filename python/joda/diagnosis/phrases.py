@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
+from joda.effects.base import Kind
 from joda.profile import Joint
 from joda.template import Template, read_templates
 
@@ -51,7 +51,7 @@ class Words:
 
     name: str
     shows: str
-    kind: Literal["force", "resistance"] | None
+    kind: Kind | None
 
 
 def words_of(effect: str, templates: Mapping[str, Template] | None = None) -> Words:

@@ -6,9 +6,10 @@ from joda.diagnosis.phrases import words_of
 from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.settings import SETTINGS
+from joda.effects.base import Kind
 from joda.template import Template
 
-Kinds = Mapping[str, str]
+Kinds = Mapping[str, Kind]
 """Of each effect that is one: a force over position or a resistance."""
 
 

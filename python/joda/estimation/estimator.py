@@ -140,7 +140,7 @@ class Linearization:
         return np.asarray((r**2).sum(axis=1) + ((self.z + own) ** 2).sum(axis=1))
 
     def follow(self, move: Array) -> Array:
-        """How the starts move, in these, when the numbers do; shape (m, d)."""
+        """How the starts move, in prior standard deviations, when the numbers do; shape (m, d)."""
         return np.asarray(-(self.inverse @ self.start_gradient(self.r + self.J @ move))[:, :, 0])
 
 

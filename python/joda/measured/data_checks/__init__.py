@@ -1,7 +1,7 @@
 """What looks wrong in a measurement, each as a sentence for a person, before anything is fitted.
 
 A check speaks only when it is sure: what good measurements do too (impacts, latches, noise, coarse
-encoders, slow pulls) is none.
+encoders, slow pulls) is no fault.
 """
 
 from joda.measured.data_checks.base import DataCheck, Kind, suspect
