@@ -51,7 +51,7 @@ class Joint:
         monkeypatch.setattr(improvement, "divided", lambda profile, effect, begin: ("", effect))
         monkeypatch.setattr(improvement, "_with", lambda parts, profile: (profile, None))
         monkeypatch.setattr(improvement, "error", lambda held: Error(1.0, 1.0))
-        monkeypatch.setattr(improvement, "fitted_stops", lambda train, held: None)
+        monkeypatch.setattr(improvement, "better_stops", lambda train, held: None)
 
     def diagnosed(self, without, calibrate):
         """Unexplained as a whole; of what was taken out that it is that; else adequate."""
