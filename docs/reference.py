@@ -67,8 +67,8 @@ def write(folder: Path) -> None:
 def commands() -> str:
     """Every command: what it does, its usage, its arguments and options."""
     out = ["# Commands", "Every command prints this with `--help`."]
-    group: Any = typer.main.get_command(app)
     for name in joda.COMMANDS:
+        group: Any = typer.main.get_command(app(name))
         command = group.commands[name]
         context = typer.Context(command, info_name=f"joda {name}")
         usage = " ".join([context.info_name, *command.collect_usage_pieces(context)])

@@ -19,11 +19,11 @@ import pytest
 
 from joda import COMMANDS, JodaError, Profile, bench, demo, plot
 from joda.cli import app, main
-from joda.cli.tell import tell_viewer
-from joda.commands.bench_plot import bench_plot
-from joda.commands.bench_plot import profile as plotted
 from joda.commands.refine import Refined
+from joda.pictures.cost import draw_growth
+from joda.pictures.cost import profile as plotted
 from joda.scenes.hinges import hinges, without_plugin
+from joda.terminal.say import say_viewer
 
 MODELS = Path(__file__).parents[1] / "models"
 LATCH = Path(__file__).parent / "microwave.latch.json"
@@ -123,10 +123,10 @@ def test_the_viewer_is_started_by_the_python_that_has_joda(tmp_path, monkeypatch
     options = "-m mujoco.viewer '--mjcf=my oven/scene.xml'\n"
     for folder, python in ((Path(sys.executable).parent, "python"), (tmp_path, sys.executable)):
         monkeypatch.setenv("PATH", str(folder))
-        tell_viewer(Path("my oven/scene.xml"))
+        say_viewer(Path("my oven/scene.xml"))
         assert capsys.readouterr().out == f"See it move: {python} {options}"
     monkeypatch.setattr(sys, "executable", str(tmp_path / "a folder" / "python"))
-    tell_viewer(Path("scene.xml"))
+    say_viewer(Path("scene.xml"))
     told = shlex.split(capsys.readouterr().out.removeprefix("See it move: "))
     assert told == [sys.executable, "-m", "mujoco.viewer", "--mjcf=scene.xml"]
 
@@ -272,14 +272,14 @@ class TestBench:
 
     @pytest.mark.long
     def test_the_plot_shows_how_the_cost_grows(self, folder, monkeypatch):
-        monkeypatch.setattr("joda.commands.bench_plot.ROUNDS", 2)
-        monkeypatch.setattr("joda.commands.bench_plot.JOINTS", (1, 3))
-        growth = bench_plot(folder / "cost.png")
+        monkeypatch.setattr("joda.pictures.cost.ROUNDS", 2)
+        monkeypatch.setattr("joda.pictures.cost.JOINTS", (1, 3))
+        growth = draw_growth(folder / "cost.png")
         assert (folder / "cost.png").read_bytes().startswith(b"\x89PNG")
         assert growth.joints == (1, 3) and min(growth.ours + growth.rows) > 0
         assert len(growth.by_components) == len(growth.components)
         with pytest.raises(JodaError, match="exists already"):
-            bench_plot(folder / "cost.png")
+            draw_growth(folder / "cost.png")
         assert [len(plotted(n).channels.friction.components) for n in (3, 96)] == [1, 32]
 
     def test_worlds_are_of_warp(self, folder):
@@ -317,7 +317,7 @@ def test_refine_tells_errors_in_the_joints_unit(kind, unit, tmp_path, monkeypatc
     )
     monkeypatch.setattr("joda.commands.refine.refine", lambda *_, **__: result)
     command = ["refine", "scene.xml", "run.csv", "--joint", "door", "-o", "better.xml"]
-    app(command, standalone_mode=False)
+    app("refine")(command, standalone_mode=False)
     assert capsys.readouterr().out.splitlines() == [
         "Nothing changed.",
         f"Position error: 0.02 → 0.001 {unit} RMS after 4 iterations; "

@@ -15,10 +15,10 @@ import pytest
 from distributed_cases import make
 
 import joda
-import joda.distributed.folder as folder_module
+import joda.commands.distribute as folder_module
 from joda import distribute
-from joda.distributed.pool import _deferred, by_processes, by_ray
-from joda.distributed.task import Task
+from joda.commands.distribute.pool import _deferred, by_processes, by_ray
+from joda.commands.distribute.task import Task
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -220,7 +220,7 @@ def test_a_result_that_cannot_be_written_is_told_and_the_others_go_on(tmp_path):
 
 INTERRUPTED = """
 import os, sys, time
-from joda.distributed import pool
+from joda.commands.distribute import pool
 
 def slow(task):
     try:

@@ -10,12 +10,12 @@ import pytest
 from test_cli import fails, joda
 
 from joda import attach, context, experiments
-from joda.cases import CASES
-from joda.cases.base import Latch, LetGo, Press, bundled
-from joda.cases.baselines import Baseline, fit_forces, fit_motions
-from joda.cases.gallery import Shown, gallery, span
-from joda.cases.subject import Subject
-from joda.cases.tried import WAYS, try_case
+from joda.commands.experiments.base import Latch, LetGo, Press, bundled
+from joda.commands.experiments.baselines import Baseline, fit_forces, fit_motions
+from joda.commands.experiments.gallery import Shown, gallery, span
+from joda.commands.experiments.subject import Subject
+from joda.commands.experiments.table import CASES
+from joda.commands.experiments.tried import WAYS, try_case
 from joda.component import Component
 from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scenes.model import load_model

@@ -20,12 +20,12 @@ from test_generate import (  # noqa: F401
 from test_prompts import answers, texts
 
 from joda import JodaError, generate, generate_all
-from joda.cli.tell import telling_cost
-from joda.commands.generate import Generated
-from joda.commands.generate_all import PassedOver
 from joda.proposal import Proposal
 from joda.propose import session
+from joda.propose.generation import Generated
+from joda.propose.joints import PassedOver
 from joda.propose.offline import Offline
+from joda.terminal.rounds import saying_cost
 
 pytestmark = pytest.mark.usefixtures("quick")
 
@@ -136,7 +136,7 @@ def test_what_was_asked_is_told_where_the_user_breaks_off(server, models, tmp_pa
     server.results = answered
     done = generate_all(models, tmp_path / "out")
     spent = sum(one.history.usage.requests for one in done.values())
-    with pytest.raises(KeyboardInterrupt), telling_cost(tmp_path / "out", as_json=False):
+    with pytest.raises(KeyboardInterrupt), saying_cost(tmp_path / "out", as_json=False):
         raise KeyboardInterrupt
     assert f"Asked {spent} times: " in capsys.readouterr().out
 

@@ -26,7 +26,6 @@ from workshop import RUN, check_whole, contents, fill
 
 import joda
 from joda import JodaError, Profile
-from joda.cli.progress import progress_bar, spinner
 from joda.component import MAX_VALUE, Component
 from joda.diagnosis.findings import read_diagnosis
 from joda.files import LARGEST, file_name
@@ -37,6 +36,7 @@ from joda.propose.history import History
 from joda.propose.requirements import read_requirements
 from joda.propose.session import NONE, Session
 from joda.scenes.scene import read_profiles
+from joda.terminal.progress import progress_bar, spinner
 
 CLI = Path(joda.__file__).parent / "cli"
 ACTS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2028\u2029\u2066-\u2069\U000e0041]")

@@ -11,6 +11,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs"))
 from architecture import imports, longest
 
+from joda import COMMANDS
+
 PACKAGE = Path(__file__).parents[1] / "python" / "joda"
 
 LAYERS = [
@@ -28,8 +30,8 @@ LAYERS = [
     {"estimation"},
     {"hidden", "importing", "interaction", "diagnosis"},
     {"refining", "propose"},
+    {"terminal"},
     {"commands"},
-    {"cases", "distributed"},
     {"cli"},
     {"__main__"},
 ]
@@ -89,8 +91,17 @@ def test_importing_joda_is_light():
     assert not imported("import joda") & (HEAVY | {"typer", "pydantic"})
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["refine", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["doctor", "--help"]])
 def test_help_needs_nothing_heavy(arguments):
     """Typer itself imports pydantic for the help of a command."""
     code = f"sys.argv = {['joda', *arguments]}\nfrom joda.cli import main\nmain()"
     assert not imported(code) & HEAVY
+
+
+SELDOM_NEEDED = {"matplotlib", "jax", "rich", "scipy.stats", "scipy.signal", "anthropic", "nicegui"}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_is_loaded_without_what_few_of_its_runs_need(command):
+    code = f"sys.argv = ['joda', '{command}', '--help']\nfrom joda.cli import main\nmain()"
+    assert not imported(code) & SELDOM_NEEDED

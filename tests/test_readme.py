@@ -23,7 +23,7 @@ README = re.findall(r"^\| [^|]+ \| `((?:joda|python) .+?)` \|$", TEXT, re.MULTIL
 FIGURES = re.findall(r"^\| ([^|]+) \| ([^|`]+) \| (`[^|]+`) \|$", TEXT, re.MULTILINE)
 HELP = {
     name: re.findall(
-        r"^ {4,}(joda .+)$", CliRunner().invoke(app, [name, "-h"]).stdout, re.MULTILINE
+        r"^ {4,}(joda .+)$", CliRunner().invoke(app(name), [name, "-h"]).stdout, re.MULTILINE
     )
     for name in joda.COMMANDS
 }

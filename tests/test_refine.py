@@ -16,7 +16,7 @@ from scenes import attached, model_of, write
 from scipy.optimize import least_squares
 
 from joda import JodaError, Profile, attach, compare, context, refine
-from joda.cli import measure
+from joda.commands import refine as refine_file
 from joda.commands.refine import ITERATIONS, Refined, _beyond, _settled
 from joda.component import Component
 from joda.effects import GravityOffset
@@ -360,7 +360,7 @@ def test_a_curve_of_a_tenth_of_the_force_is_asked_about(tmp_path):
 
 
 def test_the_command_line_fits_as_long_as_the_function():
-    own = signature(measure.refine).parameters["iterations"].default
+    own = signature(refine_file.command).parameters["iterations"].default
     assert own == ITERATIONS == signature(refine).parameters["iterations"].default
 
 

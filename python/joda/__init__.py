@@ -15,25 +15,22 @@ from joda.errors import JodaError
 from joda.plugin import load, load_into_older, plugin_path
 
 if TYPE_CHECKING:
-    from joda.cases.experiments import experiments
     from joda.commands.add import add
     from joda.commands.bench import bench
-    from joda.commands.compare import compare
+    from joda.commands.compare import compare, compare_all
     from joda.commands.demo import demo
-    from joda.commands.diagnose import diagnose
+    from joda.commands.diagnose import diagnose, diagnose_all
+    from joda.commands.distribute import distribute
     from joda.commands.doctor import doctor
-    from joda.commands.each_joint import compare_all, diagnose_all, improve_all
-    from joda.commands.estimate import estimate
     from joda.commands.evaluate import evaluate
+    from joda.commands.experiments import experiments
     from joda.commands.export import export
     from joda.commands.generate import generate
-    from joda.commands.generate_all import generate_all
     from joda.commands.hidden_effect import hidden_effect
     from joda.commands.import_log import import_log
-    from joda.commands.improve import improve
+    from joda.commands.improve import improve, improve_all
     from joda.commands.plot import plot
     from joda.commands.refine import refine
-    from joda.commands.review import Decision
     from joda.commands.revise import revise
     from joda.commands.schema import schema
     from joda.commands.simulate import simulate
@@ -41,9 +38,11 @@ if TYPE_CHECKING:
     from joda.commands.templates import templates
     from joda.commands.weigh import weigh
     from joda.compiling import compile
-    from joda.distributed.folder import distribute
     from joda.pictures.positions import render
     from joda.profile import Profile
+    from joda.propose.estimate import estimate
+    from joda.propose.generate_all import generate_all
+    from joda.propose.review import Decision
     from joda.scenes.attaching import attach
     from joda.scenes.context import context
     from joda.scenes.scene import read_profiles, set_profile
@@ -90,51 +89,46 @@ __all__ = [
 ]
 
 COMMANDS = (
-    "add",
+    "demo",
     "attach",
-    "bench",
-    "compare",
     "compile",
     "context",
-    "demo",
-    "diagnose",
-    "distribute",
-    "doctor",
-    "evaluate",
-    "experiments",
-    "export",
     "generate",
-    "import",
-    "improve",
+    "revise",
     "plot",
+    "simulate",
+    "import",
+    "compare",
+    "diagnose",
+    "add",
+    "improve",
     "refine",
     "render",
-    "revise",
-    "schema",
-    "simulate",
+    "experiments",
     "studio",
+    "export",
+    "distribute",
+    "evaluate",
+    "bench",
+    "schema",
     "templates",
     "weigh",
+    "doctor",
 )
+"""In the order of the README."""
 _MODULES = ("effects", "field", "mjx", "warp")
 _LAZY = {
     **{name: f"joda.commands.{name}" for name in COMMANDS},
-    "Decision": "joda.commands.review",
+    "Decision": "joda.propose.review",
     "Profile": "joda.profile",
-    "attach": "joda.scenes.attaching",
-    "compare_all": "joda.commands.each_joint",
-    "compile": "joda.compiling",
-    "context": "joda.scenes.context",
-    "diagnose_all": "joda.commands.each_joint",
-    "distribute": "joda.distributed.folder",
-    "estimate": "joda.commands.estimate",
-    "experiments": "joda.cases.experiments",
-    "generate_all": "joda.commands.generate_all",
+    "compare_all": "joda.commands.compare",
+    "diagnose_all": "joda.commands.diagnose",
+    "estimate": "joda.propose.estimate",
+    "generate_all": "joda.propose.generate_all",
     "hidden_effect": "joda.commands.hidden_effect",
     "import_log": "joda.commands.import_log",
-    "improve_all": "joda.commands.each_joint",
+    "improve_all": "joda.commands.improve",
     "read_profiles": "joda.scenes.scene",
-    "render": "joda.pictures.positions",
     "set_profile": "joda.scenes.scene",
 }
 

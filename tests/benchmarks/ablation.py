@@ -18,11 +18,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from joda import compile, context
-from joda.commands.generate import run as propose
 from joda.errors import JodaError
 from joda.field import evaluate
 from joda.interaction.behaviour import behaviour
 from joda.propose import Task
+from joda.propose.generation import run as propose
 from joda.propose.offline import Offline
 from joda.propose.recognise import gravity_role
 from joda.propose.replies import parse, parse_ablation

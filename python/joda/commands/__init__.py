@@ -1,2 +1,6 @@
-"""One file for each command, which is also the function `joda.add`, `joda.compare`, ...; `joda.cli`
-only parses and prints."""
+"""One file for each command: the function `joda.add`, `joda.compare`, ..., which what it returns is
+documented with, and the command line `command`, which parses, calls the function and prints.
+
+`attach`, `compile`, `context` and `render` are functions of the packages below, which use them
+too; here is their command line. `joda.cli` loads the one file that is asked for.
+"""

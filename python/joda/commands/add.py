@@ -4,7 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from joda.commands.diagnose import check_effect
 from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error, with_stop
@@ -32,9 +34,13 @@ from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together
 from joda.measured.corrections_file import corrections_beside
+from joda.measured.trust import read_trust
 from joda.measured.visited import unvisited_part
 from joda.pictures.changes import changes
 from joda.pictures.style import png
+from joda.terminal import options
+from joda.terminal.progress import spinner
+from joda.terminal.say import print_json, say
 
 FILES = ("scene", "composed", "picture", "corrections")
 
@@ -272,3 +278,43 @@ def _interval(said: Any, path: Path) -> tuple[float, float] | None:
     if not numbers or len(said) != 2 or not 0 <= said[0] < said[1] <= 1:
         raise JodaError(f"{path}: interval must be two increasing numbers from 0 to 1, not {said}.")
     return said[0], said[1]
+
+
+def command(
+    model: options.Model,
+    runs: options.Runs,
+    joint: options.Joint,
+    diagnosis: Annotated[
+        Path, typer.Option(help="What joda diagnose --json wrote.", show_default=False)
+    ],
+    output: options.Scene,
+    effect: Annotated[
+        str | None, typer.Option(help="Which effect [default: the diagnosis' first].")
+    ] = None,
+    passive: options.Passive = False,
+    trust: options.Trust = None,
+    templates: options.Effects = None,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Add the effect that a diagnosis names, if that helps.
+
+    It helps if it is plausible and clearly lowers the error on runs held out; else nothing is
+    written. Leaves, beside the scene, its .composed.json and .png, and .corrections.json where the
+    diagnosis says that the runs' force, clock or zero is wrong. Example:
+
+        joda add hidden/model.xml hidden/run?.csv --joint joint --diagnosis diagnosis.json -o new.xml
+    """  # noqa: E501
+    with spinner("add") as progress:
+        added = add(
+            model, joint, diagnosis, runs, output, effect=effect, passive=passive,
+            trust=read_trust(trust or ()), templates=templates or (), force=force,
+            progress=progress,
+        )  # fmt: skip
+    if as_json:
+        print_json(added.as_json())
+        return
+    for sentence in sentences(added):
+        say(sentence)
+    for path in filter(None, (added.scene, added.composed, added.picture, added.corrections)):
+        say(path)

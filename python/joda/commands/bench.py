@@ -5,26 +5,30 @@ median over the rounds of the ratio within a round is reported. Of the swings of
 counts, as what else the machine does only adds to the others.
 """
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import mujoco
 import numpy as np
+import typer
 
+from joda.errors import JodaError
+from joda.pictures.cost import draw_growth
 from joda.profile import CHANNELS
 from joda.scenes.hinges import LEARNED, hinges, three_channels, without_plugin
 from joda.scenes.scene import open_scene
+from joda.scenes.timing import seconds_per_step, swings_in
+from joda.terminal import options
+from joda.terminal.progress import spinner
+from joda.terminal.say import print_json, say
+
+if TYPE_CHECKING:
+    from joda.warp.bench import WarpRow
 
 ROUNDS = 31
-SWING = 100  # steps of one joint's swing; it moves all the while
-LEAST_SWING = 20  # steps of many joints', so short that a busy machine seldom breaks in
-FINE = time.get_clock_info("thread_time").resolution < 1e-6
-CLOCK = time.thread_time if FINE else time.perf_counter
-"""Where the system counts it finely, the time of this thread alone."""
-FULL = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 @dataclass(frozen=True)
@@ -122,43 +126,12 @@ def _bench_scene(path: Path, progress: Callable[[str], None]) -> list[Row]:
 
 def _measure(models: list[tuple[mujoco.MjModel, Any]]) -> np.ndarray:
     """Seconds per step, shape (models, rounds): free swings from the middle of the range."""
-    repeats = [_repeats(model, callback) for model, callback in models]
+    repeats = [swings_in(0.02, model, callback) for model, callback in models]
     times = np.empty((len(models), ROUNDS))
     for k in range(ROUNDS):
         for i, (model, callback) in enumerate(models):
-            times[i, k] = seconds(model, callback, repeats[i])
+            times[i, k] = seconds_per_step(model, callback, repeats[i])
     return times
-
-
-def _repeats(model: mujoco.MjModel, callback: Any) -> int:
-    """How many swings take about 20 ms."""
-    return max(1, int(0.02 / (_steps(model) * seconds(model, callback, 1))))
-
-
-def _steps(model: mujoco.MjModel) -> int:
-    """Of a swing."""
-    return max(LEAST_SWING, SWING // int(model.nv))
-
-
-def seconds(model: mujoco.MjModel, callback: Any = None, repeats: int = 1) -> float:
-    """Seconds per step of the fastest of short swings through the middle of the joints' ranges."""
-    data = mujoco.MjData(model)
-    limited = np.asarray(model.jnt_limited, bool) & (np.asarray(model.jnt_type) >= 2)
-    data.qpos[model.jnt_qposadr[limited]] = model.jnt_range[limited].mean(axis=1)
-    data.qvel[:] = 0.5
-    start = np.empty(mujoco.mj_stateSize(model, FULL))
-    mujoco.mj_getState(model, data, start, FULL)
-    mujoco.set_mjcb_passive(callback)
-    steps, fastest = _steps(model), np.inf
-    try:
-        for _ in range(repeats):
-            mujoco.mj_setState(model, data, start, FULL)
-            begin = CLOCK()
-            mujoco.mj_step(model, data, steps)
-            fastest = min(fastest, CLOCK() - begin)
-    finally:
-        mujoco.set_mjcb_passive(None)
-    return fastest / steps
 
 
 def _row(what: str, ours: np.ndarray, other: np.ndarray, bar: str) -> Row:
@@ -166,3 +139,102 @@ def _row(what: str, ours: np.ndarray, other: np.ndarray, bar: str) -> Row:
     low, middle, high = np.percentile(ratios, (25, 50, 75))
     times = (1e6 * float(np.median(ours)), 1e6 * float(np.median(other)))
     return Row(what, float(middle), float(high - low) / 2, bar, times)
+
+
+def command(
+    scene: Annotated[
+        Path | None, typer.Argument(help="Scene with profiles [default: hinges of our own].")
+    ] = None,
+    warp: Annotated[
+        bool, typer.Option("--warp", help="In MuJoCo Warp, from 1 to 8192 worlds.")
+    ] = False,
+    worlds: Annotated[
+        list[int] | None, typer.Option(min=1, help="With --warp: so many worlds instead.")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw how the cost grows with joints and components: a PNG."),
+    ] = None,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Measure what profiles cost per step, as ratios.
+
+    Example:
+
+        joda bench scene.xml
+    """
+    if worlds and not warp:
+        raise JodaError("--worlds is of --warp; add --warp.")
+    if plot and (warp or scene):
+        raise JodaError("--plot draws hinges of our own; leave out the scene and --warp.")
+    if plot:
+        _bench_plot(plot, force, as_json)
+        return
+    if warp:
+        _bench_warp(scene, worlds or (), as_json)
+        return
+
+    with spinner("bench") as progress:
+        rows = bench(scene, progress=progress)
+    if as_json:
+        print_json([asdict(row) for row in rows])
+        return
+    _say_ratios(rows)
+
+
+def _bench_plot(plot: Path, force: bool, as_json: bool) -> None:
+    """`joda bench --plot`."""
+    with spinner("bench") as progress:
+        growth = draw_growth(plot, force=force, progress=progress)
+    if as_json:
+        print_json(asdict(growth))
+        return
+    say(plot)
+
+
+def _bench_warp(scene: Path | None, worlds: Sequence[int], as_json: bool) -> None:
+    """`joda bench --warp`."""
+    from joda.plugin import load
+
+    load()
+    from joda.warp import quiet
+    from joda.warp.bench import WORLDS
+    from joda.warp.bench import bench as run
+
+    quiet()
+    with spinner("bench") as progress:
+        rows = run(scene, worlds=worlds or WORLDS, progress=progress)
+    if as_json:
+        print_json([asdict(row) for row in rows])
+        return
+    _say_worlds(rows)
+
+
+def _say_ratios(rows: Iterable[Row]) -> None:
+    """The table of `joda bench`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("comparison", "ratio", "required", "µs per step", box=None, pad_edge=False)
+    for row in rows:
+        ours, other = row.microseconds
+        table.add_row(
+            row.what, f"{row.ratio:.3f} ± {row.spread:.3f}", row.bar, f"{ours:.2f} / {other:.2f}"
+        )
+    Console(width=None if sys.stdout.isatty() else 110).print(table)
+
+
+def _say_worlds(rows: "Sequence[WarpRow]") -> None:
+    """The table of `joda bench --warp`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    heads = ("worlds", "steps/s with profiles", "native", "none", "÷ native", "÷ none", "kernels")
+    table = Table(*heads, box=None, pad_edge=False)
+    for row in rows:
+        speeds = (f"{speed:,.0f}" for speed in row.per_second)
+        ratios = (f"{row.native_ratio:.2f}", f"{row.plain_ratio:.2f}")
+        table.add_row(str(row.worlds), *speeds, *ratios, " / ".join(map(str, row.launches)))
+    Console(width=None if sys.stdout.isatty() else 110).print(table)
+    say(f"device {rows[0].device}; ÷: time with profiles over that of the other scene")

@@ -1,28 +1,37 @@
 """Compares a model with measured runs and curves: numbers, sentences, a picture, a page."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from json import dumps, loads
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
-from joda.files import check_targets, write_together
+from joda.files import check_targets, write_text, write_together
 from joda.measured.adequacy import Adequacy, adequacy
 from joda.measured.comparison import Comparison, sentences
 from joda.measured.curves import curve_error, curves_verdict, failing_force
+from joda.measured.driven import ALL, named_joints
 from joda.measured.errors import Errors, errors, known
 from joda.measured.failing import LENGTHS, Failing, where, window_rows
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
 from joda.measured.measured_joint import Measured
+from joda.measured.misfit import rms
 from joda.measured.reading import read_measured
 from joda.measured.replay import left_out
+from joda.measured.scene_replay import Together, replayed_together
 from joda.measured.stepping import timestep_note
 from joda.measured.visited import unvisited
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
 from joda.pictures.style import house_style, png
+from joda.scenes.model import load_model
+from joda.terminal import options
+from joda.terminal.progress import spinner
+from joda.terminal.say import print_json, say
 from joda.threads import one_blas_thread
 
 if TYPE_CHECKING:
@@ -112,6 +121,78 @@ def compare(
     return comparison
 
 
+@dataclass(frozen=True)
+class Compared:
+    """A model against logs of several joints.
+
+    Attributes:
+        joints: each joint by itself, what the others do to it as a force on it, by name.
+        together: replays of the scene as it is, all joints at once; none where a command of one of
+            their actuators, or a force, is not known, or runs were corrected.
+    """
+
+    joints: dict[str, Comparison]
+    together: tuple[Together, ...]
+
+    def rmse(self, joint: str) -> float | None:
+        """Of a joint in the replays of all at once, rad or m; None where a run has none."""
+        errors = [error for run in self.together if (error := run.rmse.get(joint)) is not None]
+        return rms(np.array(errors)) if errors and len(errors) == len(self.together) else None
+
+    def to_json(self) -> str:
+        """The comparison as JSON."""
+        joints = {
+            name: loads(one.to_json()) | {"rmse_together": self.rmse(name)}
+            for name, one in self.joints.items()
+        }
+        runs = [vars(run) for run in self.together]
+        return dumps({"joints": joints, "together": runs}, indent=2, ensure_ascii=False) + "\n"
+
+
+def compare_all(
+    model: str | Path,
+    runs: Sequence[str | Path],
+    joints: Sequence[str] = (ALL,),
+    *,
+    passive: bool = False,
+    corrections: str | Path | None = None,
+    json: str | Path | None = None,
+    force: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> Compared:
+    """Compares a model with logs of several joints: each joint by itself, then all at once.
+
+    Args:
+        model: MJCF or URDF, with or without profiles.
+        runs: CSV files with time, `position:JOINT` and perhaps `velocity:JOINT`, `force:JOINT`,
+            `ctrl:ACTUATOR`.
+        joints: names; "all": those that the first run has.
+        passive: whether the actuators on the joints were off.
+        corrections: as in `joda.compare`, of every joint by itself.
+        json: file to write, all numbers.
+        force: overwrite it.
+        progress: told what is being done.
+
+    Raises:
+        JodaError: as `joda.compare`.
+    """
+    check_targets([Path(json)] if json else [], force, [model, *runs])
+    found = {}
+    for name in named_joints(model, runs, joints):
+        progress(name)
+        found[name] = compare(model, name, runs, passive=passive, corrections=corrections)
+    progress("all joints at once")
+    together = (
+        ()
+        if passive or corrections
+        else replayed_together(load_model(Path(model)), [*map(Path, runs)])
+    )
+    compared = Compared(found, together)
+    if json:
+        write_text(Path(json), compared.to_json())
+    return compared
+
+
 def _failing(
     measured: Measured, found: Errors, short: Array, judged: Adequacy | None
 ) -> tuple[list[Failing], float]:
@@ -181,3 +262,71 @@ def _picture(measured: Measured, paths: Sequence[Array], rows: Array) -> "Figure
             draw_curves(below, measured, curves)
             below.suptitle("quasi-static force that moves the joint", x=0.01, ha="left")
     return figure
+
+
+def command(
+    model: options.Model,
+    runs: options.Runs,
+    joint: options.Joints = None,
+    as_json: options.JsonFile = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Write an HTML page with pictures to this file.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
+    ] = None,
+    corrections: options.Corrections = None,
+    passive: options.Passive = False,
+    force: options.Force = False,
+) -> None:
+    """Replay measured runs: how far off the model is, and where.
+
+    Example:
+
+        joda compare oven/scene.xml out/let_go_5.csv out/let_go_45.csv --joint door --report compare.html
+    """  # noqa: E501
+    written = None if as_json == options.STDOUT else as_json
+    if options.several(joint):
+        options.one_joint_only(report, output)
+        with spinner("compare") as progress:
+            every = compare_all(
+                model, runs, joint or (), passive=passive, corrections=corrections, json=written,
+                force=force, progress=progress,
+            )  # fmt: skip
+        if as_json == options.STDOUT:
+            print_json(loads(every.to_json()))
+            return
+        _say_joints(every)
+        if as_json:
+            say(as_json)
+        return
+    assert joint
+    with spinner("compare") as progress:
+        found = compare(
+            model, joint[0], runs, passive=passive, corrections=corrections, json=written,
+            report=report, picture=output, force=force, progress=progress,
+        )  # fmt: skip
+    if as_json == options.STDOUT:
+        print_json(loads(found.to_json()))
+        return
+    for sentence in (*found.notes, *sentences(found)):
+        say(sentence)
+    for path in filter(None, (written, report, output)):
+        say(path)
+
+
+def _say_joints(found: Compared) -> None:
+    """Errors of all joints of logs of several, a row each, and what is said of each."""
+    rows: list[tuple[str, ...]] = []
+    rows.append(("joint", "whole runs", "windows of 0.4 s", "noise", "all joints at once"))
+    for name, one in found.joints.items():
+        errors = one.rmse, one.rmse_window, one.noise_floor, found.rmse(name)
+        rows.append((name, *("" if x is None else f"{x:.3g} {one.unit}" for x in errors)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        say("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip())
+    if not found.together:
+        say("Not replayed all at once: a command of an actuator on them, or a force, is not known.")
+    notes = dict.fromkeys(note for one in found.joints.values() for note in one.notes)
+    for note in notes:
+        say(note)

@@ -1,12 +1,14 @@
 """The first contact: an oven door gets its behaviour, beside the same door without a profile."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.resources import as_file, files
+from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+import typer
 
 from joda.commands.generate import generate
 from joda.errors import JodaError
@@ -21,6 +23,10 @@ from joda.propose.history import History
 from joda.scenes.context import context
 from joda.scenes.model import find_joint, load_model
 from joda.scenes.motion import Motion, release
+from joda.terminal import options
+from joda.terminal.progress import spinner
+from joda.terminal.rounds import say_round
+from joda.terminal.say import print_json, say, say_files, say_viewer, with_text_paths
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -167,3 +173,95 @@ def _picture(let_go: list[list[Motion]], opened: list[Motion], views: Sequence[I
             axes.set_title(title, fontsize=11, loc="left")
             axes.axis("off")
         return figure
+
+
+def command(
+    what: Annotated[
+        Literal["oven", "hidden-effect"],
+        typer.Argument(
+            help="An oven door gets its behaviour; or a joint's hidden effect is found and added."
+        ),
+    ] = "oven",
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Folder to fill [default: joda_demo, or joda_hidden_effect]."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="hidden-effect: draws the same joint again.")
+    ] = None,
+    reveal: Annotated[
+        bool, typer.Option("--reveal", help="hidden-effect: say at once what is hidden.")
+    ] = False,
+    position_only: Annotated[
+        bool, typer.Option("--position-only", help="hidden-effect: no force is recorded.")
+    ] = False,
+    alien: Annotated[
+        bool, typer.Option("--alien", help="hidden-effect: a law of no catalogue, to be learned.")
+    ] = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Give an oven door its behaviour, beside the door without.
+
+    Or simulate a joint with an effect that its model lacks, find it from measured runs, add it,
+    and open the seal. Needs no key and no network. Example:
+
+        joda demo -o out
+
+        joda demo hidden-effect --seed 9 --position-only -o hidden
+    """
+    if what == "hidden-effect":
+        _hidden_effect(
+            output, as_json, seed=seed, reveal=reveal, position_only=position_only, alien=alien,
+            force=force,
+        )  # fmt: skip
+        return
+    if seed is not None or reveal or position_only or alien:
+        raise JodaError(
+            "--seed, --reveal, --position-only and --alien go with joda demo hidden-effect."
+        )
+
+    with spinner("demo") as progress:
+        result = demo(output, force=force, progress=progress)
+    if as_json:
+        told = {key: value for key, value in vars(result).items() if key != "history"}
+        print_json({**with_text_paths(told), "rounds": len(result.history.rounds)})
+        return
+    for round in result.history.rounds:
+        say_round(round)
+    _say_doors(result)
+    names = "demo.png", "profile.png", "scene.xml", "composed.json", "history.json", "oven.xml"
+    say_files(result.folder, names)
+    say_viewer(result.scene)
+
+
+def _hidden_effect(output: Path | None, as_json: bool, **asked: Any) -> None:
+    from joda import hidden_effect
+
+    if as_json:
+        result = hidden_effect(output, **asked)
+        print_json({**with_text_paths(asdict(result))})
+        return
+    result = hidden_effect(output, say=say, **asked)
+    names = "compare.html", "diagnosis.html", "new.xml", "new.png", "unseen.html", "sealed.json"
+    say_files(result.folder, [name for name in names if (result.folder / name).exists()])
+
+
+def _say_doors(result: Demo) -> None:
+    """What the demo's two doors did."""
+    rows = zip(result.starts, result.plain_ends, result.joda_ends, strict=True)
+    for start, without, ours in rows:
+        say(
+            f"Let go at {degrees(start):.0f} degrees, {result.duration:g} s later: without a "
+            f"profile at {degrees(without):.1f}, with it at {abs(degrees(ours)):.1f} degrees."
+        )
+    forces = zip(
+        ("without a profile", "with it"), (result.plain_force, result.joda_force), strict=True
+    )
+    told = [
+        f"{name} it {'pulls' if force > 0 else 'holds back'} with up to {abs(force):.1f} N·m"
+        for name, force in forces
+    ]
+    say(f"Opened slowly by hand: {', '.join(told)}.")

@@ -1,21 +1,30 @@
 """Diagnoses what a model lacks: the verdict as sentences, a picture, a page."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict
+from json import dumps, loads
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.outcome import NO_TRUST, read_runs
 from joda.diagnosis.phrases import LEARN, effect_names, percent
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
-from joda.files import check_targets, write_together
+from joda.files import check_targets, write_text, write_together
+from joda.measured.driven import ALL, named_joints
 from joda.measured.maps import draw_maps, draw_models, draw_runs, replayed
 from joda.measured.measured_joint import Measured
+from joda.measured.trust import read_trust
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
 from joda.pictures.style import house_style, png
 from joda.profile import Profile
+from joda.terminal import options
+from joda.terminal.progress import progress_bar
+from joda.terminal.say import print_json, say
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,6 +87,59 @@ def diagnose(
             files[Path(report)] = _page(diagnosis, drawn)
     write_together(files)
     return diagnosis
+
+
+def diagnose_all(
+    model: str | Path,
+    runs: Sequence[str | Path],
+    joints: Sequence[str] = (ALL,),
+    *,
+    exclude: Collection[str] = (),
+    passive: bool = False,
+    trust: Mapping[str, float] = NO_TRUST,
+    templates: Sequence[str | Path] = (),
+    json: str | Path | None = None,
+    force: bool = False,
+    progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+) -> dict[str, Diagnosis]:
+    """Diagnoses each joint of logs of several joints, as `joda.diagnose` does.
+
+    Args:
+        model, runs, joints, passive, json, force: as in `compare_all`.
+        exclude: effects that are not considered.
+        trust, templates: as in `joda.diagnose`, of every joint.
+        progress: told how much is done, of how much, and what.
+
+    Returns:
+        the diagnoses by joint.
+
+    Raises:
+        JodaError: as `joda.diagnose`.
+    """
+    check_targets([Path(json)] if json else [], force, [model, *runs])
+    names = named_joints(model, runs, joints)
+    found: dict[str, Diagnosis] = {}
+    for number, name in enumerate(names):
+
+        def report(
+            done: int, total: int, what: str, number: int = number, name: str = name
+        ) -> None:
+            progress(number * total + done, len(names) * total, f"{name}: {what}")
+
+        found[name] = diagnose(
+            model,
+            name,
+            runs,
+            exclude=exclude,
+            passive=passive,
+            trust=trust,
+            templates=templates,
+            progress=report,
+        )
+        if json:  # what is done stays, whatever ends the rest
+            own = {joint: loads(one.to_json()) for joint, one in found.items()}
+            write_text(Path(json), dumps({"joints": own}, indent=2, ensure_ascii=False) + "\n")
+    return found
 
 
 def check_effect(name: str, templates: Collection[str] = ()) -> None:
@@ -161,3 +223,62 @@ def _picture(measured: Measured, profile: Profile | None, diagnosis: Diagnosis) 
         right.suptitle(what, x=0.02, ha="left", fontsize=10)
         figure.suptitle(diagnosis.summary, x=0.01, ha="left", fontsize=11, wrap=True)
     return figure
+
+
+def command(
+    model: options.Model,
+    runs: options.Runs,
+    joint: options.Joints = None,
+    as_json: options.JsonFile = None,
+    report: options.Report = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
+    ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="An effect that is not considered.")
+    ] = None,
+    passive: options.Passive = False,
+    trust: options.Trust = None,
+    templates: options.Effects = None,
+    force: options.Force = False,
+) -> None:
+    """Tell which effect a model lacks, where, and how much of it.
+
+    What --json writes is for joda add. Example:
+
+        joda diagnose hidden/model.xml hidden/run?.csv --joint joint --json diagnosis.json
+    """
+    written = None if as_json == options.STDOUT else as_json
+    if options.several(joint):
+        options.one_joint_only(report, output)
+        with progress_bar() as bar:
+            every = diagnose_all(
+                model, runs, joint or (), exclude=exclude or (), passive=passive,
+                trust=read_trust(trust or ()), templates=templates or (), json=written,
+                force=force, progress=bar,
+            )  # fmt: skip
+        if as_json == options.STDOUT:
+            print_json({"joints": {name: asdict(one) for name, one in every.items()}})
+            return
+        for name, one in every.items():
+            say(f"{name}:")
+            for sentence in sentences(one):
+                say(f"  {sentence}")
+        if as_json:
+            say(as_json)
+        return
+    assert joint
+    with progress_bar() as bar:
+        found = diagnose(
+            model, joint[0], runs, exclude=exclude or (), json=written, report=report,
+            picture=output, passive=passive, trust=read_trust(trust or ()),
+            templates=templates or (), force=force,
+            progress=bar,
+        )  # fmt: skip
+    if as_json == options.STDOUT:
+        print_json(asdict(found))
+        return
+    for sentence in sentences(found):
+        say(sentence)
+    for path in filter(None, (written, report, output)):
+        say(path)

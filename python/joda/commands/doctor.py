@@ -13,17 +13,23 @@ import sys
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from ctypes.util import find_library
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
+import typer
+
 from joda.companions import MJX, WARP
 from joda.errors import JodaError
 from joda.files import cache_folder
 from joda.making import compiler
+from joda.plain import plain
 from joda.plugin import PLUGIN, made_here, plugin_path
+from joda.terminal import options
+from joda.terminal.progress import spinner
+from joda.terminal.say import print_json, say
 
 State = Literal["ok", "missing", "broken"]
 
@@ -302,3 +308,42 @@ def _child(code: str, **environment: str) -> tuple[bool, str]:
     if not lines:
         return works, "" if works else f"ended with status {result.returncode}"
     return works, lines[-1].strip()
+
+
+def command(as_json: options.Json = False) -> None:
+    """Say whether all works here, and what to do if not.
+
+    Looks at what is installed, at the plugin, the renderers and joda's cache. Ends with status 1 if
+    something that joda needs does not work. Example:
+
+        joda doctor
+    """
+    with spinner("doctor"):
+        checks = doctor()
+    fatal = any(check.fatal for check in checks)
+    if as_json:
+        print_json({"ok": not fatal, "checks": [asdict(check) for check in checks]})
+    else:
+        _say_checks(checks)
+    raise typer.Exit(int(fatal))
+
+
+def _say_checks(checks: Iterable[Check]) -> None:
+    """A line per check, below it what to do, and a sentence about all."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    marks = {"ok": ("ok", "green"), "missing": ("missing", "yellow"), "broken": ("broken", "red")}
+    table = Table.grid(padding=(0, 2))
+    checks = list(checks)
+    for check in checks:
+        style = "bold red" if check.fatal else marks[check.state][1]
+        told = Text(plain(check.found))
+        if check.remedy:
+            told.append(f"\n→ {plain(check.remedy)}", "bold" if check.fatal else "dim")
+        table.add_row(Text(check.state, style), Text(check.what), told)
+    console = Console(width=None if sys.stdout.isatty() else 160)
+    console.print(table)
+    fatal = [check.what for check in checks if check.fatal]
+    say(f"Not working: {', '.join(fatal)}." if fatal else "All that joda needs works.")

@@ -1,22 +1,30 @@
 """How good a proposer is: models whose joints' behaviours were written down before, and a table."""
 
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
-from joda.commands.generate import ROUNDS, begin, check_rounds, choose, run
-from joda.commands.generate_all import MODELS
+import typer
+
 from joda.component import Frozen
 from joda.errors import JodaError
 from joda.files import file_name, fresh, make_folder, occupied, write_text
+from joda.plain import line
 from joda.profile import File
 from joda.propose import Proposer, Usage, total
 from joda.propose.asking import Effort, ProposalFailed
 from joda.propose.expected import ENDING, Expectations, Expected, model_of
+from joda.propose.generation import ROUNDS, begin, check_rounds, choose, run
+from joda.propose.joints import MODELS
 from joda.propose.offline import Offline
 from joda.propose.session import NONE, PICTURES, Session
 from joda.scenes.model import describe_joint, find_joint, load_model
+from joda.terminal import options
+from joda.terminal.progress import progress_bar
+from joda.terminal.rounds import saying_cost
+from joda.terminal.say import print_json, say
 
 RESULT = "evaluation.json"
 PATIENCE = 3
@@ -270,3 +278,91 @@ def _cases(source: Path, target: Path) -> Iterator[Case]:
                 folder = folder.with_name(f"{folder.name}_")
             taken.add(folder)
             yield Case(f"{stem}/{name}", model, name, expected, folder)
+
+
+def command(
+    what: Annotated[
+        Literal["proposer"], typer.Argument(help="What to evaluate.", show_default=False)
+    ],
+    models: Annotated[
+        Path,
+        typer.Argument(
+            help="Folder of models, beside each its MODEL.expected.json.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder to fill [default: joda_evaluation]."),
+    ] = None,
+    proposer: options.Proposer = None,
+    rounds: options.Rounds = 3,
+    templates: options.Templates = None,
+    key: options.Key = "",
+    vlm: options.Vlm = None,
+    base_url: options.BaseUrl = None,
+    effort: options.Efforts = None,
+    resume: options.Resume = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Count what a proposer gets right, and its cost.
+
+    Example:
+
+        joda evaluate proposer out --proposer offline -o evaluated
+    """
+    with saying_cost(output, as_json), progress_bar() as bar:
+        result = evaluate(
+            what, models, output, proposer=proposer, rounds=rounds, templates=templates or (),
+            key=key, vlm=vlm, base_url=base_url, effort=effort, resume=resume, force=force,
+            progress=bar,
+        )  # fmt: skip
+    if as_json:
+        print_json(_as_json(result))
+    else:
+        _say(result)
+    failed = sum(bool(one.failed) for one in result.joints)
+    if failed:
+        raise JodaError(f"{failed} of {len(result.joints)} joints have no whole answer; see above.")
+
+
+def _as_json(result: Evaluation) -> dict[str, Any]:
+    """What `joda evaluate --json` prints."""
+    told: dict[str, Any] = result.model_dump(mode="json")
+    for row, one in zip(told["joints"], result.joints, strict=True):
+        row |= {"met": one.met, "of": len(one.behaviours)}
+    usage = result.usage.model_dump(mode="json")
+    return {
+        **told, "met": result.met, "of": result.of, "usage": usage,
+        "seconds": round(result.seconds, 3),
+    }  # fmt: skip
+
+
+def _say(result: Evaluation) -> None:
+    """The table of `joda evaluate`; below it what was not met."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    heads = "joint", "met", "rounds", "tokens in", "out", "dollars", "seconds"
+    table = Table(box=None, pad_edge=False)
+    for k, head in enumerate(heads):
+        table.add_column(head, justify="right" if k else "left")
+    rows = [
+        (one.label, one.met, len(one.behaviours), one.rounds, one.usage, one.seconds)
+        for one in result.joints
+    ]
+    rounds = sum(one.rounds for one in result.joints)
+    whole = f"{result.proposer}, {len(rows)} joints"
+    rows.append((whole, result.met, result.of, rounds, result.usage, result.seconds))
+    for label, met, of, count, usage, seconds in rows:
+        dollars = "?" if usage.dollars is None else f"{usage.dollars:.3f}"
+        tokens = map(str, (usage.input_tokens, usage.output_tokens))
+        paid = (*tokens, dollars) if usage.requests else ("-", "-", "-")
+        counts = f"{met} of {of}", str(count), *paid, f"{seconds:.1f}"
+        table.add_row(Text(line(label)), *counts)
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    for one in result.joints:
+        lacking = [one.failed] if one.failed else [t for t in one.behaviours.values() if t]
+        for sentence in lacking:
+            say(f"{one.label}: {sentence}")

@@ -1,8 +1,12 @@
 """Writes a scene with profiles for who has no plugin, and says how near the constants come."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
 
 from joda.errors import JodaError
 from joda.exporting.markup import meshes_of
@@ -17,6 +21,8 @@ from joda.files import check_target, file_name, write_together
 from joda.scenes.model import find_joint, load
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
+from joda.terminal import options
+from joda.terminal.say import print_json, say
 
 
 @dataclass(frozen=True)
@@ -107,3 +113,49 @@ def _lacking(links: Sequence[Link], to: Format) -> list[str]:
         counted = [(kinds.count(kind), kind) for kind in ("plane", "ellipsoid")]
         out += [f"URDF has no {kind}: {left_out(n, kind)}" for n, kind in counted if n]
     return out
+
+
+def command(
+    scene: Annotated[Path, typer.Argument(help="Scene with profiles.", show_default=False)],
+    to: Annotated[
+        Literal["native", "urdf", "sdf", "usd"],
+        typer.Option(help="native: MJCF without the plugin; urdf; sdf; usd.", show_default=False),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="File to write.", show_default=False)
+    ],
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Write the nearest that URDF, SDF, USD or plain MJCF can say.
+
+    Example:
+
+        joda export scene.xml --to urdf -o scene.urdf
+    """
+    result = export(scene, to, output, force=force)
+    if as_json:
+        print_json({**asdict(result), "files": [str(path) for path in result.files]})
+        return
+    _say_nearest(result.joints)
+    for note in result.notes:
+        say(note)
+    for path in result.files:
+        say(path)
+
+
+def _say_nearest(joints: Iterable[Nearest]) -> None:
+    """The table of `joda export`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("joint", "what", "error: rms", "largest", "of", box=None, pad_edge=False)
+    for joint in joints:
+        for error in joint.errors:
+            least = 1e-9 * error.size  # rounding
+            sizes = (
+                f"{size:.3g}" if size > least else "0"
+                for size in (error.rms, error.largest, error.size)
+            )
+            table.add_row(joint.joint, f"{error.what}, {error.unit}", *sizes)
+    Console(width=None if sys.stdout.isatty() else 110).print(table)

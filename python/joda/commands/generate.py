@@ -1,43 +1,29 @@
 """The main job: from a joint to a profile that behaves like the object, in rounds."""
 
-import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
+from typing import Annotated, Any
 
-import mujoco
+import typer
 
 from joda.errors import JodaError
 from joda.files import occupied
-from joda.proposal import Proposal
-from joda.propose import Proposer
+from joda.propose import Proposer, total
 from joda.propose.asking import Effort, ProposalFailed
+from joda.propose.estimate import Estimate
+from joda.propose.estimate import estimate as expected_cost
+from joda.propose.generate_all import SHEET, Results, generate_all, remarks
+from joda.propose.generation import ROUNDS, Generated, begin, check_rounds, choose, run
 from joda.propose.history import History
-from joda.propose.session import PICTURES, Pictures, Progress, Session, relative, silent
-from joda.scenes.model import find_joint, joint_name, joint_type, load_model
+from joda.propose.joints import PassedOver, only_joint
+from joda.propose.session import Progress, silent
 from joda.scenes.shelf import loading_once
 from joda.template import read_templates
-
-ROUNDS = 3
-
-
-@dataclass(frozen=True)
-class Generated:
-    """What a generation left in its folder.
-
-    Attributes:
-        folder: with context.json, pictures/, proposal.json, composed.json, profile.png, scene.xml
-            and history.json.
-        history: the rounds, what each proposed, what came of it, what it cost.
-        notes: what the user should be told, a sentence each.
-        stopped: why a further round came to nothing; empty where it did not.
-    """
-
-    folder: Path
-    history: History
-    notes: tuple[str, ...] = ()
-    stopped: str = ""
+from joda.terminal import options
+from joda.terminal.progress import progress_bar, spinner
+from joda.terminal.reviewing import look_at
+from joda.terminal.rounds import generated_as_json, say_cost, say_round, saying_cost
+from joda.terminal.say import print_json, say, say_files, say_viewer
 
 
 def generate(
@@ -110,99 +96,6 @@ def generate(
     return Generated(folder, session.history, tuple(session.notes))
 
 
-def run(session: Session, proposer: Proposer, rounds: int, force: bool = False) -> None:
-    """Asks the proposer until it has nothing to change, or `rounds` proposals are made.
-
-    Raises:
-        JodaError: no proposal was to be had; what it cost is kept. Or composed.json was edited and
-            `force` is off.
-    """
-    if session.pending(rounds) and not force:
-        session.check_unedited()
-    while session.pending(rounds):
-        session.ask(proposer)
-
-
-def begin(
-    folder: Path,
-    model: Path,
-    joint: str,
-    describe: str,
-    templates: Sequence[Path],
-    key: str,
-    resume: bool,
-    progress: Progress = silent,
-    pictures: Pictures = PICTURES,
-) -> Session:
-    """The session that a folder holds, if it is to be resumed, or a new one; raises JodaError."""
-    if not resume or not (folder / "history.json").is_file():
-        return Session.start(folder, model, joint, describe, templates, key, progress, pictures)
-    history = History.read(folder / "history.json")
-    if history.model != relative(model, folder) or not _same(model, joint, history.joint):
-        raise JodaError(
-            f"{folder}: holds joint '{history.joint}' of {(folder / history.model).resolve()}; "
-            "resume with the same, or choose another folder with -o."
-        )
-    given = {
-        "describe": (describe, history.description),
-        "templates": (tuple(relative(path, folder) for path in templates), history.templates),
-        "key": (key, history.key),
-    }
-    for option, (now, then) in given.items():
-        if now and now != then and not (option == "describe" and history.reviewed):
-            raise JodaError(
-                f"{folder}: was begun with another --{option}; leave it out to go on with that, or "
-                "choose another folder with -o."
-            )
-    return Session.resume(folder, progress)
-
-
-def choose(
-    proposer: str | Path | Proposer | None,
-    key: str = "",
-    vlm: str | None = None,
-    base_url: str | None = None,
-    effort: Effort | None = None,
-) -> Proposer:
-    """The proposer that is meant; see `generate`. Raises JodaError."""
-    if proposer is not None and not isinstance(proposer, str | Path):
-        return proposer
-    name = str(proposer or ("anthropic" if os.environ.get("ANTHROPIC_API_KEY") else "offline"))
-    if effort not in (None, *get_args(Effort)):
-        raise JodaError(f"effort is '{effort}'; give one of {', '.join(get_args(Effort))}.")
-    if name == "anthropic":
-        from joda.propose.anthropic import Anthropic
-
-        return Anthropic(vlm, base_url, effort=effort)
-    if name == "openai":
-        from joda.propose.openai import OpenAI
-
-        return OpenAI(vlm, base_url, effort=effort)
-    if vlm or base_url or effort:
-        raise JodaError(
-            f"--vlm, --base-url and --effort are of the proposers anthropic and openai, not of "
-            f"'{name}'; add --proposer."
-        )
-    if name == "offline":
-        from joda.propose.offline import Offline
-
-        return Offline(key)
-    if not Path(name).is_file():
-        raise JodaError(
-            f"{name}: no such proposer or file; give anthropic, openai, offline or a file."
-        )
-    from joda.propose.file import FileProposer
-
-    Proposal.read(name)
-    return FileProposer(Path(name))
-
-
-def check_rounds(rounds: int) -> None:
-    """Raises JodaError if there are none."""
-    if rounds < 1:
-        raise JodaError(f"rounds is {rounds}; give at least 1.")
-
-
 def _check_free(folder: Path, force: bool) -> None:
     """Raises JodaError if the folder holds anything but a generation that came to nothing."""
     if force or not occupied(folder):
@@ -216,41 +109,154 @@ def _check_free(folder: Path, force: bool) -> None:
     raise JodaError(f"{folder}: exists already; choose another folder with -o, add --force{more}.")
 
 
-def only_joint(path: Path) -> str:
-    """The model's only hinge or slide with a range; raises JodaError if it has several or none."""
-    names = ranged(load_model(path))
-    if len(names) == 1:
-        return names[0]
-    listed = ", ".join(f"'{name}'" for name in names)
-    raise JodaError(
-        f"{path}: choose a joint with --joint: {listed}."
-        if names
-        else f'{path}: holds no hinge or slide with a range; add range="lo hi" to the joint.'
+def command(
+    model: Annotated[
+        Path, typer.Argument(help="MJCF or URDF file, or a folder of them.", show_default=False)
+    ],
+    output: options.Folder,
+    joint: Annotated[
+        str | None,
+        typer.Option(
+            "--joint",
+            help="A name, body:NAME[:K] or #K; not needed if there is only one. For a folder: only "
+            "joints of this name.",
+        ),
+    ] = None,
+    proposer: options.Proposer = None,
+    rounds: options.Rounds = 3,
+    describe: Annotated[
+        str, typer.Option(help="What the joint should do, in words.", show_default=False)
+    ] = "",
+    templates: options.Templates = None,
+    key: options.Key = "",
+    vlm: options.Vlm = None,
+    base_url: options.BaseUrl = None,
+    effort: options.Efforts = None,
+    resume: options.Resume = False,
+    estimate: Annotated[
+        bool, typer.Option("--estimate", help="Only say what asking a model will about cost.")
+    ] = False,
+    review: Annotated[
+        bool,
+        typer.Option(
+            "--review",
+            help="Of a folder: ask about the doubtful joints, the least sure first; with --resume "
+            "about those of before.",
+        ),
+    ] = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Give a joint the behaviour of its object.
+
+    Effects are proposed, compiled, simulated and revised. Leaves context.json, pictures,
+    proposal.json, composed.json, profile.png, scene.xml and history.json. A folder of models is
+    done joint by joint, and ends with a contact sheet, sheet.html. Example:
+
+        joda generate out/oven.xml --joint door -o stays --describe "it stays wherever it is left"
+    """
+    asked: dict[str, Any] = {
+        "proposer": proposer, "rounds": rounds, "describe": describe, "templates": templates or (),
+        "vlm": vlm, "base_url": base_url, "effort": effort,
+    }  # fmt: skip
+    if estimate or not (as_json or resume):
+        expected = expected_cost(model, joint, output, **asked)
+        if estimate or expected:
+            _say_estimate(expected, as_json)
+        if estimate:
+            return
+    asked |= {"key": key, "resume": resume, "force": force}
+    if model.is_dir():
+        with saying_cost(output, as_json), progress_bar() as bar:
+            done = generate_all(model, output, joint=joint, progress=bar, **asked)
+        if review:
+            done = generate_all(
+                model, output, joint=joint, review=look_at, **asked | {"resume": True}
+            )
+        _say_all(done, output / SHEET, as_json)
+        return
+    if review:
+        raise JodaError("--review goes with a folder of models; change one joint with joda revise.")
+    with saying_cost(output, as_json), spinner("generate") as progress:
+        result = generate(model, joint, output, progress=progress, **asked)
+    if as_json:
+        print_json(generated_as_json(result))
+        return
+    for round in result.history.rounds:
+        say_round(round)
+    say_cost(result.history.usage)
+    for note in result.notes:
+        say(note)
+    names = "profile.png", "scene.xml", "composed.json", "proposal.json", "history.json"
+    say_files(result.folder, names)
+    say_viewer(result.folder / "scene.xml")
+
+
+def _say_estimate(estimated: Estimate | None, as_json: bool) -> None:
+    """What a generation will about cost."""
+    if as_json:
+        print_json(estimated and estimated.model_dump(mode="json"))
+        return
+    if estimated is None:
+        say("Nobody would be asked who costs anything.")
+        return
+    least, most = estimated.least, estimated.most
+    dollars = (
+        "price unknown (JODA_VLM_PRICE sets it)"
+        if least.dollars is None or most.dollars is None
+        else f"{_span(least.dollars, most.dollars, '.2g')} dollars"
+    )
+    say(
+        f"Estimate, joints: {estimated.joints}, with {estimated.proposer}: "
+        f"{_span(least.requests, most.requests)} requests, "
+        f"{_span(least.input_tokens, most.input_tokens)} tokens in, "
+        f"{_span(least.output_tokens, most.output_tokens)} out, {dollars}."
     )
 
 
-def ranged(model: mujoco.MjModel) -> list[str]:
-    """Names of the joints that can have a profile: hinges and slides that have a range."""
-    return [name for name, has in _movable(model) if has]
+def _span(low: float, high: float, form: str = "d") -> str:
+    ends = f"{low:{form}}", f"{high:{form}}"
+    return " to ".join(dict.fromkeys(ends))
 
 
-def endless(model: mujoco.MjModel) -> list[str]:
-    """Names of the hinges and slides that have no range, and so can have no profile."""
-    return [name for name, has in _movable(model) if not has]
+def _say_all(done: Results, sheet: Path, as_json: bool) -> None:
+    """A line per joint, what of all does not come true, and the contact sheet.
 
-
-def _movable(model: mujoco.MjModel) -> list[tuple[str, bool]]:
-    """Hinges and slides, and whether they have a range."""
-    return [
-        (joint_name(model, k), bool(model.jnt_range[k][0] < model.jnt_range[k][1]))
-        for k in range(model.njnt)
-        if joint_type(model, k) in ("hinge", "slide")
-    ]
-
-
-def _same(path: Path, one: str, other: str) -> bool:
-    """Whether two addresses mean the same joint."""
-    if one == other:
-        return True
-    model = load_model(path)
-    return find_joint(model, one) == find_joint(model, other)
+    Raises JodaError if some gave nothing.
+    """
+    failed = {label: result for label, result in done.items() if isinstance(result, JodaError)}
+    mistakes = [one for one in failed.values() if not isinstance(one, PassedOver)]
+    lost = (one.usage for one in mistakes if isinstance(one, ProposalFailed))
+    made = {label: result for label, result in done.items() if not isinstance(result, JodaError)}
+    if as_json:
+        print_json(
+            {
+                label: {"error": str(failed[label])}
+                if label in failed
+                else generated_as_json(made[label])
+                for label in done
+            }
+        )
+    else:
+        for label in done:
+            if label in failed:
+                say(f"{label}: {failed[label]}")
+                continue
+            result = made[label]
+            last = result.history.rounds[-1]
+            lacking = " ".join(last.unmet) or "as described"
+            say(f"{label}: {last.proposal.joint_summary.motion_description}; {lacking}")
+            for note in remarks(result):
+                say(f"  {note}")
+        say_cost(total([*(result.history.usage for result in made.values()), *lost]))
+        lasts = [result.history.rounds[-1] for result in made.values()]
+        came, not_ = (sum(len(getattr(r, what)) for r in lasts) for what in ("met", "unmet"))
+        joints = sum(bool(last.unmet) for last in lasts)
+        say(f"{came} of {came + not_} behaviours come true; {joints} joints lack one.")
+        if over := len(failed) - len(mistakes):
+            say(f"{over} {'joint has' if over == 1 else 'joints have'} no range and no profile.")
+        say(f"Contact sheet: {sheet}")
+    stopped = sum(bool(result.stopped) for result in made.values())
+    lacks = [(len(mistakes), "have no profile"), (stopped, "stopped early and go on with --resume")]
+    if told := [f"{count} of {len(done)} {what}" for count, what in lacks if count]:
+        raise JodaError(f"{', '.join(told)}; see above.")

@@ -1,8 +1,12 @@
 """Makes runs of a log: of LeRobot datasets, ROS bags and MCAP, and CSV with other names."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from joda.errors import JodaError
 from joda.files import check_targets, file_name, make_folder, write_together
@@ -14,7 +18,11 @@ from joda.importing.rows import rows, text
 from joda.importing.scaling import given, scaled
 from joda.importing.understood import Understood, understood
 from joda.importing.units import checked
+from joda.plain import plain
 from joda.scenes.model import find_joint, joint_name, load_model
+from joda.terminal import options
+from joda.terminal.progress import progress_bar
+from joda.terminal.say import print_json, say
 
 
 @dataclass(frozen=True)
@@ -174,3 +182,137 @@ def _check_known(log: Log, options: Mapping[str, object]) -> None:
 
 def _inputs(log: Path, model: str | Path) -> list[str | Path]:
     return [log, model] if log.is_file() else [model]
+
+
+FILES = 3
+
+
+def command(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="LeRobot dataset (folder), ROS bag (folder, .mcap, .db3, .bag) or CSV.",
+            show_default=False,
+        ),
+    ],
+    model: Annotated[
+        Path, typer.Option(help="MJCF or URDF file whose joints they are.", show_default=False)
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for the runs.", show_default=False)
+    ],
+    joint: Annotated[
+        str | None,
+        typer.Option(help="Only this joint, in runs of one [default: all, in runs of several]."),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TARGET=NAME",
+            help="Which column is position:JOINT, velocity:JOINT, force:JOINT, ctrl:ACTUATOR or "
+            "time.",
+        ),
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=UNIT",
+            help="A column's unit: rad, deg, turn, m, cm, mm, 0..1, 0..100 (percent), -100..100, "
+            "raw; with - before it, the other direction; of times s, ms, us, ns. NAME may have *.",
+        ),
+    ] = None,
+    zero: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=NUMBER",
+            help="What a column has where the model has 0, in its own unit. NAME may have *.",
+        ),
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A column to leave out. NAME may have *."),
+    ] = None,
+    episode: Annotated[
+        list[int] | None, typer.Option(min=0, help="Of a dataset, only this one.")
+    ] = None,
+    topic: Annotated[list[str] | None, typer.Option(help="Of a bag, only this one.")] = None,
+    interpolate: Annotated[
+        bool,
+        typer.Option("--interpolate", help="Bring what has times of its own to the positions'."),
+    ] = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Make runs of a LeRobot dataset, a ROS bag or a CSV.
+
+    Prints what it took each column for; what is not sure it refuses, and names the option that
+    settles it. Options can be repeated. Reads LeRobot 2 and 3, and of bags (MCAP too) JointState
+    and JointTrajectoryControllerState. Examples:
+
+        joda import out/let_go_5.csv --model out/oven.xml --joint door -o runs
+        joda import out/let_go_45.csv --model out/oven.xml --column position:door=position -o logs
+    """
+    with progress_bar() as bar:
+        made = import_log(
+            log, model, output, joint=joint, columns=column or (), units=unit or (),
+            zeros=zero or (), without=without or (), episodes=episode or (), topics=topic or (),
+            interpolate=interpolate, force=force, progress=bar,
+        )  # fmt: skip
+    if as_json:
+        print_json({**asdict(made), "runs": [str(path) for path in made.runs]})
+        return
+    _say(made, output)
+
+
+def _say(made: Imported, output: Path) -> None:
+    runs = "1 run" if len(made.runs) == 1 else f"{len(made.runs)} runs"
+    say(f"{made.format}: {runs}, {made.seconds:.3g} s, {made.samples} samples.")
+    _say_understood(made.columns)
+    for one in made.unused:
+        say(f"Not used: {one.name}: {one.why}")
+    for note in made.notes:
+        say(note)
+    _name(made.runs, output)
+
+
+def _name(runs: Sequence[Path], output: Path) -> None:
+    for path in runs[: FILES if len(runs) > FILES else len(runs)]:
+        say(path)
+    if len(runs) > FILES:
+        say(f"and {len(runs) - FILES} more in {output}")
+
+
+def _say_understood(columns: Iterable[Understood]) -> None:
+    """The table of `joda import`."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    heads = ("column", "becomes", "unit", "known by", "range", "model's", "sign", "zero", "delay")
+    table = Table(*heads, box=None, pad_edge=False)
+    for one in columns:
+        texts = (
+            one.column, one.target, one.unit, one.why, _ends(one.range), _ends(one.model_range),
+            one.sign or "-", _zero(one), _delay(one),
+        )  # fmt: skip
+        table.add_row(*(Text(plain(text)) for text in texts))
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
+
+
+def _ends(span: tuple[float, float] | None) -> str:
+    return "-" if span is None else f"{span[0]:.3g} to {span[1]:.3g}"
+
+
+def _zero(one: Understood) -> str:
+    """Whether the zero can be the model's; of a command how far its joint is from it."""
+    if one.offset is not None:
+        return f"off by {one.offset:.2g}"
+    if one.model_range is None:
+        return "-"
+    return f"{100 * one.outside:.2g} % outside" if one.outside else "inside"
+
+
+def _delay(one: Understood) -> str:
+    if one.delay is None or one.delay_resolution is None:
+        return "-"
+    return f"{1e3 * one.delay:.0f} ms (samples: {1e3 * one.delay_resolution:.3g})"

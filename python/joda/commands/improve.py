@@ -1,7 +1,7 @@
 """Diagnoses and mends a model until the data support no more, and tells the story."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ import numpy as np
 
 from joda.commands.add import FILES
 from joda.diagnosis.end_stops import stops_described
-from joda.diagnosis.improvement import Step, improved
+from joda.diagnosis.improvement import INTERRUPTED, Step, improved
 from joda.diagnosis.outcome import (
     NO_TRUST,
     beside,
@@ -22,15 +22,20 @@ from joda.diagnosis.outcome import (
 )
 from joda.diagnosis.phrases import LEARN
 from joda.diagnosis.split import held_out, in_blocks, parted
-from joda.files import write_together
+from joda.files import check_targets, file_name, named_like, write_together
 from joda.measured.corrections_file import corrections_beside
+from joda.measured.driven import ALL, named_joints
 from joda.measured.maps import draw_maps, draw_models, replayed
 from joda.measured.measured_joint import Measured
+from joda.measured.trust import read_trust
 from joda.measured.visited import unvisited
 from joda.pictures.changes import changes
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded
 from joda.pictures.style import COLOURS, house_style, png
+from joda.terminal import options
+from joda.terminal.progress import spinner
+from joda.terminal.say import print_json, say
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -172,6 +177,65 @@ def improve(
             files[Path(report)] = _page(result, drawn)
     write_together(files)
     return result
+
+
+def improve_all(
+    model: str | Path,
+    runs: Sequence[str | Path],
+    output: str | Path,
+    joints: Sequence[str] = (ALL,),
+    *,
+    passive: bool = False,
+    trust: Mapping[str, float] = NO_TRUST,
+    templates: Sequence[str | Path] = (),
+    force: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> dict[str, Improved]:
+    """Improves one joint of logs of several joints after the other, as `joda.improve` does.
+
+    Args:
+        model, runs, joints, passive: as in `compare_all`.
+        output: scene to write; beside it, with its name and each joint's, go .composed.json and
+            .png. What is done is written joint by joint, and stays if the rest is interrupted.
+        trust, templates: as in `joda.diagnose`, of every joint.
+        force: overwrite what exists.
+        progress: told what is being done.
+
+    Returns:
+        what was done by joint; no scene is written where nothing was.
+
+    Raises:
+        JodaError: as `joda.improve`.
+    """
+    target, names = Path(output), named_joints(model, runs, joints)
+    suffixes = ".composed.json", ".png"
+    kept = {
+        (name, end): named_like(target, f".{file_name(name)}{end}")
+        for name in names
+        for end in suffixes
+    }
+    check_targets([target, *kept.values()], force, [model, *runs])
+    found: dict[str, Improved] = {}
+    current = Path(model)
+    for name in names:
+
+        def report(what: str, name: str = name) -> None:
+            progress(f"{name}: {what}")
+
+        done = improve(
+            current, name, runs, target, passive=passive, trust=trust, templates=templates,
+            force=force or bool(found), progress=report,
+        )  # fmt: skip
+        if done.scene and done.composed and done.picture:
+            current = done.scene
+            composed, picture = (kept[name, end] for end in suffixes)
+            done.composed.replace(composed)
+            done.picture.replace(picture)
+            done = replace(done, composed=composed, picture=picture)
+        found[name] = done
+        if done.why == INTERRUPTED:
+            break
+    return found
 
 
 def _departures(steps: Sequence[Step]) -> tuple[str, ...]:
@@ -316,3 +380,58 @@ def _stairs(part: "Figure | SubFigure", result: Improved) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, fontsize=8)
     part.suptitle("what each effect brought", x=0.02, ha="left", fontsize=10)
+
+
+def command(
+    model: options.Model,
+    runs: options.Runs,
+    output: options.Scene,
+    joint: options.Joints = None,
+    report: options.Report = None,
+    passive: options.Passive = False,
+    trust: options.Trust = None,
+    templates: options.Effects = None,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Diagnose and add until the data support nothing more.
+
+    Leaves, beside the scene, its .composed.json and .png, and .corrections.json where the runs'
+    force, clock or zero was wrong; without anything to add or correct, nothing but the report.
+    Example:
+
+        joda improve hidden/model.xml hidden/run?.csv --joint joint -o improved.xml
+    """
+    if options.several(joint):
+        options.one_joint_only(report, None)
+        with spinner("improve") as progress:
+            every = improve_all(
+                model, runs, output, joint or (), passive=passive,
+                trust=read_trust(trust or ()), templates=templates or (),
+                force=force, progress=progress,
+            )  # fmt: skip
+        if as_json:
+            print_json({"joints": {name: one.as_json() for name, one in every.items()}})
+            return
+        for name, one in every.items():
+            say(f"{name}:")
+            for sentence in sentences(one):
+                say(f"  {sentence}")
+            for path in filter(None, (one.scene, one.composed, one.picture, one.corrections)):
+                say(path)
+        return
+    assert joint
+    with spinner("improve") as progress:
+        result = improve(
+            model, joint[0], runs, output, report=report, passive=passive,
+            trust=read_trust(trust or ()), templates=templates or (), force=force,
+            progress=progress,
+        )  # fmt: skip
+    if as_json:
+        print_json(result.as_json())
+        return
+    for sentence in sentences(result):
+        say(sentence)
+    written = result.scene, result.composed, result.picture, result.corrections, report
+    for path in filter(None, written):
+        say(path)

@@ -1,8 +1,10 @@
 """The diagnostic picture of a file: a profile, or a profile as it stands in a scene."""
 
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 
 from joda.errors import JodaError
 from joda.files import file_name
@@ -12,6 +14,8 @@ from joda.profile import Profile
 from joda.scenes.model import find_joint
 from joda.scenes.motion import gravity_force
 from joda.scenes.scene import open_scene
+from joda.terminal import options
+from joda.terminal.say import say
 
 
 def plot(
@@ -57,3 +61,22 @@ def plot(
     target = Path(output) if output else source.with_suffix(suffix)
     write_png(draw(profile, (positions, balance)), target, force)
     return target
+
+
+def command(
+    source: Annotated[Path, typer.Argument(help="composed.json, or a scene.", show_default=False)],
+    joint: Annotated[
+        str | None, typer.Option("--joint", help="Which joint of a scene with several profiles.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="PNG to write [default: beside SOURCE].")
+    ] = None,
+    force: options.Force = False,
+) -> None:
+    """Draw a profile: its components, gravity's equilibrium.
+
+    Gravity is drawn for a scene. Example:
+
+        joda plot scene.xml -o profile.png
+    """
+    say(plot(source, output, joint=joint, force=force))

@@ -1,11 +1,13 @@
 """Refinement: bends a joint's profile until simulation matches measured motions."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import mujoco
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from joda.diagnosis.adding import Error, error
@@ -40,6 +42,9 @@ from joda.scenes.context import Context, context
 from joda.scenes.model import find_joint, joint_name, load_model
 from joda.scenes.native import whole_profile
 from joda.scenes.scene import profiles_of
+from joda.terminal import options
+from joda.terminal.progress import loss_bar
+from joda.terminal.say import print_json, say, say_changes, with_text_paths
 from joda.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -364,3 +369,94 @@ def _beyond(
             else "Gravity: as it is."
         )
     return also, said
+
+
+def command(
+    model: Annotated[
+        Path, typer.Argument(help="Scene whose joint carries a profile.", show_default=False)
+    ],
+    runs: options.Runs,
+    joint: options.Joint,
+    output: options.Scene,
+    check: Annotated[
+        list[Path] | None, typer.Option(help="A run that is only compared, not fitted.")
+    ] = None,
+    iterations: Annotated[int, typer.Option(min=1, help="Most iterations of a fit.")] = 120,
+    fit: Annotated[
+        str,
+        typer.Option(
+            help="What may change, with commas: values, intervals, strengths, damping_ratio, "
+            "inertia, gravity."
+        ),
+    ] = "values,intervals",
+    free_shape: Annotated[
+        bool, typer.Option("--free-shape", help="Let curves change sign, rising parts fall.")
+    ] = False,
+    finer: Annotated[
+        int, typer.Option(min=0, max=3, help="So many times control points are doubled first.")
+    ] = 0,
+    passive: options.Passive = False,
+    scene: Annotated[
+        bool | None,
+        typer.Option(
+            "--scene/--no-scene",
+            help="Simulate the whole scene in MJX, or the joint by itself [default: the scene "
+            "where other joints of the logs, or contacts, move the joint].",
+            show_default=False,
+        ),
+    ] = None,
+    corrections: options.Corrections = None,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Bend a joint's profile until it moves as was measured.
+
+    Leaves, beside the scene, its .composed.json, .png and .history.json, and .corrections.json
+    where what is wrong with the runs was given. Example:
+
+        joda refine oven/scene.xml out/let_go_5.csv out/let_go_45.csv --joint door -o better.xml
+    """
+    from joda import Profile
+
+    with loss_bar() as bar:
+        result = refine(
+            model, joint, runs, output, check=check or (), iterations=iterations,
+            fit=[name.strip() for name in fit.split(",") if name.strip()],  # type: ignore[misc]
+            keep_shape=not free_shape, finer=finer, passive=passive, scene=scene,
+            corrections=corrections, force=force, progress=bar,
+        )  # fmt: skip
+    if as_json:
+        print_json(with_text_paths(asdict(result)))
+        return
+    say_changes(result.changes)
+    _say_errors(result, Profile.read(result.composed).joint.unit)
+    for note in result.notes:
+        say(note)
+    beside = result.composed, result.picture, result.history, result.corrections
+    for path in filter(None, (result.scene, *beside)):
+        say(path)
+
+
+def _say_errors(result: Refined, unit: str) -> None:
+    """How near the simulation came to the measurement, and where that told little.
+
+    Args:
+        result: of a refinement.
+        unit: of its joint's position, rad or m.
+    """
+    what = "Position"
+    if result.windows is None:
+        what, unit = "Force", {"rad": "N·m", "m": "N"}[unit]
+    say(
+        f"{what} error: {result.before:.3g} → {result.after:.3g} {unit} RMS after "
+        f"{result.iterations} iterations; the measurement's noise is {result.noise:.2g} {unit}."
+    )
+    if result.windows:
+        first, last = result.windows
+        say(f"The same over windows of 0.4 s: {first:.3g} → {last:.3g} {unit}.")
+    if result.checked:
+        say(f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS.")
+    for channel, places in result.unseen.items():
+        if places:
+            where = ", ".join(f"s = {a:.2f} to {b:.2f}" for a, b in places)
+            say(f"The data tell little of {channel} at {where}: it is hardly measured there.")

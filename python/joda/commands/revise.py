@@ -2,18 +2,24 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 
-from joda.commands.generate import choose
 from joda.component import LONGEST_TEXT
 from joda.errors import JodaError
 from joda.pictures.changes import changes, overlay
 from joda.pictures.style import write_png
 from joda.propose import Proposer
 from joda.propose.asking import Effort
+from joda.propose.generation import choose
 from joda.propose.history import History
 from joda.propose.session import Progress, Session, silent
+from joda.terminal import options
+from joda.terminal.progress import spinner
+from joda.terminal.rounds import say_cost, say_round
+from joda.terminal.say import print_json, say, say_changes
 
 
 @dataclass(frozen=True)
@@ -88,3 +94,42 @@ def revise(
         history=session.history,
         notes=tuple(session.notes),
     )
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(help="What joda generate left.", show_default=False)],
+    feedback: Annotated[
+        str, typer.Option(help="What is wrong or wanted, in words.", show_default=False)
+    ],
+    proposer: Annotated[
+        str | None, typer.Option(help="anthropic, openai or offline [default: as for generate].")
+    ] = None,
+    vlm: options.Vlm = None,
+    base_url: options.BaseUrl = None,
+    effort: options.Efforts = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Although composed.json was edited by hand since.")
+    ] = False,
+    as_json: options.Json = False,
+) -> None:
+    """Change a generated profile in words; the rest stays.
+
+    Example:
+
+        joda revise oven --feedback "the final closing pull is too strong"
+    """
+    with spinner("revise") as progress:
+        result = revise(
+            folder, feedback, proposer=proposer, vlm=vlm, base_url=base_url, effort=effort,
+            force=force, progress=progress,
+        )  # fmt: skip
+    if as_json:
+        last = result.history.rounds[-1].model_dump(mode="json")
+        print_json({"changes": result.changes, "picture": str(result.picture), "round": last})
+        return
+    say_changes(result.changes)
+    say_round(result.history.rounds[-1])
+    say_cost(result.history.usage)
+    for note in result.notes:
+        say(note)
+    say(result.picture)

@@ -1,7 +1,8 @@
 """JSON Schemas of the files that joda reads and writes."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+import typer
 from pydantic import BaseModel
 
 from joda.measured.corrections_file import Corrections
@@ -10,6 +11,7 @@ from joda.proposal import Proposal
 from joda.propose.archetype import Archetypes
 from joda.propose.expected import Expectations
 from joda.template import Template
+from joda.terminal.say import print_json
 
 
 def schema(
@@ -37,3 +39,18 @@ def schema(
         "corrections": Corrections,
     }
     return models[file].model_json_schema()
+
+
+def command(
+    file: Annotated[
+        Literal["composed", "proposal", "template", "archetype", "expected", "corrections"],
+        typer.Argument(help="Which file."),
+    ] = "composed",
+) -> None:
+    """Print the JSON Schema of a file format.
+
+    Example:
+
+        joda schema composed
+    """
+    print_json(schema(file))

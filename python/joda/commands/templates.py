@@ -1,12 +1,19 @@
 """The effect templates that a proposal can name, and their previews."""
 
-from collections.abc import Sequence
+import shutil
+import textwrap
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from joda.errors import JodaError
 from joda.pictures.sheet import sheet
 from joda.pictures.style import write_png
 from joda.template import Template, read_templates
+from joda.terminal import options
+from joda.terminal.say import print_json, say
 
 
 def templates(
@@ -40,3 +47,47 @@ def templates(
     if output is not None:
         write_png(sheet(found), output, force)
     return found
+
+
+def command(
+    name: Annotated[
+        str | None, typer.Argument(help="Only this template.", show_default=False)
+    ] = None,
+    folders: options.Templates = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="PNG to write, with a preview of each."),
+    ] = None,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """List the effect templates, or picture their curves.
+
+    Example:
+
+        joda templates -o templates.png
+    """
+    found = templates(folders or (), output, name=name, force=force)
+    if as_json:
+        print_json([one.model_dump(mode="json", exclude_unset=True) for one in found.values()])
+    elif output:
+        say(output)
+    else:
+        _say_templates(found.values())
+
+
+def _say_templates(found: Iterable[Template]) -> None:
+    """A paragraph per template, no wider than the terminal."""
+    say(*"\n\n".join(map(_paragraph, found)).split("\n"))
+
+
+def _paragraph(template: Template) -> str:
+    present = ", ".join(name for name, curve in template.channels if curve)
+    texts = (
+        template.description,
+        f"Placement: {template.placement}",
+        f"Channels: {present or 'none'}",
+    )
+    width = min(shutil.get_terminal_size((100, 24)).columns, 100)
+    wrap = textwrap.TextWrapper(width, initial_indent="  ", subsequent_indent="  ")
+    return "\n".join((template.name, *map(wrap.fill, texts)))

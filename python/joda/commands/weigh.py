@@ -4,15 +4,19 @@ import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import mujoco
 import numpy as np
+import typer
 
 from joda.errors import JodaError
 from joda.files import check_target, write_bytes
 from joda.scenes.masses import implausible_mass, misplaced
 from joda.scenes.materials import Weight, estimate_weight
 from joda.scenes.model import find_joint, joint_name, load, load_model, moves_with, write_out
+from joda.terminal import options
+from joda.terminal.say import say
 
 
 @dataclass(frozen=True)
@@ -117,3 +121,25 @@ def _written(spec: mujoco.MjSpec, source: Path, folder: Path) -> bytes:
         near = Path(os.path.relpath(absolute, folder.resolve())).as_posix()
         text = re.sub(rf'{kind}="[^"]*"', f'{kind}="{near}/"'.replace("\\", "/"), text)
     return text.encode()
+
+
+def command(
+    model: options.Model,
+    joint: options.Joint,
+    output: options.Scene,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Overwrite the output; replace a mass that can be, too."),
+    ] = False,
+) -> None:
+    """Give what a joint moves a mass estimated from its size.
+
+    For models whose mass cannot be, as `joda context` and `joda generate` say. Rough, within a
+    factor of three; a scale is better. Example:
+
+        joda weigh out/oven.xml --joint door -o weighed.xml --force
+    """
+    done = weigh(model, joint, output, force=force)
+    for warning in done.warnings:
+        say(warning)
+    say(f"{done.describe()}; weigh it if you can.", output)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
-from scipy.stats import multivariate_normal
 
 from joda._core import JointSimulator
 from joda.component import Component
@@ -332,6 +331,8 @@ def heavier(found: Sequence[Number]) -> float:
     and all strengths are less by one factor: that each is off by a factor of its own, and these are
     alike by chance, is the other way to see it. Factors are log-normal before the data; 0 where
     fewer than two are told."""
+    from scipy.stats import multivariate_normal  # loading it takes longer than a short command
+
     told = _determined(found)
     off = np.log([max(one.factor, ZERO) for one in told])
     if len(told) < 2 or off.mean() > 0:

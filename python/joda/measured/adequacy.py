@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, norm
+from scipy.special import bdtr, ndtr
 
 from joda.measured.data_checks.timing import repeats
 from joda.measured.errors import MULTIPLE, Errors, Missed
@@ -162,7 +162,8 @@ def residual_pattern(rows: Array) -> float | None:
 
 def sign_test(sign: NDArray[np.bool_]) -> float:
     """Two-sided: as uneven a number of either sign by chance."""
-    return float(binomtest(int(sign.sum()), len(sign)).pvalue) if len(sign) else 1.0
+    fewer = min(int(sign.sum()), int((~sign).sum()))
+    return min(1.0, 2 * float(bdtr(fewer, len(sign), 0.5)))
 
 
 def runs_test(sign: NDArray[np.bool_]) -> float:
@@ -174,4 +175,4 @@ def runs_test(sign: NDArray[np.bool_]) -> float:
     runs = 1 + int(np.sum(sign[1:] != sign[:-1]))
     mean = 1 + 2 * a * b / n
     variance = (mean - 1) * (mean - 2) / (n - 1)
-    return float(norm.cdf((runs + 0.5 - mean) / np.sqrt(variance))) if variance > 0 else 1.0
+    return float(ndtr((runs + 0.5 - mean) / np.sqrt(variance))) if variance > 0 else 1.0

@@ -16,13 +16,17 @@ from joda.measured.sensing import RIGHT, Sensing
 from joda.measured.table import header
 from joda.measured.touching import touching
 from joda.scenes.actuators import Drive, Servo, actuators_on, drive_of
-from joda.scenes.model import joint_name
+from joda.scenes.model import joint_name, load_model
 
 Array = NDArray[np.float64]
 
 OF_JOINTS = ("position", "velocity", "force")
 SHOWN = 6
 """Most joints that a note names."""
+
+
+ALL = "all"
+"""In the place of a joint's name: every joint that the logs have."""
 
 
 @dataclass(frozen=True)
@@ -221,3 +225,18 @@ def _driven(model: mujoco.MjModel, joint: int, acting: Sequence[str]) -> str:
 
 def _listed(columns: Sequence[str]) -> str:
     return ", ".join(f"'{column}'" for column in columns)
+
+
+def named_joints(model: str | Path, runs: Sequence[str | Path], joints: Sequence[str]) -> list[str]:
+    """The joints that are meant; raises JodaError if there is none."""
+    if not runs:
+        raise JodaError("no runs; give at least one CSV file with time and position.")
+    if list(joints) not in ([], [ALL]):
+        return list(dict.fromkeys(joints))
+    there = joints_in(load_model(Path(model)), Path(runs[0]))
+    if not there:
+        raise JodaError(
+            f"{runs[0]}: has no columns 'position:JOINT' of the model's joints; name the joint of "
+            "its 'position' with --joint."
+        )
+    return there

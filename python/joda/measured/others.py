@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 Array = NDArray[np.float64]
 
@@ -31,6 +30,8 @@ class Motion:
 
 def motion(time: Array, position: Array, over: float = SMOOTHED) -> Motion:
     """A motion smoothed over a time, s (Savitzky and Golay, Anal. Chem. 36 (1964) 1627)."""
+    from scipy.signal import savgol_filter  # loading it takes longer than a short command
+
     count = len(time)
     grid = np.linspace(time[0], time[-1], count)
     gap = float(grid[1] - grid[0])

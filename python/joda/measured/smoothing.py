@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 Array = NDArray[np.float64]
 
@@ -117,8 +117,8 @@ def trimmed_deviation(values: Array) -> float:
     """Standard deviation of noise about zero, from the smaller `KEPT` of the values: those of a
     normal distribution make the part kept - 2 z phi(z) of its variance, for kept = P(|x| < z)."""
     size = np.sort(np.abs(values))[: max(int(KEPT * len(values)), 1)]
-    z = norm.ppf(0.5 + KEPT / 2)
-    part = KEPT - 2 * z * norm.pdf(z)
+    z = ndtri(0.5 + KEPT / 2)
+    part = KEPT - 2 * z * np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi)
     return float(np.sqrt(np.sum(size**2) / len(values) / part))
 
 

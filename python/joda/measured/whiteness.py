@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from joda.measured.measured_joint import Measured
 from joda.measured.replay import Start
@@ -105,7 +105,7 @@ def drift(residual: Array, position: Array, step: float, moved: float = 0.0) -> 
     means, sizes = np.array([(own.mean(), len(own)) for own in blocks])[told].T
     variance = max(long_run_variance(blocks), 1.0) / sizes + TOLERATED**2 + moved**2
     variance += step**2 / 12 / levels[told]
-    return float(chi2.sf(np.sum(means**2 / variance), told.sum() - 2))
+    return float(chdtrc(told.sum() - 2, np.sum(means**2 / variance)))
 
 
 def long_run_variance(blocks: list[Array]) -> float:

@@ -1,1 +1,0 @@
-"""Joints as tasks: what one needs and leaves, and who runs many of them."""
