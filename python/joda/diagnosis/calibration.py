@@ -146,11 +146,12 @@ class Calibration:
             measured: the joint as it was given.
         """
         values = self.numbers.values(self.fit.x).items()
-        rows = zip(values, self.errors, self.others, self.numbers.little(self.fit.x), strict=True)
+        little = self.numbers.little(self.fit.x)
+        rows = zip(values, self.errors, self.others, little, strict=True)
         return tuple(
             correction_of(measured, name, value, float(error), others)
-            for (name, value), error, others, little in rows
-            if not little
+            for (name, value), error, others, hardly in rows
+            if not hardly or all(little)
         )
 
 
@@ -168,7 +169,8 @@ class Calibrator:
 
         Args:
             baseline: the model fitted to the runs.
-            beside: whether effects were looked for too, so that these can be compared.
+            beside: whether effects were looked for too, so that these can be compared; then the
+                model as it is does not suffice, and numbers that are off by little count too.
         """
         measured, every = self.measured, nuisances_of(self.measured, baseline.base)
         if not measured.runs or not every.names:
@@ -176,7 +178,7 @@ class Calibrator:
         if self._segments is not baseline.estimator:
             self._segments, self._fits = baseline.estimator, {}
         found = _calibrated(_Search(measured, baseline, every, self._fits), beside)
-        if found and all(found.numbers.little(found.fit.x)):
+        if found and not beside and all(found.numbers.little(found.fit.x)):
             return None
         return _longer(measured, found) if found and found.alone else found
 
