@@ -1,4 +1,4 @@
-// joda._core in Python: the field, and a joint by itself. It does not know MuJoCo.
+// joda._core in Python: the field, learned tables, and a joint by itself. It does not know MuJoCo.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -17,6 +17,7 @@
 #include "end_stop.h"
 #include "field.h"
 #include "joint_simulator.h"
+#include "table.h"
 
 namespace py = pybind11;
 
@@ -33,12 +34,30 @@ std::array<const char*, joda::kTexts> Pointers(const Texts& texts) {
   return out;
 }
 
-py::array_t<double> Coefficients(const joda::PiecewiseCubic& channel) {
-  const auto pieces = channel.Cubics();
-  py::array_t<double> out({py::ssize_t{4}, static_cast<py::ssize_t>(pieces.size())});
-  for (size_t k = 0; k < pieces.size(); ++k) {
-    for (size_t i = 0; i < 4; ++i) out.mutable_at(i, k) = pieces[k][i];
+// Value and slope at each of the places, arrays of their shape; `at` gives them at the i-th.
+template <typename At>
+std::pair<py::array_t<double>, py::array_t<double>> Samples(const py::array& places, At at) {
+  const std::vector<py::ssize_t> shape(places.shape(), places.shape() + places.ndim());
+  py::array_t<double> value(shape), slope(shape);
+  for (py::ssize_t i = 0; i < places.size(); ++i) {
+    const joda::Sample sample = at(i);
+    value.mutable_data()[i] = sample.value;
+    slope.mutable_data()[i] = sample.slope;
   }
+  return {value, slope};
+}
+
+py::array_t<double> List(const std::vector<double>& numbers) {
+  return py::array_t<double>(numbers.size(), numbers.data());
+}
+
+// Coefficients of cubics, constant first: shape (shape, 4).
+py::array_t<double> Cubics(const std::vector<joda::Coefficients>& cubics,
+                           std::vector<py::ssize_t> shape) {
+  shape.push_back(4);
+  py::array_t<double> out(shape);
+  double* to = out.mutable_data();
+  for (const auto& cubic : cubics) to = std::copy(cubic.begin(), cubic.end(), to);
   return out;
 }
 
@@ -109,9 +128,10 @@ std::pair<Dense<double>, Dense<double>> Replay(const joda::JointSimulator& simul
 }  // namespace
 
 PYBIND11_MODULE(_core, module) {
-  module.doc() = "C++ core of JODA: channels of a profile, and a joint by itself.";
+  module.doc() = "C++ core of JODA: channels, tables of learned forces, and a joint by itself.";
 
-  py::class_<joda::PiecewiseCubic>(module, "Channel", R"(A channel of a profile, merged at load.
+  py::class_<joda::PiecewiseCubic>(module, "PiecewiseCubic",
+                                   R"(A channel of a profile, merged at load.
 
 Args:
   text: components as in the plugin's attributes, "label: a b | x ... | y ... ; ...".
@@ -124,29 +144,60 @@ Raises:
            py::arg("nonnegative") = false)
       .def(
           "__call__",
-          [](const joda::PiecewiseCubic& channel, py::array_t<double, py::array::forcecast> s) {
-            py::array_t<double> value(std::vector<py::ssize_t>(s.shape(), s.shape() + s.ndim()));
-            py::array_t<double> slope(std::vector<py::ssize_t>(s.shape(), s.shape() + s.ndim()));
-            const auto dense = py::array_t<double, py::array::c_style>::ensure(s);
-            for (py::ssize_t i = 0; i < dense.size(); ++i) {
-              const joda::Sample sample = channel(dense.data()[i]);
-              value.mutable_data()[i] = sample.value;
-              slope.mutable_data()[i] = sample.slope;
-            }
-            return std::make_pair(value, slope);
+          [](const joda::PiecewiseCubic& channel, const Dense<double>& s) {
+            return Samples(s, [&](py::ssize_t i) { return channel(s.data()[i]); });
           },
           py::arg("s"), "Value and slope d/ds at normalised positions s, arrays of the shape of s.")
       .def("max_stiffness", py::overload_cast<>(&joda::PiecewiseCubic::MaxStiffness, py::const_),
            "Largest stiffness max(-dF/ds, 0) anywhere on the channel.")
       .def_property_readonly(
-          "knots",
-          [](const joda::PiecewiseCubic& channel) {
-            const auto knots = channel.Knots();
-            return py::array_t<double>(knots.size(), knots.data());
-          },
+          "knots", [](const joda::PiecewiseCubic& channel) { return List(channel.Knots()); },
           "Breakpoints in s, shape (n + 1,).")
-      .def_property_readonly("coefficients", &Coefficients,
-                             "c0..c3 of each piece about its left knot, shape (4, n).");
+      .def_property_readonly(
+          "cubics",
+          [](const joda::PiecewiseCubic& channel) {
+            const auto cubics = channel.Cubics();
+            return Cubics(cubics, {static_cast<py::ssize_t>(cubics.size())});
+          },
+          "c0..c3 of each piece about its left knot, shape (n, 4).")
+      .def_property_readonly(
+          "descents", [](const joda::PiecewiseCubic& channel) { return List(channel.Descents()); },
+          "Largest stiffness max(-dF/ds, 0) on each piece, shape (n,).");
+
+  py::class_<joda::Table>(module, "Table",
+                          R"(The table of a learned force: resistance over position and velocity.
+
+Args:
+  interval: a and b in normalised position.
+  positions: increasing, shape (n,).
+  velocities: increasing, rad/s or m/s, shape (m,).
+  y: resistance there, N m or N, shape (n, m).
+
+Raises:
+  ValueError: a number is impossible; one sentence says why.)")
+      .def(py::init([](std::pair<double, double> interval, std::vector<double> positions,
+                       std::vector<double> velocities, const std::vector<std::vector<double>>& y) {
+             return joda::Table(interval, std::move(positions), std::move(velocities), y, true);
+           }),
+           py::arg("interval"), py::arg("positions"), py::arg("velocities"), py::arg("y"))
+      .def(
+          "__call__",
+          [](const joda::Table& table, const Dense<double>& s, const Dense<double>& v) {
+            if (!std::equal(s.shape(), s.shape() + s.ndim(), v.shape(), v.shape() + v.ndim())) {
+              throw py::value_error("s and v must have one shape");
+            }
+            return Samples(s, [&](py::ssize_t i) { return table(s.data()[i], v.data()[i]); });
+          },
+          py::arg("s"), py::arg("v"),
+          "Resistance and its slope d/dv at normalised positions s and velocities v of one shape.")
+      .def_property_readonly(
+          "cubics",
+          [](const joda::Table& table) {
+            const auto rows = static_cast<py::ssize_t>(table.Rows());
+            const auto& cubics = table.Cubics();
+            return Cubics(cubics, {rows, static_cast<py::ssize_t>(cubics.size()) / rows});
+          },
+          "c0..c3 of each row's cubics about their left velocities, shape (n, m - 1, 4).");
 
   module.def("stop_rebound", &joda::Rebound, py::arg("damping"),
              "Restitution of an end stop with this damping, times the timestep; 0 <= it <= 1.");

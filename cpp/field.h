@@ -232,6 +232,13 @@ class PiecewiseCubic {
     return out;
   }
 
+  // Their largest descents max(-dF/ds, 0).
+  std::vector<double> Descents() const {
+    std::vector<double> out;
+    for (size_t k = 0; k < Count(); ++k) out.push_back(Descent(pieces_[k]));
+    return out;
+  }
+
  private:
   static constexpr size_t kBuckets = 32;
 

@@ -3,7 +3,7 @@
 // Along velocity each row is a PCHIP curve, along position the rows are mixed linearly: a mean of
 // two rows resists as both do, and PCHIP lies between neighbouring values, so where the table only
 // resists what is between its points does, too. Beyond the outermost points the outermost values
-// hold; outside the interval there is nothing. See python/joda/field/table.py.
+// hold; outside the interval there is nothing.
 #ifndef JODA_TABLE_H_
 #define JODA_TABLE_H_
 
@@ -50,6 +50,12 @@ class Table {
   }
 
   bool Empty() const { return cubics_.empty(); }
+
+  // How many positions there are, with a row each.
+  size_t Rows() const { return positions_.size(); }
+
+  // The cubics of the first row, of the second, ..., each about its left velocity.
+  const std::vector<Coefficients>& Cubics() const { return cubics_; }
 
   // Resistance R(s, v) and its slope dR/dv.
   Sample operator()(double s, double v) const {

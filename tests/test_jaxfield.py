@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 
-from joda import _core
 from joda.component import Component
-from joda.field import evaluate, jaxfield
+from joda.field import jaxfield, merge
 from joda.profile import Channel, Joint, Profile
 
 jax.config.update("jax_enable_x64", True)
@@ -122,11 +121,11 @@ def test_max_descent_is_the_plugins(combine):
             y = tuple(rng.normal(0, 3, 4).tolist())
             parts.append(Component(interval=(a, b), x=x, y=y))
         channel = Channel(combine=combine, components=tuple(parts))
-        merged = _core.Channel(channel.text(), combine)
+        merged = merge(channel)
         ours = jaxfield.from_channel(channel, components=3, knots=5)
         assert float(descent(ours, -0.1, 1.1)) == pytest.approx(merged.max_stiffness(), rel=1e-9)
-        knots = np.asarray(merged.knots)
-        c = np.asarray(merged.coefficients).reshape(4, -1)
+        knots = merged.knots
+        c = merged.cubics.T
         t = np.linspace(0, 1, 2001)[:, None] * np.diff(knots)
         steepest = (-(c[1] + t * (2 * c[2] + 3 * c[3] * t))).max(0).clip(0)
         for lo, hi in np.sort(rng.uniform(-0.2, 1.2, (10, 2)), axis=1):
@@ -258,14 +257,15 @@ def test_strength_has_a_derivative_at_zero():
 
 def test_profiles_are_mapped_over():
     """One compiled function for profiles of any number of components and control points."""
-    channels = [channel_of(case) for case in GOLDENS if case.combine == "sum"]
+    cases = [case for case in GOLDENS if case.combine == "sum"]
     stacked = jax.tree.map(
         lambda *leaves: jnp.stack(leaves),
-        *(jaxfield.from_channel(channel, **SIZE) for channel in channels),
+        *(jaxfield.from_channel(channel_of(case), **SIZE) for case in cases),
     )
     s = np.linspace(-0.1, 1.1, 97)
     values, slopes = jax.jit(jax.vmap(partial(jaxfield.evaluate), (0, None)))(stacked, s)
-    for channel, value, slope in zip(channels, values, slopes, strict=True):
-        expected, expected_slope = evaluate(channel, s)
+    for case, value, slope in zip(cases, values, slopes, strict=True):
+        curves = [make_field.Curve(*c.interval, c.x, c.y) for c in channel_of(case).components]
+        expected, expected_slope, _ = make_field.evaluate(curves, s, case.combine)
         assert_close(value, expected, 1e-12)
         assert_close(slope, expected_slope, 1e-12)

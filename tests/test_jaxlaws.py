@@ -149,7 +149,7 @@ def test_a_joint_flies_through_its_play_and_shares_its_momentum_with_the_load():
 
 
 @pytest.mark.slow
-def test_a_learned_table_is_numpys_and_filling_changes_nothing():
+def test_a_learned_table_is_the_plugins_and_filling_changes_nothing():
     rng = np.random.default_rng()
     for _ in range(3):
         effect = random_table(rng, 2.0, rows=6, sides=6)

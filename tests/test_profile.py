@@ -57,7 +57,7 @@ def test_a_profile_survives_the_plugins_attributes(profile):
 def test_the_plugin_reads_what_a_profile_writes(profile):
     for name in CHANNELS:
         channel = getattr(profile.channels, name)
-        merged = _core.Channel(channel.text(), channel.combine, name != "conservative")
+        merged = _core.PiecewiseCubic(channel.text(), channel.combine, name != "conservative")
         ends = {end for component in channel.components for end in component.interval}
         assert ends <= set(merged.knots)
 
@@ -211,9 +211,11 @@ LARGEST = {
 def test_the_largest_channel_is_read_and_one_more_is_refused(count, points, sentence, combine):
     parts = tuple(line(k / count, (k + 1) / count, points) for k in range(count))
     channel = Channel(combine=combine, components=parts)
-    assert _core.Channel(channel.text(), combine)(0.99)[0] == pytest.approx(0.99 * count % 1 or 1)
+    assert _core.PiecewiseCubic(channel.text(), combine)(0.99)[0] == pytest.approx(
+        0.99 * count % 1 or 1
+    )
     with pytest.raises(ValueError) as caught:
-        _core.Channel(f"{channel.text()}; {line(0, 1, 2).text()}", combine)
+        _core.PiecewiseCubic(f"{channel.text()}; {line(0, 1, 2).text()}", combine)
     assert str(caught.value) == sentence
     profile = Profile(joint=HINGE, channels=Channels(conservative=channel))
     with pytest.raises(JodaError, match=r"^joint 'door': conservative takes no more: .* at most"):
@@ -289,10 +291,10 @@ def test_each_mistake_in_attributes_has_its_sentence(text, sentence):
 )
 def test_each_mistake_has_its_sentence_in_the_plugin(text, sentence):
     with pytest.raises(ValueError) as caught:
-        _core.Channel(text, nonnegative=True)
+        _core.PiecewiseCubic(text, nonnegative=True)
     assert str(caught.value) == sentence
 
 
 def test_the_plugin_combines_by_sum_or_max():
     with pytest.raises(ValueError, match=r'^must be "sum" or "max", got "min"$'):
-        _core.Channel("", "min")
+        _core.PiecewiseCubic("", "min")

@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-class Channel:
+class PiecewiseCubic:
     """A channel of a profile, merged at load."""
 
     def __init__(self, text: str, combine: str = "sum", nonnegative: bool = False) -> None: ...
@@ -15,7 +15,25 @@ class Channel:
     @property
     def knots(self) -> NDArray[np.float64]: ...
     @property
-    def coefficients(self) -> NDArray[np.float64]: ...
+    def cubics(self) -> NDArray[np.float64]: ...
+    @property
+    def descents(self) -> NDArray[np.float64]: ...
+
+class Table:
+    """The table of a learned force: resistance over position and velocity."""
+
+    def __init__(
+        self,
+        interval: tuple[float, float],
+        positions: Sequence[float],
+        velocities: Sequence[float],
+        y: Sequence[Sequence[float]],
+    ) -> None: ...
+    def __call__(
+        self, s: ArrayLike, v: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    @property
+    def cubics(self) -> NDArray[np.float64]: ...
 
 def stop_rebound(damping: float) -> float: ...
 def stop_damping(restitution: float) -> float: ...

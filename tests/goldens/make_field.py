@@ -75,6 +75,29 @@ def cases():
     ]
 
 
+def evaluate(curves, s, combine):
+    """Value, slope, and whether s is within 1e-9 of a crossing, where the slope is either's."""
+    s, beyond = np.clip(s, 0, 1), (s < 0) | (s > 1)
+    values, slopes = np.full((len(curves) + 2, s.size), np.nan), np.zeros((len(curves) + 2, s.size))
+    for k, (a, b, x, y) in enumerate(curves):
+        curve = PchipInterpolator(x, y, extrapolate=False)
+        covers = (a <= s) & (s <= b)
+        u = (s[covers] - a) / (b - a)
+        values[k, covers], slopes[k, covers] = curve(u), curve.derivative()(u) / (b - a)
+    covered = ~np.isnan(values)
+    if combine == "sum":
+        value, slope = np.where(covered, values, 0).sum(0), np.where(covered, slopes, 0).sum(0)
+        return value, np.where(beyond, 0, slope), np.zeros(s.size, dtype=bool)
+    ranked = np.where(covered, values, -np.inf)
+    top, columns = ranked.argmax(0), np.arange(s.size)
+    second, first = np.sort(ranked, axis=0)[-2:]
+    any_cover = covered.any(0)
+    value = np.where(any_cover, ranked[top, columns], 0)
+    slope = np.where(any_cover & ~beyond, slopes[top, columns], 0)
+    with np.errstate(invalid="ignore"):
+        return value, slope, any_cover & (first - second < 1e-4)  # slopes here are below 1e5
+
+
 def read(path=PATH):
     """All cases of the file."""
     out = []
@@ -114,31 +137,8 @@ def _case(name, combine, curves, rng):
     inside = [[a, a + 0.3 * (b - a), a + 0.8 * (b - a), b] for a, b, _, _ in curves]
     anywhere = np.round(rng.uniform(0, 1, 20), 4)
     s = np.unique(np.concatenate([[-2, -0.01, 0, 1, 1.01, 3], *knots, *inside, anywhere]))
-    value, slope, unclear = _combine(curves, np.clip(s, 0, 1), combine)
-    slope[(s < 0) | (s > 1)] = 0
+    value, slope, unclear = evaluate(curves, s, combine)
     return Case(name, combine, text, s[~unclear], value[~unclear], slope[~unclear])
-
-
-def _combine(curves, s, combine):
-    """Value, slope, and whether s is within 1e-9 of a crossing, where the slope is either's."""
-    values, slopes = np.full((len(curves) + 2, s.size), np.nan), np.zeros((len(curves) + 2, s.size))
-    for k, (a, b, x, y) in enumerate(curves):
-        curve = PchipInterpolator(x, y, extrapolate=False)
-        covers = (a <= s) & (s <= b)
-        u = (s[covers] - a) / (b - a)
-        values[k, covers], slopes[k, covers] = curve(u), curve.derivative()(u) / (b - a)
-    covered = ~np.isnan(values)
-    if combine == "sum":
-        value, slope = np.where(covered, values, 0).sum(0), np.where(covered, slopes, 0).sum(0)
-        return value, slope, np.zeros(s.size, dtype=bool)
-    ranked = np.where(covered, values, -np.inf)
-    top, columns = ranked.argmax(0), np.arange(s.size)
-    second, first = np.sort(ranked, axis=0)[-2:]
-    any_cover = covered.any(0)
-    value = np.where(any_cover, ranked[top, columns], 0)
-    slope = np.where(any_cover, slopes[top, columns], 0)
-    with np.errstate(invalid="ignore"):
-        return value, slope, any_cover & (first - second < 1e-4)  # slopes here are below 1e5
 
 
 def _words(numbers):

@@ -1,6 +1,9 @@
-"""Learned forces with random tables."""
+"""Learned forces with random tables, and a table's resistance by SciPy."""
+
+from collections.abc import Callable
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from joda.effects import LearnedForce
 
@@ -27,6 +30,23 @@ def random_table(rng: np.random.Generator, size: float, rows=4, sides=4, **how) 
     return LearnedForce(
         velocities=tuple(v.tolist()), y=tuple(map(tuple, y.tolist())), **(places | how)
     )
+
+
+def scipys_resistance(table: LearnedForce) -> Callable:
+    """Resistance of a table that reaches over the whole range, by s and v of one shape (n,)."""
+    rows = PchipInterpolator(table.velocities, table.y, axis=1)
+    slopes = rows.derivative()
+
+    def resistance(s, v) -> tuple[np.ndarray, np.ndarray]:
+        """It, and its slope dR/dv."""
+        inside = np.clip(v, table.velocities[0], table.velocities[-1])
+        value, slope = (
+            [np.interp(at, table.positions, row) for at, row in zip(s, of(inside).T, strict=True)]
+            for of in (rows, slopes)
+        )
+        return np.array(value), np.where(inside == v, slope, 0)
+
+    return resistance
 
 
 def random_memory(rng: np.random.Generator, size: float) -> dict:

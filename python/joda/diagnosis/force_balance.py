@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.estimation.segments import Segments
-from joda.field import merge
+from joda.field import evaluate
 from joda.joints.joint_model import JointModel
 from joda.joints.resistance import friction_bounds
 from joda.measured.quasi_static import exerted
@@ -70,7 +70,7 @@ def _missing(
     lo, hi = profile.joint.range
     s = np.clip((q - lo) / (hi - lo), 0.0, 1.0)
     up, down = friction_bounds(profile, s)
-    resisted = np.where(v > 0, up, -down) + merge(profile.channels.damping)(s)[0] * v
+    resisted = np.where(v > 0, up, -down) + evaluate(profile.channels.damping, s)[0] * v
     if joint_model.servo is not None and segments.command is not None:
         total = np.append(0.0, np.cumsum(segments.command))
         command = (total[at[pairs + 1]] - total[at[pairs]]) / steps

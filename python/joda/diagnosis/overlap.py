@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.effects import written_as
-from joda.field import merge
+from joda.field import evaluate
 from joda.profile import CHANNELS, Channels, Profile
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def places(profile: Profile, effect: str, given: Profile | None = None) -> list[
     for name in CHANNELS:  # a catch has friction beside its force: the force comes first
         channel = getattr(own.channels, name)
         if channel.components:
-            value = np.abs(merge(channel)(np.linspace(0, 1, GRID))[0])
+            value = np.abs(evaluate(channel, np.linspace(0, 1, GRID))[0])
             return [_felt(own, level) for own in (value, value - value.min()) for level in LEVELS]
     return [getattr(one, "interval", (0.0, 1.0)) for one in own.effects] or [(0.0, 1.0)]
 

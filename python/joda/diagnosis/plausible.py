@@ -9,7 +9,7 @@ from joda.diagnosis.overlap import divided
 from joda.diagnosis.settings import SETTINGS
 from joda.effects.base import Motion
 from joda.estimation.problem import segments_for
-from joda.field import merge
+from joda.field import evaluate
 from joda.joints.resistance import damping, friction_bounds
 from joda.measured import smoothing
 from joda.measured.measured_joint import Measured
@@ -83,7 +83,7 @@ def unseen_shape(
         channel = getattr(own.channels, name)
         if not channel.components or not seen.any():
             continue
-        y = merge(channel)(s)[0]
+        y = evaluate(channel, s)[0]
         for there in inside:
             edges = y[seen & (np.roll(there, 1) | np.roll(there, -1))]
             other = (
@@ -150,7 +150,7 @@ class Needs:
         for name in CHANNELS:
             channel = getattr(profile.channels, name)
             if channel.components:
-                most = float(np.abs(merge(channel)(grid)[0]).max())
+                most = float(np.abs(evaluate(channel, grid)[0]).max())
                 total += most * (self.speed if name == "damping" else 1.0)
         motion = Motion(self.speed, self.acceleration, self.force, self.travel)
         return total + sum(one.largest_force(motion) for one in profile.effects)

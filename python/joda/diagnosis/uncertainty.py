@@ -25,7 +25,7 @@ from joda.effects.guesses import STRENGTH, TRIAL
 from joda.estimation.estimator import Make, SegmentEstimator
 from joda.estimation.segments import Simulator
 from joda.estimation.unknowns import Unknowns
-from joda.field import merge
+from joda.field import evaluate
 from joda.profile import CHANNELS, Profile
 
 ERRORS = SETTINGS.errors
@@ -195,7 +195,7 @@ def _seen(baseline: Baseline, found: FittedHypothesis) -> tuple[float, tuple[flo
     drawn = (getattr(bare.channels, name) for name in CHANNELS)
     if first := next((one for one in drawn if one.components), None):
         here, all_over = (
-            float(np.abs(merge(first)(np.linspace(a, b, GRID))[0]).max())
+            float(np.abs(evaluate(first, np.linspace(a, b, GRID))[0]).max())
             for a, b in ((low, high), (0.0, 1.0))
         )
         magnitude *= here / all_over if all_over > 0 else 1.0

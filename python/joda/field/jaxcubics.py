@@ -44,23 +44,23 @@ class Cubics:
         return jnp.where(self.b > self.a, self.b - self.a, 1)
 
 
-def pchip(x: Array, y: Array) -> Array:
-    """Coefficients of one curve's cubics about their left knots, shape (knots - 1, 4)."""
-    return pchip_of(x, y, jnp.sum(x < 1.5))
-
-
-def pchip_of(x: Array, y: Array, n: Array) -> Array:
-    """The same where the first n knots are not filling."""
+def pchip_slopes(x: Array, y: Array, n: Array) -> Array:
+    """Slopes dy/dx of one curve at its knots, of which those after the first n are filling."""
     h = jnp.diff(x)
     m = jnp.diff(y) / h
-    inside = _inner_slopes(h, m)
     first = _end_slope(h[0], h[1], m[0], m[1])
     p, q = n - 2, jnp.maximum(n - 3, 0)
     last = _end_slope(h[p], h[q], m[p], m[q])
-    place = jnp.arange(len(x))
-    d = jnp.concatenate((first[None], inside, last[None]))
-    d = jnp.where(place == n - 1, last, d)
-    d = jnp.where(n == 2, m[0], d)
+    d = jnp.concatenate((first[None], _inner_slopes(h, m), last[None]))
+    d = jnp.where(jnp.arange(len(x)) == n - 1, last, d)
+    return jnp.where(n == 2, m[0], d)
+
+
+def pchip_cubics(x: Array, y: Array, n: Array) -> Array:
+    """Coefficients of its cubics about their left knots, constant first, shape (knots - 1, 4)."""
+    h = jnp.diff(x)
+    m = jnp.diff(y) / h
+    d = pchip_slopes(x, y, n)
     c2 = (3 * m - 2 * d[:-1] - d[1:]) / h
     c3 = (d[:-1] + d[1:] - 2 * m) / h**2
     return jnp.stack((y[:-1], d[:-1], c2, c3), axis=1)

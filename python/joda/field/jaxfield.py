@@ -18,7 +18,7 @@ from jax.typing import ArrayLike
 
 from joda import profile
 from joda.component import Component
-from joda.field.jaxcubics import Array, Cubics, curve, largest, pchip
+from joda.field.jaxcubics import Array, Cubics, curve, largest, pchip_cubics
 from joda.field.jaxmerge import merge
 
 __all__ = [
@@ -170,9 +170,9 @@ def prepare(channel: Channel, pieces: bool = False) -> Cubics:
         c = jnp.zeros((0, knots - 1, 4), channel.y.dtype)
         last = jnp.zeros(0, int)
         return Cubics(channel.a, channel.b, channel.x, last, c, None, channel.combine)
-    c = channel.strength * jax.vmap(pchip)(channel.x, channel.y)
-    last = jnp.sum(channel.x < 1.5, axis=1) - 1
-    cubics = Cubics(channel.a, channel.b, channel.x, last, c, None, channel.combine)
+    count = jnp.sum(channel.x < 1.5, axis=1)
+    c = channel.strength * jax.vmap(pchip_cubics)(channel.x, channel.y, count)
+    cubics = Cubics(channel.a, channel.b, channel.x, count - 1, c, None, channel.combine)
     if not pieces:
         return cubics
     return replace(cubics, pieces=merge(cubics))

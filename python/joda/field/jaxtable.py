@@ -13,7 +13,7 @@ import numpy as np
 
 from joda.component import MAX_VALUE
 from joda.effects.learned_force import EDGE, LearnedForce
-from joda.field.jaxcubics import Array, cubic, pchip_of
+from joda.field.jaxcubics import Array, cubic, pchip_cubics
 
 register = jax.tree_util.register_dataclass
 
@@ -83,7 +83,7 @@ def prepare(table: Table) -> Patches:
     """Does once what does not depend on the state."""
     v = table.velocities
     count = jnp.sum(v < FILLING)
-    c = jax.vmap(lambda row: pchip_of(v, row, count))(table.y)
+    c = jax.vmap(lambda row: pchip_cubics(v, row, count))(table.y)
     return Patches(table.interval, table.positions, v, v[count - 1], count - 1, c)
 
 

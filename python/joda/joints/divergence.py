@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.field.reference import evaluate
+from joda.field import evaluate
 from joda.joints.joint_model import JointModel
 from joda.profile import Profile
 

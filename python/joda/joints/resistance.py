@@ -12,7 +12,7 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
-from joda.field import merge
+from joda.field import evaluate
 from joda.field.table import resistance
 from joda.profile import Channel, Profile
 
@@ -34,7 +34,7 @@ def friction_bounds(
         two arrays of shape (n,), N·m or N; the friction force is between minus the first and the
         second.
     """
-    both = merge(profile.channels.friction)(s)[0]
+    both = evaluate(profile.channels.friction, s)[0]
     sides = {"positive": np.zeros_like(both), "negative": np.zeros_like(both)}
     for effect in profile.effects:
         if isinstance(effect, StribeckFriction):
@@ -59,7 +59,7 @@ def damping(profile: Profile, s: ArrayLike, v: ArrayLike) -> Array:
     Returns:
         shape (n,), N·m·s/rad or N·s/m.
     """
-    out = merge(profile.channels.damping)(s)[0]
+    out = evaluate(profile.channels.damping, s)[0]
     v = np.asarray(v, float)
     up = np.where(v > 0, 1.0, 0.0)
     ways = {"both": np.ones_like(up), "positive": up, "negative": 1 - up}
@@ -76,4 +76,4 @@ def damping(profile: Profile, s: ArrayLike, v: ArrayLike) -> Array:
 
 def _curve(curve: Curve, s: ArrayLike) -> Array:
     component = Component(interval=curve.interval, x=curve.x, y=curve.y)
-    return merge(Channel(components=(component,)))(s)[0]
+    return evaluate(Channel(components=(component,)), s)[0]

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.field import merge
+from joda.field import evaluate
 from joda.measured import smoothing
 from joda.measured.runs import QuasiStatic, Run
 from joda.profile import Profile
@@ -60,7 +60,7 @@ class Barrier:
         spring = profile.channels.conservative
         forces = np.interp(self.positions, found.positions, found.gravity_force)
         if spring.components:
-            forces = forces + merge(spring)(own)[0]
+            forces = forces + evaluate(spring, own)[0]
         self.own = float(np.abs(forces).max())
 
     def excludes(self, one: Run | QuasiStatic, room: float) -> NDArray[np.bool_]:

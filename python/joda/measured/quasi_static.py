@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from joda.effects import GravityOffset, LoadDependentFriction
 from joda.errors import JodaError
-from joda.field import merge
+from joda.field import evaluate
 from joda.joints.resistance import friction_bounds
 from joda.joints.rig import gravity_factors
 from joda.measured import smoothing
@@ -179,7 +179,7 @@ def held_force(profile: Profile, weight: Array, position: Array, direction: Arra
 
 def exerted(profile: Profile, s: Array, position: Array) -> Array:
     """A profile's force over normalised position s, and position (rad or m), N·m or N."""
-    out = merge(profile.channels.conservative)(s)[0]
+    out = evaluate(profile.channels.conservative, s)[0]
     for effect in profile.effects:
         if isinstance(effect, GravityOffset):
             out = out + effect.sin * np.sin(position) + effect.cos * np.cos(position) + effect.force

@@ -17,7 +17,7 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
-from joda.field.reference import evaluate
+from joda.field import evaluate
 from joda.joints.resistance import damping, friction_bounds
 from joda.pictures.bars import component_strip
 from joda.pictures.learned import SPEEDS, table_panel

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.component import Component
-from joda.field.reference import evaluate
+from joda.field import evaluate
 from joda.pictures.style import COLOURS, INK, house_style, text_width
 from joda.profile import CHANNELS, Channel
 from joda.template import Curve, Template

@@ -173,34 +173,29 @@ def rebounds() -> Array:
 
 
 @lru_cache(maxsize=4096)
-def _merged(text: str, combine: str) -> core.Channel:
-    return core.Channel(text, combine)
+def _merged(text: str, combine: str) -> core.PiecewiseCubic:
+    return core.PiecewiseCubic(text, combine)
 
 
-def _pieces(channel: core.Channel, knots: Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _pieces(
+    channel: core.PiecewiseCubic, knots: Array
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Which piece of a channel begins at or before each knot, and whether it reaches beyond."""
     piece = np.searchsorted(channel.knots, knots, side="right") - 1
     inside = (piece >= 0) & (piece < len(channel.knots) - 1)
     return np.where(inside, piece, 0), inside
 
 
-def _about(channel: core.Channel, knots: Array) -> Array:
+def _about(channel: core.PiecewiseCubic, knots: Array) -> Array:
     """Coefficients about each of these knots, shape (knots, 4); 0 outside the channel's own."""
     piece, inside = _pieces(channel, knots)
-    c0, c1, c2, c3 = channel.coefficients[:, piece]
+    c0, c1, c2, c3 = channel.cubics[piece].T
     t = knots - channel.knots[piece]
     about = (((c3 * t + c2) * t + c1) * t + c0, (3 * c3 * t + 2 * c2) * t + c1, 3 * c3 * t + c2, c3)
     return np.where(inside[:, None], np.stack(about, axis=1), 0)
 
 
-def _descents(channel: core.Channel, knots: Array) -> Array:
+def _descents(channel: core.PiecewiseCubic, knots: Array) -> Array:
     """The largest descent on the channel's piece that begins at or before each knot, or 0."""
-    width = np.diff(channel.knots)
-    _, c1, c2, c3 = channel.coefficients
-    slopes = [c1, c1 + width * (2 * c2 + 3 * width * c3)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        vertex = -c2 / (3 * c3)
-    vertex = np.where((vertex > 0) & (vertex < width), vertex, 0)
-    slopes.append(c1 + vertex * (2 * c2 + 3 * vertex * c3))
     piece, inside = _pieces(channel, knots)
-    return np.where(inside, np.maximum(0, -np.min(slopes, axis=0))[piece], 0)
+    return np.where(inside, channel.descents[piece], 0)

@@ -5,7 +5,7 @@ import numpy as np
 from joda.component import Component
 from joda.diagnosis.hypotheses.base import Array, Bounds
 from joda.diagnosis.settings import SETTINGS
-from joda.field import merge
+from joda.field import evaluate
 from joda.profile import Channel
 
 WIDTHS = (0.08, 0.13, 0.2, 0.3, 0.42, 0.6)
@@ -64,7 +64,7 @@ def felt(
     """
     a, b = part.interval
     grid = np.linspace(a, b, GRID)
-    value = np.abs(merge(Channel(components=(part,)))(grid)[0])
+    value = np.abs(evaluate(Channel(components=(part,)), grid)[0])
     there = grid[value >= level * value.max()]
     low, high = float(there[0]), float(there[-1])
     return a if to_ends and a <= 0.0 else low, b if to_ends and b >= 1.0 else high
