@@ -14,7 +14,7 @@ from joda.hidden import draw, write
 from joda.measured.adequacy import WINDOWS, residual_pattern
 from joda.measured.comparison import sentences
 from joda.measured.errors import EXPLAINED, MULTIPLE
-from joda.measured.failing import COLUMNS, FORCE
+from joda.measured.failing_intervals import COLUMNS, FORCE
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run
 

@@ -10,7 +10,7 @@ from lids import FRICTION, INERTIA, RATE, SCENE, SIGMA, SPAN, thrown
 
 from joda import compare
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.coverage import too_little
+from joda.diagnosis.data_sufficiency import too_little
 from joda.diagnosis.free_runs import free_runs
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError

@@ -13,7 +13,7 @@ from joda.measured.adequacy import Adequacy, adequacy
 from joda.measured.comparison import Comparison, sentences
 from joda.measured.curves import curve_error, curves_verdict, failing_force
 from joda.measured.errors import Errors, errors, known
-from joda.measured.failing import LENGTHS, Failing, where, window_rows
+from joda.measured.failing_intervals import LENGTHS, Failing, where, window_rows
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
 from joda.measured.measured_joint import Measured
 from joda.measured.reading import read_measured

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.adding import Error, error
-from joda.diagnosis.coverage import hardly_moved
+from joda.diagnosis.data_sufficiency import hardly_moved
 from joda.diagnosis.outcome import parting
 from joda.diagnosis.plausible import Needs
 from joda.diagnosis.shape_refinement import resolved

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
-from joda.diagnosis.coverage import at_rest
+from joda.diagnosis.data_sufficiency import at_rest
 from joda.diagnosis.departures import FAITHFUL, Departures, departures, given_parts, restored
 from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.hypotheses import Hypothesis

@@ -24,7 +24,7 @@ from joda.diagnosis.corrections import (
     off_without,
     one_factor,
 )
-from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
+from joda.diagnosis.data_sufficiency import at_rest, moved_one_way, too_little, too_noisy
 from joda.diagnosis.end_stops import OtherEnds, suited, with_other_ends
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import FreeRuns, worst

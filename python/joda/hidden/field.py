@@ -17,10 +17,10 @@ from joda.hidden.gestures import Session, perform, shove, some, sweep, toss, tra
 from joda.hidden.instrument import drawn
 from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
-from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Hidden, Sampler
 from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
+from joda.hidden.uncatalogued import BEYOND
 
 TIMED = "periodic_disturbance"
 SLOW = 0.7, 2.0

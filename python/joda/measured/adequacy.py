@@ -15,7 +15,7 @@ from scipy.stats import binomtest, norm
 
 from joda.measured.data_checks.timing import repeats
 from joda.measured.errors import MULTIPLE, Errors, Missed
-from joda.measured.failing import FORCE, LENGTHS
+from joda.measured.failing_intervals import FORCE, LENGTHS
 from joda.measured.measured_joint import Measured
 from joda.measured.runs import Run
 from joda.measured.whiteness import drifts, free_parts, strays
@@ -73,7 +73,7 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     Args:
         measured: the joint and its runs.
         found: errors of their replays.
-        rows: of `joda.measured.failing.window_rows`.
+        rows: of `joda.measured.failing_intervals.window_rows`.
     """
     whole = [one for one in found.missed if one.time is None]
     pieces = [one for one in found.missed if one.time is not None]
@@ -141,7 +141,7 @@ def residual_pattern(rows: Array) -> float | None:
     position and velocity.
 
     Args:
-        rows: of `joda.measured.failing.window_rows`, in the order of time.
+        rows: of `joda.measured.failing_intervals.window_rows`, in the order of time.
 
     Returns:
         Bonferroni-corrected p-value of the runs tests (Wald and Wolfowitz, Ann. Math. Stat. 11

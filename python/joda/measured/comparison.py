@@ -7,7 +7,7 @@ from json import dumps
 from joda.measured.adequacy import LOUD, Adequacy, Adequate
 from joda.measured.curves import CurveError, FailingForce, curves_described
 from joda.measured.errors import MULTIPLE, Missed, RunError
-from joda.measured.failing import Failing
+from joda.measured.failing_intervals import Failing
 from joda.plain import plain
 from joda.scenes.contacts import Contact
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.measured.adequacy import CHANCE, Adequate, runs_test, sign_test
-from joda.measured.failing_intervals import BINS, failing_intervals, significant
 from joda.measured.quasi_static import QuasiStaticComparison
+from joda.measured.significant_bins import BINS, significant, significant_intervals
 from joda.profile import Joint
 
 SAID = 0.1
@@ -103,7 +103,9 @@ def failing_force(curves: Sequence[QuasiStaticComparison], joint: Joint) -> list
         ("position", np.linspace(0, 1, BINS + 1), (place - lo) / (hi - lo)),
         ("direction", np.array([-1.0, 0.0, 1.0]), way / 2),
     ):
-        for interval, inside in failing_intervals(edges, values, found, apart=by == "direction"):
+        for interval, inside in significant_intervals(
+            edges, values, found, apart=by == "direction"
+        ):
             means = [excess[inside & (way == d)].mean() for d in (1, -1) if d in way[inside]]
             error = float(np.sqrt(np.mean(excess[inside] ** 2)))
             if by == "direction" and max(map(abs, means)) < AGREE * error:

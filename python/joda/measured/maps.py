@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.measured.failing import FORCE, window_rows
+from joda.measured.failing_intervals import FORCE, window_rows
 from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import QuasiStaticComparison, static_force
 from joda.measured.runs import Run

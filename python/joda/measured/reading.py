@@ -24,11 +24,11 @@ from joda.measured.slow_runs import as_curve
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.angles import implausible_range
-from joda.scenes.besides import acting_besides
 from joda.scenes.context import Context, context
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
 from joda.scenes.native import own_friction_row, whole_profile
 from joda.scenes.scene import profiles_of
+from joda.scenes.unmodelled import unmodelled_elements
 
 Array = NDArray[np.float64]
 
@@ -106,13 +106,13 @@ def read_measured(
     notes = [*checked(logs.read, found, float(compiled.opt.timestep)), *logs.notes]
     clear = clear_of_contacts(compiled, number, found, profile, logs.read)
     notes += clear.notes
-    if besides := acting_besides(compiled, number):
+    if unmodelled := unmodelled_elements(compiled, number):
         notes.append(
             f"In the scene more acts on joint '{name}' than itself, gravity and contacts: "
-            f"{', '.join(besides)}; a replay of the joint by itself leaves that out."
+            f"{', '.join(unmodelled)}; a replay of the joint by itself leaves that out."
         )
     return taken(
-        compiled, number, found, profile, clear, notes, whole=not besides, servo=logs.servo
+        compiled, number, found, profile, clear, notes, whole=not unmodelled, servo=logs.servo
     )
 
 

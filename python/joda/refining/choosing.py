@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.measured import smoothing
+from joda.measured.coupling import coupling_force
 from joda.measured.driven import Logs, joints_in
 from joda.measured.misfit import rms
-from joda.measured.others import force_of_others
 from joda.measured.scene_log import SceneRun, read_scene_run
 from joda.measured.touching import touching
 from joda.refining.engine import JointEngine
@@ -123,7 +123,7 @@ def _dependence(model: mujoco.MjModel, joint: int, runs: Sequence[SceneRun]) -> 
         if inside.any():
             first, second = max(pairs, key=lambda pair: pairs[pair])
             return f"as '{first}' touches '{second}' in {run.name}, or may"
-        force = force_of_others(model, joint, run.time, positions)
+        force = coupling_force(model, joint, run.time, positions)
         moved = rms(force) / inertia * WINDOW**2 / 2
         if moved > CLEARLY * smoothing.noise(run.time, run.position):
             unit = "N·m" if joint_type(model, joint) == "hinge" else "N"
@@ -138,5 +138,5 @@ def _alone(model: mujoco.MjModel, run: SceneRun) -> SceneRun:
     if len(run.joints) == 1:
         return replace(run, among=True)
     positions = dict(zip(run.joints, run.positions.T, strict=True))
-    force = force_of_others(model, run.joints[0], run.time, positions)
+    force = coupling_force(model, run.joints[0], run.time, positions)
     return replace(run, force=run.force + force, forced=True, among=True)

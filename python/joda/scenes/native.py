@@ -46,7 +46,7 @@ def whole_profile(model: mujoco.MjModel, joint: int, profile: Profile) -> Profil
     Returns:
         a profile that alone makes the joint move as it does in the scene: what the scene's flags
         disable is not in it. The cubic part of a damping polynomial is left out
-        (`joda.scenes.besides`).
+        (`joda.scenes.unmodelled`).
     """
     dof = model.jnt_dofadr[joint]
     springs, damps, rubs = (is_on(model, flag) for flag in ("spring", "damper", "frictionloss"))

@@ -1,4 +1,4 @@
-"""What other joints of a log do to a joint: a force, by MuJoCo along the measured motion."""
+"""Coupling: the force of other joints of a log on a joint, by MuJoCo along the measured motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ def motion(time: Array, position: Array, over: float = SMOOTHED) -> Motion:
     return Motion(*found)
 
 
-def force_of_others(
+def coupling_force(
     model: mujoco.MjModel,
     joint: int,
     time: Array,
@@ -98,7 +98,7 @@ def _needed(model: mujoco.MjModel, motions: Mapping[int, Motion]) -> Array:
     return out
 
 
-def error_of_others(time: Array, force: Array, shorter: Array) -> Array:
+def coupling_force_std(time: Array, force: Array, shorter: Array) -> Array:
     """Standard deviation of that force, as white noise from sample to sample, shape (n,).
 
     What another smoothing makes of it tells its error; that is the same over the time smoothed, so
