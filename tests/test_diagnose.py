@@ -180,7 +180,8 @@ def test_a_wrong_effect_never_raises_the_error(hidden):
 
 @pytest.mark.long
 def test_the_stairs_never_rise(hidden, monkeypatch):
-    monkeypatch.setattr(improvement, "MOST", 1)
+    one = replace(improvement.ADDING, max_effects=1)
+    monkeypatch.setattr(improvement, "ADDING", one)
     page = hidden.folder / "story.html"
     output = hidden.folder / "improved.xml"
     result = improve(hidden.folder / "model.xml", "joint", hidden.runs, output, report=page)

@@ -15,7 +15,7 @@ from joda.cases.base import Latch, LetGo, Press, bundled
 from joda.cases.baselines import Baseline, fit_forces, fit_motions
 from joda.cases.gallery import Shown, gallery, span
 from joda.cases.subject import Subject
-from joda.cases.tried import WAYS, try_case
+from joda.cases.trial import WAYS, try_case
 from joda.component import Component
 from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scenes.model import load_model

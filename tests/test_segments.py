@@ -389,7 +389,7 @@ def test_when_a_force_jumped_between_two_samples_is_not_known():
 def _spans(segments):
     """First and last times of the segments that have enough samples."""
     rows = [row[row >= 0] for row in segments.rows]
-    return [segments.time[row[[0, -1]]] for row in rows if len(row) >= smoothing.LEAST]
+    return [segments.time[row[[0, -1]]] for row in rows if len(row) >= smoothing.MIN_SAMPLES]
 
 
 def test_a_good_fit_stays_as_it_is(tmp_path):

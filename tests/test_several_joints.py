@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from joda import JodaError, compare, compare_all, diagnose_all, improve_all
+from joda.measured.contact_samples import NEAR, touching
 from joda.measured.coupling import coupling_force
 from joda.measured.reading import read_measured
 from joda.measured.scene_replay import replayed_together
-from joda.measured.touching import NEAR, touching
 
 ARM = """<mujoco>
   <compiler angle="radian"/>

@@ -76,7 +76,7 @@ def _pieces(number: int, run) -> Iterator[Piece]:
     count = max(int((run.time[-1] - run.time[0]) / WINDOW + 1e-9), 1)
     for begin in run.time[0] + WINDOW * np.arange(count):
         inside = (run.time >= begin - 1e-9) & (run.time <= begin + WINDOW + 1e-9)
-        if np.count_nonzero(inside) < smoothing.LEAST:
+        if np.count_nonzero(inside) < smoothing.MIN_SAMPLES:
             continue
         x = smoothing.smooth(run.time, run.position, np.array([begin]), sigma)
         yield Piece(

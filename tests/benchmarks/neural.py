@@ -20,7 +20,7 @@ from hidden_cases import read
 from neural_network import Moved, Network, Replays
 
 from joda.diagnosis.adding import clearly, error, fallen, replayed
-from joda.diagnosis.learning.choosing import learn
+from joda.diagnosis.learning.term_selection import learn
 from joda.diagnosis.paired_test import worse
 from joda.diagnosis.shape_refinement import Likelihood
 from joda.diagnosis.split import parted

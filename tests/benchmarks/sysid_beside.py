@@ -100,7 +100,7 @@ def pieces_of(measured: Measured) -> list[Piece]:
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         for begin in np.arange(run.time[0], run.time[-1] - WINDOW + 1e-9, WINDOW):
             inside = (run.time > begin + h) & (run.time <= begin + WINDOW + 1e-9)
-            if np.count_nonzero(inside) < smoothing.LEAST:
+            if np.count_nonzero(inside) < smoothing.MIN_SAMPLES:
                 continue
             x = smoothing.smooth(run.time, run.position, np.array([begin]), sigma)
             start = np.array([x.position, x.velocity])

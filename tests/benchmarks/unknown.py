@@ -13,7 +13,7 @@ import numpy as np
 from hidden_cases import read
 
 from joda.diagnosis.adding import error
-from joda.diagnosis.learning.choosing import learn
+from joda.diagnosis.learning.term_selection import learn
 from joda.diagnosis.split import parted
 from joda.hidden import FAMILIES, draw
 

@@ -11,7 +11,7 @@ from joda.cases import CASES, Case
 from joda.cases.base import bundled, unit_shown
 from joda.cases.gallery import Shown, command, gallery
 from joda.cases.picture import draw_case
-from joda.cases.tried import Tried, try_case, write_baselines
+from joda.cases.trial import Tried, try_case, write_baselines
 from joda.commands.simulate import Simulated, simulate
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, write_bytes, write_text

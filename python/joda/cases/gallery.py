@@ -6,9 +6,9 @@ from typing import Any
 
 from joda.cases.base import Case
 from joda.cases.baselines import Baseline
-from joda.cases.improved import Predicted
 from joda.cases.picture import TITLES
-from joda.cases.tried import WAYS
+from joda.cases.refinement_case import Predicted
+from joda.cases.trial import WAYS
 
 INTRO = """# Gallery
 

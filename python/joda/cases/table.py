@@ -5,7 +5,7 @@ door shuts by itself from a few degrees, and otherwise stays where it was left.
 """
 
 from joda.cases.base import Case, Latch, LetGo, Press
-from joda.cases.improved import Predicted, gravity_cabinet
+from joda.cases.refinement_case import Predicted, gravity_cabinet
 
 NEARLY = (0.018, 0.034)
 """Nearly closed, of the way: there a door that shuts itself is to shut."""

@@ -18,7 +18,7 @@ from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_run
 from joda.measured.measured_joint import Measured
 from joda.measured.reading import read_measured
 from joda.measured.replay import left_out
-from joda.measured.stepping import timestep_note
+from joda.measured.timestep_error import timestep_note
 from joda.measured.visited import unvisited
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded

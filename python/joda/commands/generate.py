@@ -16,7 +16,7 @@ from joda.propose.asking import Effort, ProposalFailed
 from joda.propose.history import History
 from joda.propose.session import PICTURES, Pictures, Progress, Session, relative, silent
 from joda.scenes.model import find_joint, joint_name, joint_type, load_model
-from joda.scenes.shelf import loading_once
+from joda.scenes.model_cache import loading_once
 from joda.template import read_templates
 
 ROUNDS = 3

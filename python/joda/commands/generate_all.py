@@ -25,7 +25,7 @@ from joda.propose.offline import Offline
 from joda.propose.session import PICTURES, Pictures, Session
 from joda.propose.sheet import Entry, sheet
 from joda.scenes.model import load_model
-from joda.scenes.shelf import loading_once
+from joda.scenes.model_cache import loading_once
 
 Advance = Callable[[int, int, str], None]
 Results = dict[str, Generated | JodaError]

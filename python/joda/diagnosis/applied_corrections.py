@@ -7,7 +7,7 @@ from typing import Any
 
 from joda.measured.measured_joint import Measured
 from joda.measured.sensing import RIGHT, Sensing
-from joda.scenes.weights import Heavier
+from joda.scenes.mass_attributes import Heavier
 
 
 @dataclass(frozen=True)

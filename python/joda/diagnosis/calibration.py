@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 ALSO_AN_EFFECT: NuisanceName = "force_offset"
 """A number in whose place an effect always explains as much: a constant force."""
-LEAST_FACTOR = 1e-3
+MIN_FACTOR = 1e-3
 """Below which a factor of the model's own strengths counts as that."""
 LONGEST = 1.5
 """Length of the segments in which numbers are fitted at last, s."""
@@ -370,7 +370,7 @@ def _concluded(
     samples = max(estimator.samples, 1.0)
     left, before = excess(fit.loss, samples), excess(baseline.fit.loss, samples)
     base = own.base
-    off = np.log(np.maximum(fit.x[: base.count], LEAST_FACTOR)) / base.unknowns.prior_std
+    off = np.log(np.maximum(fit.x[: base.count], MIN_FACTOR)) / base.unknowns.prior_std
     if "force_scale" in names and len(off):  # masses and strengths may all be off by one factor
         off = off - off.mean()
     usual = float(off @ off) < SETTINGS.corrections.surprising**2  # else something resists

@@ -35,7 +35,7 @@ WIDE = 2.0
 """How far a search begins to look, in those."""
 SEARCHED, SETTLING = 15, 4
 """Models that it tries for each number, and iterations that fit the starts of one."""
-FEW = 4
+ITERATIONS = 4
 """Iterations after that."""
 ROUGH = 3
 """Iterations in which segments that are far off count in full; as many again of the best trials."""
@@ -47,7 +47,7 @@ FINEST = 3
 """How many times the places at which a size differs along the way become more."""
 LOST = 10.0
 """Mean square residual of segments, in the median, from which a model's fit leads nowhere."""
-MANY = 4000
+MANY_SAMPLES = 4000
 """Samples that count as many: from there on, what was fitted first is hardly in the way."""
 
 
@@ -123,7 +123,9 @@ def initial_points(
 
     A factor that is far off may stand in for what is missing; many samples lead back from there.
     """
-    far = estimator.samples < MANY and np.any(np.abs(fit.x - given.x) > SETTINGS.search.stand_in)
+    far = estimator.samples < MANY_SAMPLES and np.any(
+        np.abs(fit.x - given.x) > SETTINGS.search.stand_in
+    )
     fits = [fit, given] if far else [fit]
     wide = [CAUCHY_SCALE * usual(estimator, one) for one in fits]
     return tuple(
@@ -296,7 +298,7 @@ def perturbed(
         for way in (-by, by):
             x = best.x.copy()
             x[k] += way
-            trial = estimator.fit(make, unknowns, x, best.start, FEW)
+            trial = estimator.fit(make, unknowns, x, best.start, ITERATIONS)
             if trial.loss < best.loss - SETTINGS.search.equal_loss:
                 best = estimator.fit(make, unknowns, trial.x, trial.start)
     return _free(

@@ -20,11 +20,11 @@ IMPACTS = SETTINGS.impacts
 
 Array = NDArray[np.float64]
 
-MOST = 24
+MAX_SEGMENTS = 24
 """Segments with impacts at an end from which on only some are looked at."""
 RATIOS = np.linspace(0.2, 0.95, 11)
 """Restitutions that are tried."""
-FEWEST = 3
+MIN_RATIOS = 3
 """Restitutions between which the best one is told, at the least."""
 SHORTEST, TIMES = 6, 8
 """Steps that an impact lasts at the least without damping, and how many durations are tried."""
@@ -174,15 +174,15 @@ def impacts_at(segments: Segments, base: BaseModel, given: JointModel) -> dict[i
                 continue
             ratios = np.append(RATIOS, mean)
         tried = np.unique(ratios[(ratios > own + IMPACTS.min_restitution) & (ratios <= RATIOS[-1])])
-        if len(tried) < FEWEST:
+        if len(tried) < MIN_RATIOS:
             continue
         out[side] = Impacts(some_of(segments, numbers), given, own, times, tried)
     return out
 
 
 def some_of(segments: Segments, numbers: NDArray[np.intp]) -> SegmentEstimator:
-    """Of the segments with these numbers, or of `MOST` of them at most, evenly spread."""
-    kept = np.isin(np.arange(len(segments.at)), numbers[:: len(numbers) // MOST + 1])
+    """Of the segments with these numbers, or of `MAX_SEGMENTS` of them at most, evenly spread."""
+    kept = np.isin(np.arange(len(segments.at)), numbers[:: len(numbers) // MAX_SEGMENTS + 1])
     return SegmentEstimator(segments.only(kept), np.ones(int(kept.sum()), bool))
 
 

@@ -78,14 +78,14 @@ def improved(
         the stairs, the first one the model as it was; and why there are no more, a sentence.
     """
     steps = [Step(None, measured.profile, error(parts[1]))]
-    why = f"{ADDING.most_effects} effects were added; that is as many as are tried."
+    why = f"{ADDING.max_effects} effects were added; that is as many as are tried."
     try:
         if measured.joint_model.servo and (
             first := _numbers_first(parts, steps[0].error, progress)
         ):
             parts = _driven(parts, first.servo)
             steps.append(first)
-        while len(steps) <= ADDING.most_effects:
+        while len(steps) <= ADDING.max_effects:
             progress("diagnose")
             given = steps[-1].profile
             found = diagnosed(_with(parts, given)[0], calibrate=len(steps) == 1)
@@ -217,7 +217,7 @@ def _next(parts: Parts, last: Step, latest: Diagnosed, progress: Progress) -> li
     if latest.unexplained_by and not last.added and not parts[0].joint_model.servo:
         train = parts[0].changed(last.profile)
         known, found = False, pairs(train, latest.unexplained_by, progress)
-    for number, (first, *second) in enumerate(found[: ADDING.most_tried]):
+    for number, (first, *second) in enumerate(found[: ADDING.max_tried]):
         if known and number and first.probability < ADDING.min_probability:
             return []
         most = ADDING.max_error if known or not number else ADDING.max_error_unlikely

@@ -180,7 +180,7 @@ class Needs:
 
 def _speed(time: Array, position: Array) -> float:
     """Largest over a few samples, so that noise hardly counts."""
-    n = min(smoothing.LEAST, len(time) - 1)
+    n = min(smoothing.MIN_SAMPLES, len(time) - 1)
     return float(np.max(np.abs(position[n:] - position[:-n]) / (time[n:] - time[:-n])))
 
 

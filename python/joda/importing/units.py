@@ -16,7 +16,7 @@ MODEL, RAW = "model", "raw"
 ALIASES = {"percent": "0..100", "degrees": "deg", "radians": "rad", "degree": "deg", "%": "0..100"}
 SLACK = 0.1
 """How far beyond a joint's range, in parts of it, measured positions may lie in the right unit."""
-LEAST = 0.05
+MIN_RANGE_SHARE = 0.05
 """Least part of a range, or of a unit's whole scale, that the joint which moves most has moved: a
 log in radians read as degrees moves less, and so does one read as percents."""
 FULL = 0.95
@@ -163,7 +163,9 @@ def decided(seen: Sequence[Seen], units: Sequence[str]) -> tuple[str, str]:
 
 
 def _fits(seen: Sequence[Seen], unit: str) -> bool:
-    return all(one.within(unit) for one in seen) and any(one.part(unit) >= LEAST for one in seen)
+    return all(one.within(unit) for one in seen) and any(
+        one.part(unit) >= MIN_RANGE_SHARE for one in seen
+    )
 
 
 def _sure(seen: Sequence[Seen], unit: str, units: Sequence[str]) -> bool:

@@ -20,7 +20,7 @@ NEAR = 0.02
 """How near a contact (in normalised position) a joint that got stuck there may be."""
 OVERLAPS = 0.9
 """What presses over more than this share of the range is no obstacle but drawn into each other."""
-MANY = 3
+MAX_CONTACTS = 3
 """How many contacts are told, those with the largest force first."""
 
 
@@ -129,7 +129,7 @@ def surroundings(path: Path, joint: str) -> Surroundings | None:
 
 def touching(contacts: Sequence[Contact]) -> str:
     """The contacts with the largest forces in words."""
-    hardest = sorted(contacts, key=lambda one: -one.force)[:MANY]
+    hardest = sorted(contacts, key=lambda one: -one.force)[:MAX_CONTACTS]
     out = [
         f"'{one.geom}' touches '{one.other}' from s = {one.interval[0]:.2f} to "
         f"{one.interval[1]:.2f}"

@@ -16,7 +16,7 @@ SHORTER = 0.2
 """Another time, with which its error is told, s."""
 GRID = 401
 """Positions at which what a joint needs by itself is asked for."""
-FEWEST = 9
+MIN_SAMPLES = 9
 """Samples over which it is smoothed at least."""
 
 
@@ -34,7 +34,7 @@ def motion(time: Array, position: Array, over: float = SMOOTHED) -> Motion:
     count = len(time)
     grid = np.linspace(time[0], time[-1], count)
     gap = float(grid[1] - grid[0])
-    wide = min(max(round(over / gap), FEWEST) | 1, count - 1 + count % 2)
+    wide = min(max(round(over / gap), MIN_SAMPLES) | 1, count - 1 + count % 2)
     even = np.interp(grid, time, position)
     found = [
         np.interp(time, grid, savgol_filter(even, wide, min(ORDER, wide - 1), deriv=k, delta=gap))

@@ -14,7 +14,7 @@ from joda.profile import Joint
 
 SAID = 0.1
 """What is less than this share of the larger one is not said."""
-MOST = 6
+MAX_INTERVALS = 6
 """Most places that are told."""
 AGREE = 0.5
 """Least mean error of a direction, in units of its RMS, that is the direction's: what changes its
@@ -26,7 +26,7 @@ LINE = 0.01
 """Chance that one period stands out of noise as it does, below which it is none."""
 WILD = 6.0
 """Error of a single sample, in units of the noise, that no noise makes."""
-FEW = 15
+MIN_SAMPLES = 15
 """Fewest samples of a curve that give one."""
 TOO_LOUD = (
     "what the force does from sample to sample is much of all that it does, whether that is noise "
@@ -136,7 +136,7 @@ def curves_verdict(
     beyond = failing or any(significant(row) or row[:, 2].max() > WILD**2 for row in rows)
     if beyond or any(_pattern(curve) < CHANCE for curve in curves):
         return "beyond_noise"
-    few = any(len(curve.excess) < FEW for curve in curves)
+    few = any(len(curve.excess) < MIN_SAMPLES for curve in curves)
     return "not_enough_data" if few or any(map(too_loud, curves)) else "within_noise"
 
 
@@ -154,7 +154,7 @@ def _periodic(curve: QuasiStaticComparison) -> bool:
     for one in (1, -1):
         there = np.flatnonzero(way == one)
         error = curve.excess[there[np.argsort(position[there], kind="stable")]]
-        if len(error) < FEW or not np.ptp(error) > 0:
+        if len(error) < MIN_SAMPLES or not np.ptp(error) > 0:
             continue
         power = np.abs(np.fft.rfft(error - error.mean())[1:]) ** 2
         count = len(power)
@@ -198,14 +198,14 @@ def curves_described(
             "show no fault of the model that is larger."
         )
     elif verdict == "not_enough_data":
-        why = f"a curve has fewer than {FEW} samples, or {TOO_LOUD}"
+        why = f"a curve has fewer than {MIN_SAMPLES} samples, or {TOO_LOUD}"
         out.append(f"Not enough to tell whether the model is right: {why}")
     elif not failing:
         out.append(
             "Small, but not noise: the force's error is larger than noise makes it, or its signs "
             "have a pattern that noise makes in fewer than 1 of 200 cases."
         )
-    return out + [_failing_described(place, unit) for place in failing[:MOST]]
+    return out + [_failing_described(place, unit) for place in failing[:MAX_INTERVALS]]
 
 
 def _failing_described(place: FailingForce, unit: str) -> str:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
+from joda.measured.contact_samples import touching
 from joda.measured.coupling import SHORTER, SMOOTHED, coupling_force, coupling_force_std
 from joda.measured.run_files import read_measurement, read_together
-from joda.measured.runs import LEAST, QuasiStatic, Run, evened
+from joda.measured.runs import MIN_SAMPLES, QuasiStatic, Run, evened
 from joda.measured.sensing import RIGHT, Sensing
 from joda.measured.table import header
-from joda.measured.touching import touching
 from joda.scenes.actuators import Drive, Servo, actuators_on, drive_of
 from joda.scenes.model import joint_name
 
@@ -154,7 +154,7 @@ def _with_coupling(
             f"'{pair[0]}' '{pair[1]}'{more}."
         )
     inner = np.abs(run.time - (run.time[0] + run.time[-1]) / 2) <= (np.ptp(run.time) - SMOOTHED) / 2
-    if inner.sum() < LEAST or len(positions) == 1:
+    if inner.sum() < MIN_SAMPLES or len(positions) == 1:
         return run, notes
     return run.part(np.flatnonzero(inner)), notes  # the ends are smoothed from one side only
 

@@ -40,7 +40,7 @@ FORCE = 8
 COLUMNS = 13
 IMPACT = 12
 """Column of the rows: whether the joint is at an end of its range in the window."""
-MOSTLY = 0.8
+MIN_IMPACT_SHARE = 0.8
 """Part of what is beyond the noise at ends from which speed, direction, time and load are told by
 other windows alone: an impact has all of these, but by its place."""
 LEFT = 0.5
@@ -113,7 +113,7 @@ def failing_intervals(rows: Array) -> list[Failing]:
     beyond = np.maximum(found[:, 2] - found[:, 1], 0.0)
     rest = np.ones(len(rows), bool)
     impacts = rows[:, IMPACT] > 0
-    if beyond[impacts].sum() > MOSTLY * beyond.sum():
+    if beyond[impacts].sum() > MIN_IMPACT_SHARE * beyond.sum():
         rest = ~impacts
     out = _by("position", values[:, 0], found, beyond)
     others: tuple[By, ...] = ("velocity", "direction", "time", "load")
@@ -134,7 +134,7 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
     """
     rows = []
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        least = (smoothing.LEAST + 1) * float(np.median(np.diff(run.time)))
+        least = (smoothing.MIN_SAMPLES + 1) * float(np.median(np.diff(run.time)))
         windows = measured.replayer.windows(run, sigma, max(length, least))
         rows += [
             [*_row(measured, run, sigma, window), float(_at_end(measured, run, sigma, window))]

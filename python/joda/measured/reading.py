@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 CLEARLY = 0.9
 """Part of the error in windows to which another friction row must bring it."""
-ENOUGH, BRIEFLY = 4, 15.0
+ROW_RUNS, ROW_DURATION = 4, 15.0
 """Runs that tell which row that is, and how much of each, s."""
 SURELY = 20.0
 """Squared misfits, in noises, by which MuJoCo's own row must be better to be the one replayed."""
@@ -47,7 +47,7 @@ FINEST = 1e-6
 """Least noise, in units of the range."""
 STEPS = 5_000_000
 """Most timesteps of a run that are simulated."""
-LEAST = 0.7
+MIN_NOISE = 0.7
 """The same of a run, in units of the noise of all runs together: one encoder measured them all."""
 
 
@@ -141,7 +141,7 @@ def taken(
     notes, step = list(notes), float(model.opt.timestep)
     timed = tuple(run for run in clear.measured if isinstance(run, Run))
     usual = smoothing.pooled_noise([(run.time, run.position) for run in timed])
-    least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
+    least = max(FINEST * float(np.ptp(profile.joint.range)), MIN_NOISE * usual)
     sigma = tuple(max(smoothing.noise(run.time, run.position), least) for run in timed)
     row = own_friction_row(model, joint)
     own = replace(joint_model(found, profile, model, joint), servo=servo)
@@ -150,9 +150,10 @@ def taken(
         yielding = replace(own, friction_row=row)
         other = Replayer(found, profile, yielding, step)
         some = [
-            run.part(np.flatnonzero(run.time < run.time[0] + BRIEFLY)) for run in timed[:ENOUGH]
+            run.part(np.flatnonzero(run.time < run.time[0] + ROW_DURATION))
+            for run in timed[:ROW_RUNS]
         ]
-        errors = [missed(one, some, sigma[:ENOUGH]) for one in (replayer, other)]
+        errors = [missed(one, some, sigma[:ROW_RUNS]) for one in (replayer, other)]
         samples = sum(len(run.time) for run in some)
         gain = samples * (errors[0] ** 2 - errors[1] ** 2) / float(np.mean(np.square(sigma)))
         if errors[1] < CLEARLY * errors[0] or gain > SURELY:

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 WINDOW = 0.4
 """Length of a window, s."""
-MOST = 1000
+MAX_SEGMENTS = 1000
 """Most windows of a run that are replayed."""
 AT_ONCE = 100_000
 """Steps of a whole run that are held in memory together."""
@@ -66,10 +66,10 @@ def left_out(runs: Sequence[Run], shortest: float) -> list[str]:
     """A sentence for each run of which not every window of this length (s) is replayed."""
     lasting = [(run.name, float(np.ptp(run.time))) for run in runs]
     return [
-        f"{name}: {duration:.4g} s are replayed as a whole, and in at most {MOST} windows of each "
-        "length, evenly spread."
+        f"{name}: {duration:.4g} s are replayed as a whole, and in at most {MAX_SEGMENTS} windows "
+        "of each length, evenly spread."
         for name, duration in lasting
-        if duration > MOST * shortest
+        if duration > MAX_SEGMENTS * shortest
     ]
 
 
@@ -141,7 +141,7 @@ class _Beginning:
     @property
     def count(self) -> int:
         """Of the samples within `HORIZON`, at least as many as can be smoothed."""
-        return max(int(np.searchsorted(self.time, HORIZON, side="right")), smoothing.LEAST)
+        return max(int(np.searchsorted(self.time, HORIZON, side="right")), smoothing.MIN_SAMPLES)
 
 
 @dataclass(frozen=True)
@@ -388,7 +388,7 @@ class Replayer:
     def windows(self, run: Run, sigma: float, length: float = WINDOW) -> list[Window]:
         """The run in windows one after another; where the force is unknown there are none.
 
-        Of more than `MOST` windows so many are replayed, evenly spread over the run.
+        Of more than `MAX_SEGMENTS` windows so many are replayed, evenly spread over the run.
         """
         steps = max(round(length / self.h), 2)
         length = steps * self.h
@@ -399,7 +399,7 @@ class Replayer:
         last = np.searchsorted(run.time, begins + length + 1e-9, side="right")
         for begin, a, b in zip(begins, first, last, strict=True):
             samples = np.arange(a, b)
-            if len(samples) >= smoothing.LEAST and not np.isnan(run.force[samples]).any():
+            if len(samples) >= smoothing.MIN_SAMPLES and not np.isnan(run.force[samples]).any():
                 pieces.append(samples)
                 kept.append(begin)
         if not kept:
@@ -489,7 +489,7 @@ def _known(run: Run) -> tuple[Array, Array]:
     """Times from 0 on (s) and forces, to where the force is unknown; none if that is too short."""
     unknown = np.flatnonzero(np.isnan(run.force))
     end = int(unknown[0]) if len(unknown) else len(run.time)
-    known = slice(0, end if end >= smoothing.LEAST else 0)
+    known = slice(0, end if end >= smoothing.MIN_SAMPLES else 0)
     return run.time[known] - run.time[0], run.force[known]
 
 
@@ -501,8 +501,8 @@ def _command(run: Run, count: int, every: slice = slice(None)) -> tuple[Array, A
 
 
 def _spread(count: int) -> Array:
-    """At most `MOST` of the numbers below `count`, evenly."""
-    return np.round(np.linspace(0, count - 1, min(count, MOST)))
+    """At most `MAX_SEGMENTS` of the numbers below `count`, evenly."""
+    return np.round(np.linspace(0, count - 1, min(count, MAX_SEGMENTS)))
 
 
 def _fitted(

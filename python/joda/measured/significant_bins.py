@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 BINS = 10
-LEAST = 3
+MIN_ROWS = 3
 """Fewest rows in a bin that can be significant."""
 CERTAIN = 5.0
 """Standard deviations above what noise makes, from which an error counts as significant."""
@@ -44,7 +44,7 @@ def significant(rows: Array) -> bool:
 
     Without the worst row: a window that begins in an impact may have a wrong start.
     """
-    if len(rows) < LEAST:
+    if len(rows) < MIN_ROWS:
         return False
     kept = np.argsort(rows[:, 2] / rows[:, 1])[:-1]
     samples, squares = rows[kept, 1].sum(), rows[kept, 2].sum()

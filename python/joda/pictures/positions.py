@@ -24,8 +24,8 @@ from joda.pictures.scene_renderer import SceneRenderer, View
 from joda.pictures.style import COMPRESSED, clean
 from joda.profile import Joint
 from joda.scenes.model import describe_joint, find_joint, load_model
+from joda.scenes.model_cache import shelf_name
 from joda.scenes.part import Array, moving
-from joda.scenes.shelf import shelf_name
 
 ARROW = (0.95, 0.36, 0.05)
 AXIS = (0.12, 0.12, 0.14)

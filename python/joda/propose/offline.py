@@ -16,7 +16,7 @@ from joda.errors import JodaError
 from joda.interaction.pulling import SLOW
 from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
 from joda.propose import Answer, Task, Turn
-from joda.propose.added import RISING, WISHED
+from joda.propose.added_effects import RISING, WISHED
 from joda.propose.adjustment import adjusted_strengths, rescale
 from joda.propose.archetype import Archetype
 from joda.propose.archetype_effects import ArchetypeEffect

@@ -20,7 +20,7 @@ become so much smaller."""
 HOPELESS, HARDLY = 10.0, 0.2
 """Error in units of the noise, and of curves of that before, from which such a change explains too
 little."""
-MOST_LEFT = 0.3
+MAX_ERROR_RATIO = 0.3
 """Part of windows' error before that a fit may leave beyond that."""
 CAUSES = (
     "the unit, clock, sign or joint of the measurement may be another, a mass or an effect of the "
@@ -84,7 +84,7 @@ def _hardly_better(before: Error, after: Error, noise: float) -> str | None:
     if after.whole is None or after.window <= HOPELESS * noise:
         return None
     for part, was, now in _parts(before, after):
-        if now > (WORSE if part == "whole" else MOST_LEFT) * was:
+        if now > (WORSE if part == "whole" else MAX_ERROR_RATIO) * was:
             return (
                 f"what was fitted would still be missed by {now:.3g} instead of {was:.3g}"
                 f"{_in(after, part)}, {now / noise:.0f} times the noise: {CAUSES}"

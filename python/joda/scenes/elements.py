@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict
 from joda.profile import Joint
 from joda.scenes.contacts import contacts_along
 from joda.scenes.engine import polynomial
-from joda.scenes.native import LEAST
+from joda.scenes.native import MIN_FRICTION
 from joda.scenes.unmodelled import unmodelled_elements
 
 
@@ -92,7 +92,7 @@ def elements(model: mujoco.MjModel, joint: int, described: Joint) -> Elements:
     friction = float(model.dof_frictionloss[dof])
     return Elements(
         damping=polynomial(model, "dof_damping", dof)[0],
-        frictionloss=friction if friction > LEAST else 0.0,
+        frictionloss=friction if friction > MIN_FRICTION else 0.0,
         stiffness=polynomial(model, "jnt_stiffness", joint)[0],
         springref=float(model.qpos_spring[model.jnt_qposadr[joint]]),
         armature=float(model.dof_armature[dof]),

@@ -10,9 +10,9 @@ from pydantic import ValidationError
 
 from joda.errors import JodaError
 from joda.profile import Joint, describe
-from joda.scenes.copies import refuse_copied_plugins
 from joda.scenes.engine import FORGETS_INSTANCES
-from joda.scenes.shelf import Loaded, kept
+from joda.scenes.model_cache import Loaded, kept
+from joda.scenes.plugin_copies import refuse_copied_plugins
 
 _TYPES = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name

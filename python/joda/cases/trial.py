@@ -7,7 +7,7 @@ from pathlib import Path
 
 from joda.cases.base import Case, bundled
 from joda.cases.baselines import Baseline, fit_forces, fit_motions
-from joda.cases.improved import SCENE, Predicted, improved, measure
+from joda.cases.refinement_case import SCENE, Predicted, improved, measure
 from joda.cases.subject import Subject
 from joda.commands.generate import ROUNDS, run
 from joda.files import write_text

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.measured import smoothing
+from joda.measured.contact_samples import touching
 from joda.measured.coupling import coupling_force
 from joda.measured.driven import Logs, joints_in
 from joda.measured.misfit import rms
 from joda.measured.scene_log import SceneRun, read_scene_run
-from joda.measured.touching import touching
 from joda.refining.engine import JointEngine
 from joda.scenes.model import joint_name, joint_type
 from joda.scenes.scene import profiles_of

@@ -12,7 +12,7 @@ from joda.propose.offline import Offline
 from joda.propose.session import NONE, Session
 from joda.scenes import model as loading
 from joda.scenes.model import load, load_model
-from joda.scenes.shelf import KEPT, loading_once, shelf_name
+from joda.scenes.model_cache import KEPT, loading_once, shelf_name
 
 PAIR = """<mujoco><compiler angle="radian"/>
   <asset><texture name="wood" type="2d" builtin="checker" width="64" height="64" rgb1="1 .8 .5"/>

@@ -13,7 +13,7 @@ from joda.diagnosis.learning.ensemble import (
     over_position,
     over_speed,
 )
-from joda.diagnosis.learning.experiment import narrowing
+from joda.diagnosis.learning.experiment_design import narrowing
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.formula import Formula, formula
 from joda.diagnosis.learning.law import Memory

@@ -11,7 +11,7 @@ from joda import context
 from joda.effects import EndStopRestitution
 from joda.estimation.profile_parameters import KINDS, Parameters
 from joda.joints import joint_model
-from joda.refining.between import Between
+from joda.refining.discontinuities import Between
 from joda.refining.engine import JointEngine
 from joda.refining.shooting import Shooting
 
