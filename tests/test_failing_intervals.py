@@ -88,7 +88,7 @@ def test_noise_free_runs_that_stick_blame_no_tiny_force(friction, spring, rest, 
     blamed = [abs(place.force) for place in found.failing if place.force is not None]
     assert not blamed or min(blamed) > 1e-3 * friction
     measured = read_measured(path, "lid", [runs[0]])
-    (window, *_) = measured.replayer.windows(read_run(runs[0]), measured.sigma[0])
+    (window, *_) = measured.replayer.segments(read_run(runs[0]), measured.sigma[0])
     assert window.force == 0.0 and np.isinf(window.force_error)  # friction holds it at rest
 
 

@@ -61,7 +61,7 @@ def test_in_mujoco_the_true_profile_moves_as_in_the_simulator(number):
     _, held_out = read(case)
     true = held_out.changed(true_profile(case, held_out.profile))
     pairs = zip(true.runs, true.sigma, strict=True)
-    missed = [rms(w.misfit) for run, sigma in pairs for w in true.replayer.windows(run, sigma)]
+    missed = [rms(w.misfit) for run, sigma in pairs for w in true.replayer.segments(run, sigma)]
     # a half, as windows that end in a knock, or go over a barrier or just not, tell of luck
     part = 0.25 if effect == "end_stop_restitution" else 0.5
     assert np.quantile(missed, part) < 3 * case.noise

@@ -216,7 +216,7 @@ def test_the_nearest_known_effect_is_told_with_what_it_misses(times):
     told = Account(**none, along=False, memory="none", nearest=nearest, unit="rad", force_unit="")
     last = account_sentences(told)[-1]
     assert last.startswith("Nearest of what has a name: viscous damping; with it")
-    assert last.endswith(f"missed by {times:.2g} times what it is missed by with the law.")
+    assert last.endswith(f"the held-out error is {times:.2g} times that of the law.")
 
 
 def test_the_demo_judges_what_was_learned():

@@ -309,8 +309,8 @@ def test_starts_of_a_joint_that_runs_away_are_found_from_what_is_early_in_a_segm
     segments = segments_of(runs, 3 * [SIGMA], 2.0, -1.0, 1.0, STEP, 0.9)
     assert len(segments.at) == 3
     begun = np.stack([start, start, start - [0.0, 0.07]])
-    doubt = np.tile([10 * SIGMA, 0.1], (3, 1))
-    off = replace(segments, start=begun, prior_std=doubt)
+    prior_std = np.tile([10 * SIGMA, 0.1], (3, 1))
+    off = replace(segments, start=begun, prior_std=prior_std)
     estimator = SegmentEstimator(off, np.ones(3, bool))
     alone = estimator._descended(Hill(), begun, estimator.squares(Hill(), begun)[1], 8)
     assert np.array_equal(alone.squares > 10 * segments.count, [False, False, True])

@@ -47,7 +47,7 @@ from joda.hidden.cases import VISIBLE
 from joda.measured import smoothing
 from joda.measured.measured_joint import Measured
 from joda.measured.reading import read_measured
-from joda.measured.replay import WINDOW
+from joda.measured.replay import SEGMENT_LENGTH
 
 Array = np.ndarray
 
@@ -96,10 +96,10 @@ class Piece:
 def pieces_of(measured: Measured) -> list[Piece]:
     """All runs in windows."""
     h, out = measured.timestep, []
-    t = h * np.arange(round(WINDOW / h) + 1)
+    t = h * np.arange(round(SEGMENT_LENGTH / h) + 1)
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        for begin in np.arange(run.time[0], run.time[-1] - WINDOW + 1e-9, WINDOW):
-            inside = (run.time > begin + h) & (run.time <= begin + WINDOW + 1e-9)
+        for begin in np.arange(run.time[0], run.time[-1] - SEGMENT_LENGTH + 1e-9, SEGMENT_LENGTH):
+            inside = (run.time > begin + h) & (run.time <= begin + SEGMENT_LENGTH + 1e-9)
             if np.count_nonzero(inside) < smoothing.MIN_SAMPLES:
                 continue
             x = smoothing.smooth(run.time, run.position, np.array([begin]), sigma)

@@ -113,9 +113,9 @@ CASES = (
         name="cabinet_improved",
         model="cabinet.xml",
         joint="door",
-        claim="Three measured releases, and a run in which a hand takes the flap to and fro, show "
-        "that the proposed profile lacks something; with what `joda improve` finds and adds, it "
-        "predicts other releases.",
+        claim="Three measured releases, and a run in which a hand moves the flap in both "
+        "directions, show that the proposed profile lacks something; with what `joda improve` "
+        "finds and adds, it predicts other releases.",
         meaning="let go where it was not measured: root mean square of the distance to what the "
         "object does, over 2 s",
         unit="angle",

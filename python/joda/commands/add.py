@@ -261,7 +261,7 @@ def _no_help(told: dict[str, Any], effect: str) -> str | None:
 def _in_doubt(told: dict[str, Any]) -> str | None:
     """Why nothing is added before somebody asks for it by name, a clause; None if nothing is in
     doubt."""
-    doubt = told.get("doubt")
+    doubt = told.get("confounder")
     return f"{doubt}; --effect adds it all the same" if isinstance(doubt, str) else None
 
 

@@ -37,14 +37,13 @@ from joda.profile import Profile
 from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
 
-NO_LESS = "it does not lower the error on what was held out of the fit"
+NO_LESS = "it does not lower the held-out error"
 OWN = (
     "the model's own numbers, fitted without it, do as well on what was held out; joda refine fits "
     "them"
 )
 NOTHING_LEFT = (
-    "what was held out of the fit is missed by no more than the noise even without it, so that it "
-    "cannot tell"
+    "the held-out error is no more than the noise even without it, so that it cannot tell"
 )
 STRENGTHS = (1.0, 3.0, 10.0)
 """Of an effect whose place is known: the trials, in units of the usual one."""
@@ -57,7 +56,7 @@ class Error:
     Attributes:
         whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where none can be
             replayed, as the force at its beginning is unknown, or there are only curves.
-        window: RMS of windows of 0.4 s, rad or m; of curves the force's, N·m or N.
+        window: RMS of segments of 0.4 s, rad or m; of curves the force's, N·m or N.
     """
 
     whole: float | None
@@ -116,7 +115,7 @@ def add_effect(
     """Adds an effect, if that is plausible and runs held out are clearly better with it.
 
     Of what is tried, the likeliest is taken that makes those runs likelier, their error less in
-    windows (a paired test) and not more as a whole, and exerts no force that nothing needs. It may
+    segments (a paired test) and not more as a whole, and exerts no force that nothing needs. It may
     change what the model gave, or act elsewhere than near, only if no other is nearly as good.
 
     Args:
@@ -243,11 +242,12 @@ def by_all(
 
 
 def fallen(before: Error, after: Error) -> bool:
-    """Whether windows are missed by less, or whole runs where windows are too short to show it."""
-    windows = after.window < SETTINGS.adding.max_segment_error * before.window
+    """Whether the segment error is smaller, or that of free runs where segments are too short to
+    show it."""
+    in_segments = after.window < SETTINGS.adding.max_segment_error * before.window
     if before.whole is None or after.whole is None:
-        return windows
-    return windows or (
+        return in_segments
+    return in_segments or (
         after.whole < SETTINGS.adding.whole_run_fall * before.whole and after.window < before.window
     )
 

@@ -56,9 +56,9 @@ def _moving(measured: Measured, segments: Segments) -> int:
         return int(np.ptp(segments.position[own]) / far) if len(own) else 0
 
     usable = segments.usable
-    windows = sum(motions(row) > 0 for row in segments.rows[usable])
+    many = sum(motions(row) > 0 for row in segments.rows[usable])
     runs = (usable & (segments.run == number) for number in np.unique(segments.run))
-    return max(windows, sum(motions(segments.rows[own]) for own in runs))
+    return max(many, sum(motions(segments.rows[own]) for own in runs))
 
 
 def too_little(measured: Measured) -> str:

@@ -100,7 +100,7 @@ def improved(
                     continue
                 own = tuple(one for one in own if one not in steps[-1].corrections)
             steps[-1] = replace(steps[-1], diagnosis=said)
-            if said.doubt:
+            if said.confounder:
                 why = said.summary
                 break
             anew = found.calibration or not steps[-1].corrections

@@ -375,9 +375,9 @@ class AddingSettings:
         chance: largest probability of as clear an improvement by chance (probability).
         changed: by how much a window's error must change to count (noises).
         min_segments: of fewer that change none may become worse, and all together must be better
-            (windows).
+            (segments).
         max_rise: how many times the geometric mean of the errors of whole runs may become.
-        whole_run_fall: to what part that must fall, in every one, where windows are too short to
+        whole_run_fall: to what part that must fall, in every one, where segments are too short to
             show an effect.
         silent: error before, up to which what was held out tells nothing (noises).
         max_segment_error: part of the error before, and of the loss, to which an effect must bring

@@ -177,7 +177,7 @@ class Trials:
         """Fits in longer and longer segments, each from what the one before found."""
         found = []
         for length in lengths:
-            progress(what + (f", windows of {length:.2g} s" if self.train.runs else ""))
+            progress(what + (f", segments of {length:.2g} s" if self.train.runs else ""))
             profile = refitted(self.train, profile, length, parts, law)
             found.append(self.tried(profile))
         return found

@@ -61,7 +61,7 @@ class FailingForce:
         by: what is told apart.
         interval: normalised position; or -1 to 0, 0 to 1 (direction).
         error: RMS error there.
-        force: mean force towards +q that the model has too much there; of the means of both
+        force: mean residual force towards +q (model's less the true one); of the means of both
             directions, where both were measured.
         friction: that it has too much there; None where one direction was measured.
         share: of the sum of squared errors beyond the noise, 0 to 1.
@@ -216,12 +216,15 @@ def _failing_described(place: FailingForce, unit: str) -> str:
     least = SAID * max(abs(place.force), abs(friction))
     share = f"By {place.by}: {100 * place.share:.0f} % of the force's error is {where}, where"
     if max(abs(place.force), abs(friction)) < AGREE * place.error:
-        return f"{share} the model is off by {place.error:.2g} {unit} RMS, with either sign."
+        return f"{share} the residual force is {place.error:.2g} {unit} RMS, with either sign."
     what = []
     if abs(place.force) >= least:
         much = "much" if place.force > 0 else "little"
-        what.append(f"pushes {abs(place.force):.2g} {unit} too {much} towards +q in the mean")
+        what.append(
+            f"the mean residual force is {abs(place.force):.2g} {unit} (the model pushes too "
+            f"{much} towards +q)"
+        )
     if place.friction is not None and abs(friction) >= least:
         much = "much" if friction > 0 else "little"
-        what.append(f"has {abs(friction):.2g} {unit} too {much} friction")
-    return f"{share} the model {' and '.join(what)}."
+        what.append(f"the model's friction is {abs(friction):.2g} {unit} too {much}")
+    return f"{share} {' and '.join(what)}."

@@ -1,4 +1,4 @@
-"""Where a model fails: windows sorted by position, velocity, direction, time and load."""
+"""Where a model fails: segments sorted by position, velocity, direction, time and load."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from joda.measured import smoothing
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
-from joda.measured.replay import Window
+from joda.measured.replay import Segment
 from joda.measured.runs import STOP, Run
 from joda.measured.significant_bins import BINS, significant_intervals
 
@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 By = Literal["position", "velocity", "direction", "time", "load"]
 
 LENGTHS = (0.1, 0.4, 1.6)
-"""Windows that tell where a model fails, s: longer ones where shorter ones show nothing, as a small
-force needs time to move a joint."""
+"""Segments that tell where a model fails, s: longer ones where shorter ones show nothing, as a
+small force needs time to move a joint."""
 PIECES = 40
-"""Of a whole run's replay, where no window shows what its end does."""
+"""Of a whole run's replay, where no segment shows what its end does."""
 LONGEST = 10.0
 """Of a run whose mean residual force is told from its start, s."""
 BLIND = 3.0
@@ -30,7 +30,7 @@ not enough to blame the model."""
 SLIGHT = 0.01
 """Mean residual force of a whole run, in units of what acts on it, that is none."""
 SURE = 2.0
-"""Standard errors from which on the direction of a window's motion is known."""
+"""Standard errors from which on the direction of a segment's motion is known."""
 CLEAR = 3.0
 """Standard deviations from which on a mean residual force is not 0."""
 AGREE = 0.8
@@ -39,10 +39,10 @@ FORCE = 8
 """Column of the rows: residual force; the next is its standard deviation."""
 COLUMNS = 13
 IMPACT = 12
-"""Column of the rows: whether the joint is at an end of its range in the window."""
+"""Column of the rows: whether the joint is at an end of its range in the segment."""
 MIN_IMPACT_SHARE = 0.8
 """Part of what is beyond the noise at ends from which speed, direction, time and load are told by
-other windows alone: an impact has all of these, but by its place."""
+other segments alone: an impact has all of these, but by its place."""
 LEFT = 0.5
 """Part of what is beyond the noise that a mean force must explain to be told."""
 
@@ -55,9 +55,9 @@ class Failing:
         by: what is told apart.
         interval: of it: normalised position, rad/s or m/s, -1 to 0 or 0 to 1 (direction), s, N·m
             or N.
-        error: RMS position error of windows there, rad or m.
-        force: mean force that the model has too much there, N·m or N; None where it changes its
-            sign there, or cannot be told from 0.
+        error: RMS position error of segments there, rad or m.
+        force: mean residual force (model's less the true one) there, N·m or N; None where it
+            changes its sign there, or cannot be told from 0.
         share: of the sum of squared errors beyond the noise, 0 to 1.
         significant: whether noise alone would hardly ever make such an error.
     """
@@ -73,17 +73,17 @@ class Failing:
 def where(
     measured: Measured, paths: Sequence[Array], short: Array, beyond: bool
 ) -> tuple[list[Failing], float]:
-    """Where the model fails, by the shortest windows that show it.
+    """Where the model fails, by the shortest segments that show it.
 
     Args:
         measured: the joint and its runs.
         paths: the model's positions at each run's times.
-        short: rows of the shortest windows.
-        beyond: whether the model is beyond the noise: then longer windows and whole runs are
+        short: rows of the shortest segments.
+        beyond: whether the model is beyond the noise: then longer segments and whole runs are
             searched where these show nothing.
 
     Returns:
-        intervals, the largest share first; and the length of the windows that told, s, 0 for
+        intervals, the largest share first; and the length of the segments that told, s, 0 for
         pieces of whole runs.
     """
     found = failing_intervals(short)
@@ -96,13 +96,13 @@ def where(
 
 
 def _clearly(measured: Measured, found: Sequence[Failing]) -> list[Failing]:
-    """What is missed by several noises: in longer windows small errors of all kinds pile up."""
+    """What is missed by several noises: in longer segments small errors of all kinds pile up."""
     least = BLIND * measured.floor
     return [place for place in found if place.error > least]
 
 
 def failing_intervals(rows: Array) -> list[Failing]:
-    """Where windows are missed by more than noise, the largest share first.
+    """Where segments are missed by more than noise, the largest share first.
 
     Args:
         rows: of `window_rows`.
@@ -125,7 +125,7 @@ def failing_intervals(rows: Array) -> list[Failing]:
 
 
 def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
-    """A row per window; slow sampling makes windows longer.
+    """A row per segment; slow sampling makes segments longer.
 
     Columns: normalised position, velocity, direction / 2, time, load; RMS misfit, samples, sum of
     squares in units of the noise (the position's, and what the force's makes of it), residual
@@ -135,19 +135,19 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
     rows = []
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
         least = (smoothing.MIN_SAMPLES + 1) * float(np.median(np.diff(run.time)))
-        windows = measured.replayer.windows(run, sigma, max(length, least))
+        segments = measured.replayer.segments(run, sigma, max(length, least))
         rows += [
-            [*_row(measured, run, sigma, window), float(_at_end(measured, run, sigma, window))]
-            for window in windows
-            if _tells(window, sigma)
+            [*_row(measured, run, sigma, segment), float(_at_end(measured, run, sigma, segment))]
+            for segment in segments
+            if _tells(segment, sigma)
         ]
     return np.array(rows).reshape(-1, COLUMNS)
 
 
-def _tells(window: Window, sigma: float) -> bool:
+def _tells(segment: Segment, sigma: float) -> bool:
     """Whether its misfit is more than errors of its start and force can make, or near the noise."""
-    error = rms(window.misfit)
-    return error < BLIND * sigma or error > BLIND * window.explained
+    error = rms(segment.misfit)
+    return error < BLIND * sigma or error > BLIND * segment.explained
 
 
 def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
@@ -160,7 +160,7 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
         force = force_error = float("nan")
         squares = np.zeros(2)
         if duration <= LONGEST and len(there) == len(run.time):
-            whole = measured.replayer.windows(run, sigma, duration)
+            whole = measured.replayer.segments(run, sigma, duration)
             if len(whole) == 1:
                 force, force_error = whole[0].force, whole[0].force_error
                 squares = np.array(whole[0].squares)
@@ -171,7 +171,9 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
             if len(samples) > 1:
                 misfit = path[samples] - run.position[samples]
                 part = squares * len(samples) / len(there)
-                piece = Window(samples, misfit, force, force_error, pushed=off, squares=tuple(part))
+                piece = Segment(
+                    samples, misfit, force, force_error, pushed=off, squares=tuple(part)
+                )
                 rows.append([*_row(measured, run, sigma, piece), 0.0])
     return np.array(rows).reshape(-1, COLUMNS)
 
@@ -183,31 +185,31 @@ def _usual_force(measured: Measured, run: Run) -> float:
     return max(load, measured.joint_model.inertia * pace)
 
 
-def _row(measured: Measured, run: Run, sigma: float, window: Window) -> list[float]:
+def _row(measured: Measured, run: Run, sigma: float, segment: Segment) -> list[float]:
     lo, hi = measured.profile.joint.range
-    ends = window.samples[[0, -1]]
-    middle = float(run.position[window.samples].mean())
-    speed, speed_error = _speed(run.time[window.samples], run.position[window.samples], sigma)
+    ends = segment.samples[[0, -1]]
+    middle = float(run.position[segment.samples].mean())
+    speed, speed_error = _speed(run.time[segment.samples], run.position[segment.samples], sigma)
     direction = 0.5 * float(np.sign(speed)) if abs(speed) > SURE * speed_error else 0.0
-    load = float(measured.load(run.part(window.samples)).mean())
-    square = float(np.sum(window.misfit**2) / (sigma**2 + window.pushed**2))
+    load = float(measured.load(run.part(segment.samples)).mean())
+    square = float(np.sum(segment.misfit**2) / (sigma**2 + segment.pushed**2))
     place = (middle - lo) / (hi - lo)
     row = [place, speed, direction, float(run.time[ends].mean()), load]
-    size = rms(window.misfit), len(window.misfit), square
-    return [*row, *size, window.force, window.force_error, *window.squares]
+    size = rms(segment.misfit), len(segment.misfit), square
+    return [*row, *size, segment.force, segment.force_error, *segment.squares]
 
 
 def _speed(time: Array, position: Array, sigma: float) -> tuple[float, float]:
-    """Of a line through a window's positions, and its standard error."""
+    """Of a line through a segment's positions, and its standard error."""
     away = time - time.mean()
     spread = float(away @ away)
     return float(away @ position) / spread, sigma / spread**0.5
 
 
-def _at_end(measured: Measured, run: Run, sigma: float, window: Window) -> bool:
-    """Whether the joint is at an end of its range in a window."""
+def _at_end(measured: Measured, run: Run, sigma: float, segment: Segment) -> bool:
+    """Whether the joint is at an end of its range in a segment."""
     lo, hi = measured.profile.joint.range
-    s, noise = (run.position[window.samples] - lo) / (hi - lo), sigma / (hi - lo)
+    s, noise = (run.position[segment.samples] - lo) / (hi - lo), sigma / (hi - lo)
     reach = STOP + BLIND * noise
     return bool((s < reach).any() or (s > 1 - reach).any())
 

@@ -89,7 +89,8 @@ class QuasiStaticComparison:
 
     @property
     def excess(self) -> Array:
-        """Force towards +q that the model has too much where the direction is known, N·m or N."""
+        """Residual force (model's less the true one) towards +q where the direction is known, N·m
+        or N."""
         known = self.direction != 0
         return np.asarray(self.curve.force[known] - self.force[known])
 

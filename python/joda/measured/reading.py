@@ -18,7 +18,7 @@ from joda.measured.measured_joint import Measured
 from joda.measured.misfit import missed
 from joda.measured.obstructed import Clear, clear_of_contacts
 from joda.measured.quasi_static import beside_model
-from joda.measured.replay import WINDOW, Replayer
+from joda.measured.replay import SEGMENT_LENGTH, Replayer
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow_runs import as_curve
 from joda.profile import Profile
@@ -33,15 +33,15 @@ from joda.scenes.unmodelled import unmodelled_elements
 Array = NDArray[np.float64]
 
 CLEARLY = 0.9
-"""Part of the error in windows to which another friction row must bring it."""
+"""Part of the segment error to which another friction row must bring it."""
 ROW_RUNS, ROW_DURATION = 4, 15.0
 """Runs that tell which row that is, and how much of each, s."""
 SURELY = 20.0
 """Squared misfits, in noises, by which MuJoCo's own row must be better to be the one replayed."""
 YIELDS = (
-    "MuJoCo's own friction row yields near rest (solreffriction, solimpfriction): by it windows of "
-    "{0:g} s are missed by {2:.2g} {3}, by the same friction in a profile, which is what is "
-    "replayed here, by {1:.2g} {3}."
+    "MuJoCo's own friction row yields near rest (solreffriction, solimpfriction): with it the "
+    "segment error ({0:g} s horizon) is {2:.2g} {3}, with the same friction in a profile, which is "
+    "what is replayed here, {1:.2g} {3}."
 )
 FINEST = 1e-6
 """Least noise, in units of the range."""
@@ -159,7 +159,7 @@ def taken(
         if errors[1] < CLEARLY * errors[0] or gain > SURELY:
             own, replayer = yielding, other
         elif errors[0] < CLEARLY * errors[1]:
-            notes.append(YIELDS.format(WINDOW, *errors, found.joint.unit))
+            notes.append(YIELDS.format(SEGMENT_LENGTH, *errors, found.joint.unit))
     static = [curve for curve in clear.measured if isinstance(curve, QuasiStatic)]
 
     def replay(run: Run, sigma: float) -> Array:

@@ -42,7 +42,7 @@ def significant_intervals(
 def significant(rows: Array) -> bool:
     """Whether the rows' sum of squares is beyond what noise makes, and the error noticeable.
 
-    Without the worst row: a window that begins in an impact may have a wrong start.
+    Without the worst row: a segment that begins in an impact may have a wrong start.
     """
     if len(rows) < MIN_ROWS:
         return False

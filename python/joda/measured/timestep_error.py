@@ -19,8 +19,8 @@ def timestep_note(measured: Measured, window: float, whole: float) -> str | None
 
     Args:
         measured: the joint and its runs.
-        window, whole: RMS in windows and of whole runs at the scene's timestep, rad or m; NaN where
-            there is none.
+        window, whole: segment and free-run errors, RMS, at the scene's timestep, rad or m; NaN
+            where there is none.
     """
     least = BEYOND * rms(np.array(measured.sigma))
     step, unit = measured.timestep / FINER, measured.profile.joint.unit
@@ -29,14 +29,14 @@ def timestep_note(measured: Measured, window: float, whole: float) -> str | None
     finer = Replayer(measured.context, measured.profile, measured.joint_model, step)
     # another fault may add up to less in other steps: whole runs must then be within the noise
     tried = (
-        ("windows are", window, missed, CLEARLY * window),
-        ("whole runs are", whole, missed_whole, min(CLEARLY * whole, least)),
+        ("segment error", window, missed, CLEARLY * window),
+        ("free-run error", whole, missed_whole, min(CLEARLY * whole, least)),
     )
     for what, error, of, most in tried:
         if error >= least and (less := of(finer, measured.runs, measured.sigma)) < most:
             return (
-                f"At the scene's timestep of {measured.timestep:g} s {what} missed by {error:.2g} "
-                f"{unit} RMS, at {step:g} s by {less:.2g} {unit}: this much is the timestep's, and "
+                f"At the scene's timestep of {measured.timestep:g} s the {what} is {error:.2g} "
+                f"{unit} RMS, at {step:g} s {less:.2g} {unit}: this much is the timestep's, and "
                 "no effect can mend it."
             )
     return None

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-WINDOW = 0.4
+SEGMENT_LENGTH = 0.4
 """Time over which it counts how far others move the joint, s."""
 CLEARLY = 3.0
 """By how much they must, in noises of its position."""
@@ -124,7 +124,7 @@ def _dependence(model: mujoco.MjModel, joint: int, runs: Sequence[SceneRun]) -> 
             first, second = max(pairs, key=lambda pair: pairs[pair])
             return f"as '{first}' touches '{second}' in {run.name}, or may"
         force = coupling_force(model, joint, run.time, positions)
-        moved = rms(force) / inertia * WINDOW**2 / 2
+        moved = rms(force) / inertia * SEGMENT_LENGTH**2 / 2
         if moved > CLEARLY * smoothing.noise(run.time, run.position):
             unit = "N·m" if joint_type(model, joint) == "hinge" else "N"
             return (
