@@ -59,8 +59,8 @@ def test_the_first_family_draws_what_it_drew_before_there_were_others(args, expe
 def test_every_family_hides_every_effect_and_laws_of_no_catalogue():
     for family in FAMILIES.values():
         assert tuple(family.known) == EFFECTS
-        assert len(family.beyond) >= 6
-        assert not set(family.beyond) & set(EFFECTS)
+        assert len(family.uncatalogued) >= 6
+        assert not set(family.uncatalogued) & set(EFFECTS)
 
 
 @pytest.mark.slow

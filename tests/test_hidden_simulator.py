@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from joda import JodaError
-from joda.hidden import EFFECTS, OUTSIDE, draw, friction_laws, laws, write
+from joda.hidden import EFFECTS, UNCATALOGUED, draw, friction_laws, laws, write
 from joda.hidden.cases import PARTIAL, VISIBLE
 from joda.hidden.joint import base_model, draw_truth
 from joda.hidden.simulator import Tape, simulate
@@ -163,7 +163,7 @@ def test_a_seed_gives_the_same_case():
     assert draw(2, None, forced=False).model != one.model
 
 
-NAMES = [*EFFECTS, *OUTSIDE, "added_inertia"]
+NAMES = [*EFFECTS, *UNCATALOGUED, "added_inertia"]
 
 
 @pytest.mark.slow

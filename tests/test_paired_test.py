@@ -9,7 +9,7 @@ from test_compare import door, runs_of, scene_of
 from joda.component import Component
 from joda.diagnosis.adding import Error
 from joda.diagnosis.paired_test import improves, risen
-from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
+from joda.diagnosis.plausible import Needs, implausible, unvisited_interval, unvisited_shape
 from joda.diagnosis.settings import SETTINGS
 from joda.effects import StribeckFriction
 from joda.measured.reading import read_measured
@@ -102,9 +102,9 @@ def test_an_effect_is_not_placed_where_nobody_was(measured):
     a, b = unvisited_part(near, (0.0, 0.3))[0]
     assert (a, b) == (0.0, 0.3)
     assert visited_share(near, (0.0, 0.3)) == 0.0
-    assert "hardly any run visited s = 0.00 to 0.30" in unseen_place(near, (0.0, 0.3))
-    assert unseen_place(measured, None) is None
-    assert unseen_place(near, (0.0, 1.0)) is None  # a law, not a place
+    assert "hardly any run visited s = 0.00 to 0.30" in unvisited_interval(near, (0.0, 0.3))
+    assert unvisited_interval(measured, None) is None
+    assert unvisited_interval(near, (0.0, 1.0)) is None  # a law, not a place
 
 
 @pytest.mark.parametrize(
@@ -126,9 +126,9 @@ def test_no_effect_turns_or_grows_where_no_run_was(measured, x, y, said):
     seen = measured.with_runs([replace(own, position=there)], [0])
     part = Component(label="detent_internal", interval=(0, 1), x=x, y=y)
     profile = measured.profile.with_component("conservative", part)
-    reason = unseen_shape((seen,), profile, "detent_internal", measured.profile)
+    reason = unvisited_shape((seen,), profile, "detent_internal", measured.profile)
     assert reason is None if said is None else reason.startswith(said), reason
-    assert unseen_shape((seen, measured), profile, "detent_internal", measured.profile) is None
+    assert unvisited_shape((seen, measured), profile, "detent_internal", measured.profile) is None
 
 
 @pytest.mark.slow

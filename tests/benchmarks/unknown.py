@@ -85,7 +85,7 @@ def main() -> None:
     seed = None if given.seed == "fresh" else int(given.seed)
     entropy = np.random.SeedSequence(seed).entropy % 2**32 if seed is None else seed
     print(f"seed {entropy}")
-    rng, laws, rows = np.random.default_rng(entropy), tuple(FAMILIES[given.family].beyond), []
+    rng, laws, rows = np.random.default_rng(entropy), tuple(FAMILIES[given.family].uncatalogued), []
     for number in range(given.cases):
         effect = laws[number % len(laws)]
         row = examined(int(rng.integers(2**31)), effect, given.family)

@@ -17,7 +17,7 @@ from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.overlap import overlap
 from joda.diagnosis.paired_test import MISSED_MORE, risen, worse
-from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
+from joda.diagnosis.plausible import Needs, implausible, unvisited_interval, unvisited_shape
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import (
     LONGEST,
@@ -128,14 +128,14 @@ def add_effect(
         given: the profile of the model as it was given; None: the joint's as it is.
     """
     before, replays = replayed(held)
-    if reason := at_rest(train) or unseen_place(train, near):
+    if reason := at_rest(train) or unvisited_interval(train, near):
         return AddedEffect(train.profile, None, before, before, reason)
     progress("the effect's own numbers")
     given = given or train.profile
     baseline = fit_baseline(train)
     begin = starts(baseline, effect, direction, near)
     trials = Trials(train, held, effect == RESTITUTION, begin[0] if begin else None)
-    tried = [one for start in begin for one in trials.reshaped(start, effect, progress)]
+    tried = [one for start in begin for one in trials.refined_shapes(start, effect, progress)]
     loss = trials.unseen.loss(train.profile)
 
     needs = Needs(train)
@@ -145,7 +145,7 @@ def add_effect(
         reasons = []
         for one in sorted(some, key=lambda one: one.score):
             reason = implausible(needs, one.profile, effect)
-            reason = reason or unseen_shape((train, held), one.profile, effect, train.profile)
+            reason = reason or unvisited_shape((train, held), one.profile, effect, train.profile)
             if not reason and not clearly(one.unseen, loss):
                 reason = NO_LESS
             if not reason:  # replays take longest
@@ -185,7 +185,7 @@ def add_effect(
     if departs.parts:
         progress("the model's own numbers without the effect")
         own = checked(baseline.base.written(baseline.fit.x))
-        without = likeliest(trials.reshaped(own, effect, progress))
+        without = likeliest(trials.refined_shapes(own, effect, progress))
         if _as_good(without, first):
             return AddedEffect(train.profile, None, before, before, OWN)
     return AddedEffect(first.profile, effect, before, after, departs=departs)

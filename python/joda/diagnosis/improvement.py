@@ -94,7 +94,7 @@ def improved(
                 if not (more := _calibrated(parts, steps[-1], found, progress)):
                     why = NOTHING_HELPS
                     break
-                parts = _righted(parts, found.calibration.righted)
+                parts = _corrected(parts, found.calibration.applied)
                 steps += more
                 if steps[-1].profile is not given:
                     continue
@@ -159,8 +159,8 @@ def _calibrated(parts: Parts, last: Step, found: Diagnosed, progress: Progress) 
     or else together with the model's own that were found off beside them, or with the effect that
     was; none if it does not."""
     assert found.calibration
-    right, said = found.calibration.righted, found.diagnosis
-    beside = _with(_righted(parts, right), last.profile)
+    right, said = found.calibration.applied, found.diagnosis
+    beside = _with(_corrected(parts, right), last.profile)
     after = error(beside[1])
     own = tuple(one for one in said.corrections if one.parameter in found.calibration.names)
     alone = Step(None, last.profile, after, said, corrections=own, right=right)
@@ -173,7 +173,7 @@ def _calibrated(parts: Parts, last: Step, found: Diagnosed, progress: Progress) 
     return [alone, *stairs] if stairs and fallen(last.error, stairs[-1].error) else []
 
 
-def _righted(parts: Parts, right: AppliedCorrections) -> Parts:
+def _corrected(parts: Parts, right: AppliedCorrections) -> Parts:
     """Both with numbers set right."""
     train, held = parts
     return right.of(train), right.of(held)

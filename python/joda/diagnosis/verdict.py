@@ -31,8 +31,8 @@ from joda.diagnosis.free_runs import FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.horizons import HorizonSearch, looked
 from joda.diagnosis.joint_calibration import jointly, needed
-from joda.diagnosis.plausible import Needs, unseen_place
-from joda.diagnosis.ranking import Ranking, hopeful, weigh
+from joda.diagnosis.plausible import Needs, unvisited_interval
+from joda.diagnosis.ranking import Ranking, hopeful, select
 from joda.diagnosis.report import experiment_for, finding, likeliest_findings, reported
 from joda.diagnosis.search import Progress, rank
 from joda.diagnosis.selection import Evidence, Selection
@@ -154,7 +154,7 @@ def _together(
         return None
     free = replace(measured, loose=widths)
     ranking = rank(fit_baseline(free), exclude, progress, hopeful, Needs(measured).allow)
-    if not weigh(ranking).likely:
+    if not select(ranking).likely:
         return None
     other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
     if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
@@ -221,7 +221,7 @@ def _concluded(
     every = likeliest_findings(measured, ranking, selection)
     sized = [k for k, one in every.items() if one.sized]
     experiment = experiment_for(measured, ranking, selection, one_way)
-    if not sized or unseen_place(measured, every[sized[0]].interval):
+    if not sized or unvisited_interval(measured, every[sized[0]].interval):
         why = ENDS_LEFT if ranking.restitution else sentences.NO_EFFECT
         if sized:
             there = every[sized[0]].interval
@@ -343,7 +343,7 @@ def _adequate(
         surely = _beside_a_force(measured, baseline, denying)
         pairs = zip(own, surely, strict=True)
         if not all(sure.off(least) for one, sure in pairs if one.off(least)):
-            experiment = experiment_for(measured, ranking, weigh(ranking), one_way=True)
+            experiment = experiment_for(measured, ranking, select(ranking), one_way=True)
             summary = f"{sentences.EITHER.format(off(own, least))}{SAME}."
             return _unexplained(measured, summary + _confounded(measured), experiment)
         own = surely
@@ -463,13 +463,13 @@ def _by_whole_runs(
         plain: what is said where that is nothing.
     """
     whole = in_whole_runs(measured, ranking, stops)
-    again, selection = whole.ranking, weigh(whole.ranking)
+    again, selection = whole.ranking, select(whole.ranking)
     if selection.verdict == "adequate":
         return _by_other_numbers(measured, whole, stops) or plain
     if selection.share > SETTINGS.whole_runs.max_share:
         return plain
     every = likeliest_findings(measured, again, selection)
-    if not every[0].sized or unseen_place(measured, every[0].interval):
+    if not every[0].sized or unvisited_interval(measured, every[0].interval):
         return plain
     report, given = plain.diagnosis, plain.diagnosis.summary
     found = _missing(measured, again, selection, every, report.next_experiment, None)
@@ -527,7 +527,7 @@ def _heavier(
     for number, candidate in enumerate(ranking.candidates):
         if candidate.hypothesis.effect == HEAVIER:
             held = Holdout(ranking.baseline, measured)
-            one = finding(measured, ranking, held, number, weigh(ranking))
+            one = finding(measured, ranking, held, number, select(ranking))
             before = held.as_given  # without it, it is the model's numbers that are off
             one = replace(one, probability=probability, held_out_error_before=before)
             summary = heavier_summary(one, numbers_off)

@@ -19,7 +19,7 @@ from joda.hidden.motions import Draw, drop, flick, hand, ramp, release
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
-from joda.hidden.uncatalogued import BEYOND
+from joda.hidden.uncatalogued import UNCATALOGUED as SHARED
 
 WEIGHTY = ("load_dependent_friction",)
 TIMED = "periodic_disturbance"
@@ -178,14 +178,14 @@ KNOWN: dict[str, Builder] = {
     "backlash": forms.behind((0.01, 0.05), (0.5, 0.85), (100.0, 160.0)),
     "end_stop_restitution": forms.rebound(soft=True, both=0.3),
 }
-STRANGE: dict[str, Builder] = {
+UNCATALOGUED: dict[str, Builder] = {
     "maxwell_relaxation": uncatalogued_forms.two_relaxations,
     "friction_ageing": uncatalogued_forms.ageing,
-    "warming_up": BEYOND["warming_up"],
-    "pulling_cable": BEYOND["pulling_cable"],
+    "warming_up": SHARED["warming_up"],
+    "pulling_cable": SHARED["pulling_cable"],
     "air_cushion": uncatalogued_forms.cushion,
     "lost_motion_damper": uncatalogued_forms.lost_motion,
-    "periodic_disturbance": BEYOND["periodic_disturbance"],
+    "periodic_disturbance": SHARED["periodic_disturbance"],
 }
 
-HOUSEHOLD = Family("household", "door", KNOWN, STRANGE, (), _truth, _encoder, _move)
+HOUSEHOLD = Family("household", "door", KNOWN, UNCATALOGUED, (), _truth, _encoder, _move)

@@ -19,7 +19,7 @@ from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
-from joda.hidden.uncatalogued import BEYOND
+from joda.hidden.uncatalogued import UNCATALOGUED as SHARED
 
 WEIGHTY = ("load_dependent_friction",)
 TIMED = "periodic_disturbance"
@@ -172,9 +172,9 @@ KNOWN: dict[str, Builder] = {
     "backlash": forms.behind((0.005, 0.03), (0.3, 0.7), (50.0, 100.0)),
     "end_stop_restitution": forms.rebound(soft=True, both=0.7),
 }
-STRANGE: dict[str, Builder] = {
+UNCATALOGUED: dict[str, Builder] = {
     "maxwell_relaxation": uncatalogued_forms.two_relaxations,
-    "warming_up": BEYOND["warming_up"],
+    "warming_up": SHARED["warming_up"],
     "running_in": uncatalogued_forms.running_in,
     "periodic_disturbance": uncatalogued_forms.switching,
     "sloshing_load": uncatalogued_forms.sloshing,
@@ -182,4 +182,4 @@ STRANGE: dict[str, Builder] = {
     "air_cushion": uncatalogued_forms.cushion,
 }
 
-MACHINERY = Family("machinery", "axis", KNOWN, STRANGE, (), _truth, _encoder, _move)
+MACHINERY = Family("machinery", "axis", KNOWN, UNCATALOGUED, (), _truth, _encoder, _move)

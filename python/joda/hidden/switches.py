@@ -19,7 +19,7 @@ from joda.hidden.motions import Draw, drop, flick, hand, ramp
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
-from joda.hidden.uncatalogued import BEYOND
+from joda.hidden.uncatalogued import UNCATALOGUED as SHARED
 
 WEIGHTY = ("load_dependent_friction",)
 TIMED = "periodic_disturbance"
@@ -171,14 +171,14 @@ KNOWN: dict[str, Builder] = {
     "backlash": forms.handle((0.02, 0.06), (0.2, 0.6)),
     "end_stop_restitution": forms.rebound(soft=False, both=0.6),
 }
-STRANGE: dict[str, Builder] = {
-    "maxwell_relaxation": BEYOND["maxwell_relaxation"],
+UNCATALOGUED: dict[str, Builder] = {
+    "maxwell_relaxation": SHARED["maxwell_relaxation"],
     "friction_ageing": uncatalogued_forms.ageing,
     "running_in": uncatalogued_forms.running_in,
     "lost_motion_damper": uncatalogued_forms.lost_motion,
     "sloshing_load": uncatalogued_forms.sloshing,
-    "square_root_damping": BEYOND["square_root_damping"],
+    "square_root_damping": SHARED["square_root_damping"],
     "speed_governor": uncatalogued_forms.governor,
 }
 
-SWITCHES = Family("switches", "button", KNOWN, STRANGE, ("backlash",), _truth, _encoder, _move)
+SWITCHES = Family("switches", "button", KNOWN, UNCATALOGUED, ("backlash",), _truth, _encoder, _move)

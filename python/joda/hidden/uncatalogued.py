@@ -90,7 +90,7 @@ def _ratchet(sampler: Sampler) -> Hidden:
     return everywhere(law, force, sampler.unit(), way)
 
 
-BEYOND: dict[str, Builder] = {
+UNCATALOGUED: dict[str, Builder] = {
     "maxwell_relaxation": _relaxation,
     "friction_ageing": _ageing,
     "warming_up": _warming,
