@@ -28,7 +28,7 @@ MIN_RATIOS = 3
 """Restitutions between which the best one is told, at the least."""
 SHORTEST, TIMES = 6, 8
 """Steps that an impact lasts at the least without damping, and how many durations are tried."""
-AROUND = 5
+IMPACT_SAMPLES = 5
 """Samples before and after an impact that tell its speeds."""
 IMPACT_TIME = 0.6
 """In which a joint goes through its range towards an impact, s."""
@@ -235,7 +235,10 @@ def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Ar
     for k in np.flatnonzero(np.isin(sides, ends)):
         row = segments.rows[k]
         own = row[row >= 0]
-        near = max(own[0] - AROUND, 0), min(own[-1] + 1 + 2 * AROUND, len(segments.time))
+        near = (
+            max(own[0] - IMPACT_SAMPLES, 0),
+            min(own[-1] + 1 + 2 * IMPACT_SAMPLES, len(segments.time)),
+        )
         t, y = segments.time[slice(*near)], segments.position[slice(*near)]
         pushed = segments.force[segments.step[slice(*near)]] / base.joint_model.inertia
         noise = 1 / float(segments.sharpness[k, 0])
@@ -245,8 +248,8 @@ def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Ar
             inside[np.argmin(away)] = False
         first = int(np.argmin(inside))  # at the end
         back = first + int(np.argmax(inside[first:]))  # off it again
-        parts = slice(first - AROUND, first), slice(back, back + AROUND)
-        if first < AROUND or back == first or back + AROUND > len(t):
+        parts = slice(first - IMPACT_SAMPLES, first), slice(back, back + IMPACT_SAMPLES)
+        if first < IMPACT_SAMPLES or back == first or back + IMPACT_SAMPLES > len(t):
             continue
         if not inside[parts[1]].all() or (np.diff(t[parts[0].start : parts[1].stop]) <= 0).any():
             continue  # it hops there, or another run begins

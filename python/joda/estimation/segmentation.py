@@ -46,7 +46,7 @@ after stays where it was moved to, and a free one goes on. Where a force or damp
 how it goes on is less well known, so many of the largest may be no more than all others."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a segment's samples share it."""
-BEYOND = 4.0
+OUTSIDE_NOISES = 4.0
 """Noises outside its range at which a joint is beyond it."""
 CLEAR = 1.5
 """How much larger the noise of fast samples must be to count as such."""
@@ -126,7 +126,8 @@ def segments_of(
             enough = np.bincount(segment, minlength=many) >= smoothing.MIN_SAMPLES
             start, prior_std = starts(time, position, time[0] + h * begins, sigma)
             seen = np.minimum(np.searchsorted(index, begins), len(index) - 1)
-            clear = _inside(*place_noise)[seen] > BEYOND  # not beyond the end that threw it back
+            # not beyond the end that threw it back
+            clear = _inside(*place_noise)[seen] > OUTSIDE_NOISES
             start[clear, 0] = np.clip(start[clear, 0], lo, lo + span)
             force = np.interp(time[0] + h * np.arange(steps), time, run.force[piece])
             fresh = np.arange(many) == 0
@@ -418,7 +419,7 @@ def _inside(s: Array, noise: Array) -> Array:
 def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -> Integers:
     """Where segments begin, also where one that began beyond the range comes back into it: what an
     end that yields does to the joint is not known."""
-    beyond = _inside(s, noise) < -BEYOND
+    beyond = _inside(s, noise) < -OUTSIDE_NOISES
     more = []
     for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
         own = beyond[row[row >= 0]]
@@ -432,7 +433,7 @@ def _where_it_stays(
 ) -> Integers:
     """Where long segments begin, also within a stay at an end of `chunk` steps or more: what is
     after half of these tells of the joint, whatever the end did to it before."""
-    at_end = np.abs(np.minimum(s, 1 - s)) < BEYOND * noise
+    at_end = np.abs(np.minimum(s, 1 - s)) < OUTSIDE_NOISES * noise
     rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
     more = []
     for row, impact in zip(rows, _impact_of_each(rows, s, noise), strict=True):
@@ -454,7 +455,7 @@ def _leaves(begins: Integers, index: Integers, s: Array, noise: Array) -> list[s
     found = []
     for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
         own = inside[row[row >= 0]]
-        clear = int(np.argmax(own >= BEYOND)) if len(own) else 0
+        clear = int(np.argmax(own >= OUTSIDE_NOISES)) if len(own) else 0
         if clear:
             there = int(np.flatnonzero(np.append(0.0, own[1:clear]) <= 1)[-1])
             found.append(slice(row[there], row[clear]))
@@ -492,7 +493,7 @@ def _stays(rows: Integers, s: Array, noise: Array) -> Integers:
         if not len(own) or np.ptp(s[own] / noise[own]) > STILL:
             continue
         for side, away in ((-1, s[own]), (1, 1 - s[own])):
-            if np.abs(away.mean()) < BEYOND * noise[own].mean():
+            if np.abs(away.mean()) < OUTSIDE_NOISES * noise[own].mean():
                 stays[own] = side
     return stays
 

@@ -11,7 +11,7 @@ from joda.measured.failing_intervals import Failing
 from joda.plain import plain
 from joda.scenes.contacts import Contact
 
-SAID = 6
+MAX_INTERVALS = 6
 """Most places that are told."""
 
 
@@ -194,7 +194,7 @@ def _rarely(probability: float) -> str:
 def _places(comparison: Comparison) -> Iterator[str]:
     unit = comparison.unit
     force = "N·m" if unit == "rad" else "N"
-    for place in comparison.failing[:SAID]:
+    for place in comparison.failing[:MAX_INTERVALS]:
         a, b = place.interval
         where = {
             "position": f"at s = {a:.2f} to {b:.2f}",

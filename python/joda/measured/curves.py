@@ -12,11 +12,11 @@ from joda.measured.quasi_static import QuasiStaticComparison
 from joda.measured.significant_bins import BINS, significant, significant_intervals
 from joda.profile import Joint
 
-SAID = 0.1
+MIN_SHARE = 0.1
 """What is less than this share of the larger one is not said."""
 MAX_INTERVALS = 6
 """Most places that are told."""
-AGREE = 0.5
+MIN_MEAN_SHARE = 0.5
 """Least mean error of a direction, in units of its RMS, that is the direction's: what changes its
 sign is the place's."""
 LOUD, ALONE = 0.15, 0.05
@@ -24,7 +24,7 @@ LOUD, ALONE = 0.15, 0.05
 place was measured both ways, or one period stands out of it, so that it may be the joint's own."""
 LINE = 0.01
 """Chance that one period stands out of noise as it does, below which it is none."""
-WILD = 6.0
+OUTLIER_NOISES = 6.0
 """Error of a single sample, in units of the noise, that no noise makes."""
 MIN_SAMPLES = 15
 """Fewest samples of a curve that give one."""
@@ -108,7 +108,7 @@ def failing_force(curves: Sequence[QuasiStaticComparison], joint: Joint) -> list
         ):
             means = [excess[inside & (way == d)].mean() for d in (1, -1) if d in way[inside]]
             error = float(np.sqrt(np.mean(excess[inside] ** 2)))
-            if by == "direction" and max(map(abs, means)) < AGREE * error:
+            if by == "direction" and max(map(abs, means)) < MIN_MEAN_SHARE * error:
                 continue
             out.append(
                 FailingForce(
@@ -133,7 +133,7 @@ def curves_verdict(
     nothing is cleared.
     """
     rows = [np.stack([np.ones(len(z)), np.ones(len(z)), z**2], axis=1) for z in map(_z, curves)]
-    beyond = failing or any(significant(row) or row[:, 2].max() > WILD**2 for row in rows)
+    beyond = failing or any(significant(row) or row[:, 2].max() > OUTLIER_NOISES**2 for row in rows)
     if beyond or any(_pattern(curve) < CHANCE for curve in curves):
         return "beyond_noise"
     few = any(len(curve.excess) < MIN_SAMPLES for curve in curves)
@@ -213,9 +213,9 @@ def _failing_described(place: FailingForce, unit: str) -> str:
     where = f"at s = {a:.2f} to {b:.2f}"
     if place.by == "direction":
         where = "while moving towards " + ("+q" if b > 0 else "\N{MINUS SIGN}q")
-    least = SAID * max(abs(place.force), abs(friction))
+    least = MIN_SHARE * max(abs(place.force), abs(friction))
     share = f"By {place.by}: {100 * place.share:.0f} % of the force's error is {where}, where"
-    if max(abs(place.force), abs(friction)) < AGREE * place.error:
+    if max(abs(place.force), abs(friction)) < MIN_MEAN_SHARE * place.error:
         return f"{share} the residual force is {place.error:.2g} {unit} RMS, with either sign."
     what = []
     if abs(place.force) >= least:

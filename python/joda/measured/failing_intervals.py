@@ -24,16 +24,16 @@ PIECES = 40
 """Of a whole run's replay, where no segment shows what its end does."""
 LONGEST = 10.0
 """Of a run whose mean residual force is told from its start, s."""
-BLIND = 3.0
+MIN_NOISES = 3.0
 """Error, in units of the noise and of what errors of start and force make, up to which they are
 not enough to blame the model."""
 SLIGHT = 0.01
 """Mean residual force of a whole run, in units of what acts on it, that is none."""
-SURE = 2.0
+SPEED_ERRORS = 2.0
 """Standard errors from which on the direction of a segment's motion is known."""
-CLEAR = 3.0
+FORCE_ERRORS = 3.0
 """Standard deviations from which on a mean residual force is not 0."""
-AGREE = 0.8
+MIN_SIGN_SHARE = 0.8
 """Part of the evidence that must have the sign of the mean force for that force to be told."""
 FORCE = 8
 """Column of the rows: residual force; the next is its standard deviation."""
@@ -43,7 +43,7 @@ IMPACT = 12
 MIN_IMPACT_SHARE = 0.8
 """Part of what is beyond the noise at ends from which speed, direction, time and load are told by
 other segments alone: an impact has all of these, but by its place."""
-LEFT = 0.5
+MIN_EXPLAINED = 0.5
 """Part of what is beyond the noise that a mean force must explain to be told."""
 
 
@@ -97,7 +97,7 @@ def where(
 
 def _clearly(measured: Measured, found: Sequence[Failing]) -> list[Failing]:
     """What is missed by several noises: in longer segments small errors of all kinds pile up."""
-    least = BLIND * measured.floor
+    least = MIN_NOISES * measured.floor
     return [place for place in found if place.error > least]
 
 
@@ -147,7 +147,7 @@ def window_rows(measured: Measured, length: float = LENGTHS[0]) -> Array:
 def _tells(segment: Segment, sigma: float) -> bool:
     """Whether its misfit is more than errors of its start and force can make, or near the noise."""
     error = rms(segment.misfit)
-    return error < BLIND * sigma or error > BLIND * segment.explained
+    return error < MIN_NOISES * sigma or error > MIN_NOISES * segment.explained
 
 
 def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
@@ -164,7 +164,7 @@ def _whole_rows(measured: Measured, paths: Sequence[Array]) -> Array:
             if len(whole) == 1:
                 force, force_error = whole[0].force, whole[0].force_error
                 squares = np.array(whole[0].squares)
-            if abs(force) < max(BLIND * force_error, SLIGHT * _usual_force(measured, run)):
+            if abs(force) < max(MIN_NOISES * force_error, SLIGHT * _usual_force(measured, run)):
                 continue  # it drifts, but no force on the whole makes it
         off = measured.replayer.scatter(run, measured.replayer.start(run, sigma))
         for samples in np.array_split(there, PIECES):
@@ -190,7 +190,7 @@ def _row(measured: Measured, run: Run, sigma: float, segment: Segment) -> list[f
     ends = segment.samples[[0, -1]]
     middle = float(run.position[segment.samples].mean())
     speed, speed_error = _speed(run.time[segment.samples], run.position[segment.samples], sigma)
-    direction = 0.5 * float(np.sign(speed)) if abs(speed) > SURE * speed_error else 0.0
+    direction = 0.5 * float(np.sign(speed)) if abs(speed) > SPEED_ERRORS * speed_error else 0.0
     load = float(measured.load(run.part(segment.samples)).mean())
     square = float(np.sum(segment.misfit**2) / (sigma**2 + segment.pushed**2))
     place = (middle - lo) / (hi - lo)
@@ -210,7 +210,7 @@ def _at_end(measured: Measured, run: Run, sigma: float, segment: Segment) -> boo
     """Whether the joint is at an end of its range in a segment."""
     lo, hi = measured.profile.joint.range
     s, noise = (run.position[segment.samples] - lo) / (hi - lo), sigma / (hi - lo)
-    reach = STOP + BLIND * noise
+    reach = STOP + MIN_NOISES * noise
     return bool((s < reach).any() or (s > 1 - reach).any())
 
 
@@ -244,7 +244,7 @@ def _uneven(rows: Array) -> bool:
     """Whether a force that does not change explains hardly any of what is beyond the noise."""
     count = float(rows[:, 1].sum())
     without, with_force = (float(rows[:, k].sum()) - count for k in (5, 6))
-    return without > CLEAR * (2 * count) ** 0.5 and with_force > LEFT * without
+    return without > FORCE_ERRORS * (2 * count) ** 0.5 and with_force > MIN_EXPLAINED * without
 
 
 def _force(force: Array, force_error: Array) -> float | None:
@@ -260,8 +260,8 @@ def _force(force: Array, force_error: Array) -> float | None:
     mean = float(np.average(force, weights=weight))
     evidence = weight * np.abs(force)
     alike = float(evidence[np.sign(force) == np.sign(mean)].sum())
-    clear = abs(mean) >= CLEAR * least / np.sqrt(float(weight.sum()))
-    return mean if clear and alike >= AGREE * float(evidence.sum()) else None
+    clear = abs(mean) >= FORCE_ERRORS * least / np.sqrt(float(weight.sum()))
+    return mean if clear and alike >= MIN_SIGN_SHARE * float(evidence.sum()) else None
 
 
 def _edges(by: By, values: Array) -> Array:

@@ -27,11 +27,11 @@ MAX_BACK_SHARE = 0.25
 """And at most this share of what was visited."""
 TURN = 4.0
 """Within so many noises of a turn the direction is not known."""
-SLOW = 0.8
+BLURRING_NOISE = 0.8
 """Noise of at least so many usual steps between samples blurs a turn."""
 MIN_SAMPLES = 5
 """Fewest samples in one direction that tell the noise."""
-SAME = 0.1
+SAME_PLACE = 0.1
 """Distance of two samples that are at the same place, in usual distances of one way's samples."""
 SCALED, ALIKE = 4.0, 0.2
 """By which factor a measured force may be the model's, and what part of it may be left over then,
@@ -247,7 +247,7 @@ def _between_ways(position: Array, force: Array, direction: Array) -> float:
     usual = float(np.median(np.diff(position[up])))
     at = np.clip(np.searchsorted(position[down], position[up]), 1, len(down) - 1)
     at -= position[up] - position[down[at - 1]] < position[down[at]] - position[up]
-    same = np.abs(position[down[at]] - position[up]) <= SAME * usual
+    same = np.abs(position[down[at]] - position[up]) <= SAME_PLACE * usual
     x = position[up[same]] + 1e-9 * usual * np.arange(same.sum())
     if 2 * len(x) < len(up) or len(x) < MIN_SAMPLES or not usual > 0:
         return np.inf
@@ -278,7 +278,7 @@ def directions(position: Array, noise: float) -> Array:
     heading, turns = _turns(position, min(BACK * noise, MAX_BACK_SHARE * float(np.ptp(position))))
     begins, ends = [0, *(last for _, last in turns)], [*(first for first, _ in turns), -1]
     usual = float(np.median(np.abs(np.diff(position))))
-    blurred = TURN * noise if noise > SLOW * usual else 0.0
+    blurred = TURN * noise if noise > BLURRING_NOISE * usual else 0.0
     out = np.zeros(len(position))
     for k, (begin, end) in enumerate(zip(begins, ends, strict=True)):
         stroke = slice(begin, end + 1 or None)

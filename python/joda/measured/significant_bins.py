@@ -10,9 +10,9 @@ Array = NDArray[np.float64]
 BINS = 10
 MIN_ROWS = 3
 """Fewest rows in a bin that can be significant."""
-CERTAIN = 5.0
+MIN_DEVIATIONS = 5.0
 """Standard deviations above what noise makes, from which an error counts as significant."""
-NOTICEABLE = 1.2
+MIN_ERROR = 1.2
 """Least error of a bin, in units of the noise."""
 
 
@@ -48,5 +48,5 @@ def significant(rows: Array) -> bool:
         return False
     kept = np.argsort(rows[:, 2] / rows[:, 1])[:-1]
     samples, squares = rows[kept, 1].sum(), rows[kept, 2].sum()
-    certain = squares > samples + CERTAIN * np.sqrt(2 * samples)
-    return bool(certain and squares > NOTICEABLE**2 * samples)
+    certain = squares > samples + MIN_DEVIATIONS * np.sqrt(2 * samples)
+    return bool(certain and squares > MIN_ERROR**2 * samples)

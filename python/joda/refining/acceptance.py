@@ -8,16 +8,16 @@ from joda.field import evaluate
 from joda.measured.errors import MULTIPLE
 from joda.profile import CHANNELS, Profile
 
-WORSE = 1.05
+MAX_INCREASE = 1.05
 """How much more what is held out may be missed by after a fit, as a factor."""
-LESS = 0.999
+MAX_REMAINING = 0.999
 """What is left of an error, as a factor, that has fallen."""
 FAR = 3.0
 """By which factor a channel must have changed to be another joint's."""
 SOME, PART = 0.3, 0.25
 """Where a channel was at least so large, in units of its largest, and over what part of that it has
 become so much smaller."""
-HOPELESS, HARDLY = 10.0, 0.2
+MAX_NOISES, MAX_CURVE_SHARE = 10.0, 0.2
 """Error in units of the noise, and of curves of that before, from which such a change explains too
 little."""
 MAX_ERROR_RATIO = 0.3
@@ -58,7 +58,7 @@ def refused(
 
 def _held_out(before: Error, after: Error, noise: float) -> str | None:
     for part, was, now in _parts(before, after):
-        if now > WORSE * max(was, noise):
+        if now > MAX_INCREASE * max(was, noise):
             return (
                 f"the {_of(after, part)} of what was held out (--check) is {now:.3g} with it "
                 f"instead of {was:.3g}"
@@ -71,7 +71,7 @@ def _no_better(before: Error, after: Error, noise: float) -> str | None:
     more than noise must fall."""
     parts = _parts(before, after)
     ratio = np.prod([max(now, noise) / max(was, noise) for _, was, now in parts])
-    if ratio < LESS or (ratio <= 1.0 and after.window <= MULTIPLE * noise):
+    if ratio < MAX_REMAINING or (ratio <= 1.0 and after.window <= MULTIPLE * noise):
         return None
     what = " and ".join(
         f"the {_of(after, part)} is {now:.3g} instead of {was:.3g}" for part, was, now in parts
@@ -81,10 +81,10 @@ def _no_better(before: Error, after: Error, noise: float) -> str | None:
 
 def _hardly_better(before: Error, after: Error, noise: float) -> str | None:
     """Runs that are still missed by far: only another model than this one follows them."""
-    if after.whole is None or after.window <= HOPELESS * noise:
+    if after.whole is None or after.window <= MAX_NOISES * noise:
         return None
     for part, was, now in _parts(before, after):
-        if now > (WORSE if part == "whole" else MAX_ERROR_RATIO) * was:
+        if now > (MAX_INCREASE if part == "whole" else MAX_ERROR_RATIO) * was:
             return (
                 f"the {_of(after, part)} of what was fitted would still be {now:.3g} instead of "
                 f"{was:.3g}, {now / noise:.0f} times the noise: {CAUSES}"
@@ -93,9 +93,9 @@ def _hardly_better(before: Error, after: Error, noise: float) -> str | None:
 
 
 def _hopeless(before: Error, after: Error, noise: float, old: Profile, new: Profile) -> str | None:
-    left, enough = after.window, HOPELESS * noise
+    left, enough = after.window, MAX_NOISES * noise
     if after.whole is None:  # what a hand does to a curve is more than its gauge's noise
-        enough = max(enough, HARDLY * before.window)
+        enough = max(enough, MAX_CURVE_SHARE * before.window)
     if left <= enough:
         return None
     for name in CHANNELS:

@@ -20,7 +20,7 @@ OFF = 0.06
 is, see `joda.estimation.nuisance`."""
 MAX_OUTLIER_SHARE = 0.02
 """Share of samples, beyond the range, that may be single wrong values."""
-STRAY, APART, FAR = 5.0, 20.0, 0.02
+OUTLIER_MOVES, OUTLIER_NOISES, OUTLIER_TRAVEL = 5.0, 20.0, 0.02
 """How much farther than usual moves a stray sample lies from both its neighbours; from them, in
 noises, and as a share of what was visited, at least."""
 MIN_BEYOND_SHARE = 0.3
@@ -91,8 +91,8 @@ def strays(run: Run, position: Array, sigma: float, unit: str) -> tuple[str, Arr
     out, back = move[1:-2], -move[2:-1]  # of the samples 2 to n - 3: from before, and to behind
     jump = np.where(out * back > 0, np.minimum(np.abs(out), np.abs(back)), 0.0)
     usual = np.max(np.abs([move[:-3], move[3:], out - back]), axis=0)
-    least = max(APART * sigma, FAR * float(np.ptp(position)))
-    stray = 2 + np.flatnonzero(jump > np.maximum(least, STRAY * usual))
+    least = max(OUTLIER_NOISES * sigma, OUTLIER_TRAVEL * float(np.ptp(position)))
+    stray = 2 + np.flatnonzero(jump > np.maximum(least, OUTLIER_MOVES * usual))
     if not 0 < len(stray) <= max(MAX_OUTLIER_SHARE * len(position), 3):
         return "", position
     worst = stray[np.argmax(jump[stray - 2])]
