@@ -27,7 +27,7 @@ def said(found):
 
 @pytest.fixture
 def unclear(tmp_path):
-    """A run of 0.3 s whose windows of 0.1 s hardly show what the whole run does."""
+    """A run of 0.3 s whose segments of 0.1 s hardly show what the whole run does."""
     write(draw(101, "magnetic_return_to_low_end", forced=False), tmp_path)
     return compare(tmp_path / "model.xml", "joint", [tmp_path / "held_out3.csv"])
 

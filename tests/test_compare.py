@@ -85,7 +85,7 @@ def rng(seed):
 def test_the_true_model_is_at_the_noise_and_fails_nowhere(tmp_path, seed):
     found = compare(scene_of(door(), tmp_path), "joint", runs_of(door(), tmp_path, seed))
     assert found.noise_floor == pytest.approx(5e-4 * SPAN, rel=0.1), seed
-    # a window may begin in a knock: in 26 seeds up to 3.1, and 3.6 where it fails most
+    # a segment may begin in a knock: in 26 seeds up to 3.1, and 3.6 where it fails most
     assert found.rmse_window < 6 * found.noise_floor, seed
     assert all(place.error < 6 * found.noise_floor for place in found.failing), seed
 

@@ -29,7 +29,7 @@ def sentence(share):
 
 
 def rows(force, force_error, ways=(1.0, -1.0), count=60):
-    """Windows missed by ten times a noise of 1 that may blame such a force."""
+    """Segments missed by ten times a noise of 1 that may blame such a force."""
     out = np.zeros((count, COLUMNS))
     out[:, 0] = np.linspace(0.05, 0.95, count)
     out[:, 1] = np.resize(ways, count)
@@ -60,7 +60,7 @@ def test_a_force_that_may_be_none_is_not_blamed(force, force_error, blamed):
 
 
 def test_a_force_that_explains_no_misfit_is_not_blamed():
-    """Within each window the force changes its sign: a constant one explains a tenth."""
+    """Within each segment the force changes its sign: a constant one explains a tenth."""
     whole, uneven = rows(0.7, 0.02), rows(0.7, 0.02)
     whole[:, 10:12] = 4000.0, 40.0
     uneven[:, 10:12] = 4000.0, 3600.0
@@ -100,7 +100,7 @@ SWINGS = """<mujoco><compiler angle="radian"/><option timestep=".001"/><worldbod
 
 @pytest.mark.slow
 def test_a_whole_run_that_no_constant_force_explains_blames_none(tmp_path):
-    """A swing whose model is a little too heavy parts from it ever more: no window shows it."""
+    """A swing whose model is a little too heavy parts from it ever more: no segment shows it."""
     path = write(tmp_path, SWINGS.format(mass=4.016), "model.xml")
     text = SWINGS.format(mass=4.0)
     run = pushed(text, "lid", lambda t: 0.0, tmp_path, "a.csv", 8.0, 0.5, noise=1e-3)

@@ -159,7 +159,7 @@ def test_a_buffer_that_throws_back_hardly_more_than_the_models_stop_is_none(tmp_
     assert found.verdict == "adequate"
 
 
-def test_windows_by_themselves_are_missed_as_among_all(tmp_path):
+def test_segments_by_themselves_are_missed_as_among_all(tmp_path):
     baseline = fit_baseline(slide(tmp_path, 0.1, 0.6, np.random.default_rng()))
     segments, simulator = baseline.estimator.segments, baseline.base.simulator(baseline.fit.x)
     kept = segments.impacts

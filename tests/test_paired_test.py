@@ -1,4 +1,4 @@
-"""The paired test of held-out windows and runs, and what is implausible to add."""
+"""The paired test of held-out segments and runs, and what is implausible to add."""
 
 from dataclasses import replace
 
@@ -32,11 +32,11 @@ from joda.refining.acceptance import refused
         ([np.inf] * 6, [1.0] * 6, True),
     ],
 )
-def test_windows_are_better_only_beyond_chance(before, after, better):
+def test_segments_are_better_only_beyond_chance(before, after, better):
     assert improves(np.array(before), np.array(after)) == better
 
 
-def test_of_many_windows_chance_is_rarely_called_better():
+def test_of_many_segments_chance_is_rarely_called_better():
     rng = np.random.default_rng()
     pairs = rng.lognormal(1.0, 1.0, (300, 2, 30))
     assert np.mean([improves(*pair) for pair in pairs]) < 0.1  # 5 %, and chance
@@ -133,7 +133,7 @@ def test_no_effect_turns_or_grows_where_no_run_was(measured, x, y, said):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("whole", "windows", "apart", "said"),
+    ("whole", "segments", "apart", "said"),
     [
         ((0.1, 0.01), (0.05, 0.002), None, None),
         ((0.1, 0.01), (0.05, 0.002), (0.1, 0.104), None),
@@ -147,10 +147,10 @@ def test_no_effect_turns_or_grows_where_no_run_was(measured, x, y, said):
         ((0.0004, 0.0005), (0.0004, 0.0005), None, None),  # all of it noise
     ],
 )
-def test_refine_writes_nothing_that_is_worse(whole, windows, apart, said, tmp_path):
+def test_refine_writes_nothing_that_is_worse(whole, segments, apart, said, tmp_path):
     measured = read_measured(scene_of(door(), tmp_path), "joint", runs_of(door(), tmp_path, 1))
     held = apart and (Error(apart[0], 0.01), Error(apart[1], 0.01))
-    fitted = tuple(Error(*both) for both in zip(whole, windows, strict=True))
+    fitted = tuple(Error(*both) for both in zip(whole, segments, strict=True))
     same = measured.profile, measured.profile
     reason = refused(fitted, held or None, 1e-3, same, Needs(measured))
     assert (reason is None) if said is None else (said in reason)

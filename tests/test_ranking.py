@@ -158,7 +158,7 @@ def test_progress_counts_and_never_exceeds_the_total(ranked, progress):
     assert progress[-1][0] > 0.8 * progress[-1][1]
 
 
-def test_the_best_are_fitted_to_longer_windows_from_where_they_were(measured, baseline, ranked):
+def test_the_best_are_fitted_to_longer_segments_from_where_they_were(measured, baseline, ranked):
     """There the others leave a larger part of what the true one does."""
     longer = fit_baseline(measured, 3 * baseline.estimator.segments.length, baseline.fit.x)
     closer = narrowed(longer, ranked)
@@ -175,7 +175,7 @@ def test_the_best_are_fitted_to_longer_windows_from_where_they_were(measured, ba
     assert len(longer.estimator.segments.at) < len(baseline.estimator.segments.at)
 
 
-def test_ends_are_asked_last_where_windows_without_knocks_tell_of_an_effect(baseline, ranked):
+def test_ends_are_asked_last_where_segments_without_knocks_tell_of_an_effect(baseline, ranked):
     noise = float(baseline.estimator.samples)
 
     def tells(without, with_it):
@@ -228,7 +228,7 @@ def test_a_well_is_tried_where_the_other_was_found(baseline):
     assert np.allclose(tried.trials[:, -2:], [(0.6, 0.9), (0.6, 1.0), (0.3, 0.9)])
 
 
-def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
+def test_in_longer_segments_an_effect_must_leave_nothing_but_noise(ranked):
     assert select(ranked).verdict == select(ranked, wholly=True).verdict == "missing_effect"
     more = replace(ranked, level=2 * SETTINGS.selection.noise_square)
     strange = select(more, wholly=True)

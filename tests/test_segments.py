@@ -151,7 +151,7 @@ def test_where_only_knocks_have_been_nothing_was_measured(tmp_path):
     assert last < 0.98
 
 
-def test_a_fit_takes_a_windows_start_anew_where_that_is_better():
+def test_a_fit_takes_a_segments_start_anew_where_that_is_better():
     """Over an edge between two sides a start does not come back by small steps."""
     segments = cut(0.5 + 0.2 * np.sin(3 * STEP * np.arange(2000)))
     estimator = SegmentEstimator(segments, np.ones(len(segments.count), bool))
@@ -475,7 +475,7 @@ def test_a_long_segment_with_a_knock_ends_where_the_joint_stays():
     assert segments.impacts[:leaves].any() and not segments.impacts[leaves:].any()
 
 
-def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
+def test_a_short_stroke_is_cut_into_short_segments_up_to_the_knock():
     """Full stroke in 20 ms, at 1 kHz, and then rest at the end."""
     t = STEP * np.arange(300)
     run = run_of(np.minimum(0.05 + (t / 0.02) ** 2, 1.0))
@@ -490,7 +490,7 @@ def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
     ("timestep", "length", "usual", "step"),
     [(2e-3, 0.1, 0.1, 1 / 1500), (5e-4, 0.45, 0.45, 3e-3), (5e-4, 1.5, 0.45, 3e-3)],
 )
-def test_steps_are_short_for_the_windows(timestep, length, usual, step):
+def test_steps_are_short_for_the_segments(timestep, length, usual, step):
     assert _step(timestep, length, usual, STEPS) == pytest.approx(step)
 
 

@@ -23,7 +23,7 @@ H = 2e-4
 
 
 def true_error(case: Case) -> float:
-    """RMS error (rad or m) of the true joint on the held-out runs in windows of 0.4 s.
+    """RMS error (rad or m) of the true joint on the held-out runs in segments of 0.4 s.
 
     As `Replayer.windows` does it, and as easily misled by a knock: from starts that are fitted
     within their measurement's error, under the measured force, linear between samples. What has a
@@ -59,7 +59,7 @@ def true_error(case: Case) -> float:
 
 @dataclass(frozen=True)
 class Piece:
-    """A window of a run: its samples, their times from its begin, measured start, force."""
+    """A segment of a run: its samples, their times from its begin, measured start, force."""
 
     run: int
     begin: float

@@ -79,7 +79,7 @@ def case_of(seed: int, effect: str | None) -> Case:
 # --- mujoco.sysid
 @dataclass(frozen=True)
 class Piece:
-    """A window of a run; times from its begin, s.
+    """A segment of a run; times from its begin, s.
 
     Attributes:
         time, position: of its samples, rad or m.
