@@ -95,7 +95,7 @@ def test_where_nothing_is_missed_nothing_can_be_told(tmp_path, rng):
     measured = thrown(tmp_path, rng, 2, drag=1e-7)
     added_effect = add_effect(*parted(measured), "quadratic_damping")
     assert added_effect.effect is None
-    assert "by no more than the noise even without it" in added_effect.reason
+    assert "no more than the noise even without it" in added_effect.reason
 
 
 @pytest.mark.slow
