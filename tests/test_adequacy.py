@@ -11,10 +11,10 @@ from test_compare import door, flat, runs_of, scene_of
 
 from joda import JodaError, compare
 from joda.hidden import draw, write
-from joda.measured.adequacy import WINDOWS, residual_pattern
+from joda.measured.adequacy import MIN_SEGMENTS, residual_pattern
 from joda.measured.comparison import sentences
 from joda.measured.errors import EXPLAINED, MULTIPLE
-from joda.measured.failing import COLUMNS, FORCE
+from joda.measured.failing_intervals import COLUMNS, FORCE
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run
 
@@ -27,7 +27,7 @@ def said(found):
 
 @pytest.fixture
 def unclear(tmp_path):
-    """A run of 0.3 s whose windows of 0.1 s hardly show what the whole run does."""
+    """A run of 0.3 s whose segments of 0.1 s hardly show what the whole run does."""
     write(draw(101, "magnetic_return_to_low_end", forced=False), tmp_path)
     return compare(tmp_path / "model.xml", "joint", [tmp_path / "held_out3.csv"])
 
@@ -136,7 +136,7 @@ def test_two_long_runs_of_signs_are_a_pattern_and_random_ones_rarely():
     assert residual_pattern(rows_of(np.repeat([1.0, -1.0], 20))) < 1e-6
     found = [residual_pattern(rows_of(rng.normal(size=40))) for _ in range(400)]
     assert np.mean(np.array(found) < 0.05) < 0.1  # Bonferroni: at most 5 %, and chance
-    assert residual_pattern(rows_of(np.ones(WINDOWS - 1))) is None
+    assert residual_pattern(rows_of(np.ones(MIN_SEGMENTS - 1))) is None
 
 
 @pytest.mark.slow

@@ -209,7 +209,7 @@ def test_what_the_model_itself_gives_a_joint(tmp_path):
     own = found.native
     assert (own.damping, own.frictionloss, own.armature) == (0.5, 0.2, 0.04)
     assert (own.stiffness, own.springref) == (1.5, 0.3)
-    assert own.besides == ("equality 'linked'", "a medium (<option density viscosity wind>)")
+    assert own.unmodelled == ("equality 'linked'", "a medium (<option density viscosity wind>)")
     first = own.contacts[0]
     assert (first.geom, first.other, first.stop) == ("leaf", "wall", False)
     # its corner at (-0.02, 0.8) reaches the face x = -0.08 at asin(0.08 / r) - asin(0.02 / r)
@@ -226,7 +226,7 @@ def test_what_the_model_itself_gives_a_joint(tmp_path):
 def test_a_plain_joint_has_no_elements_of_its_own(tmp_path):
     found = context(write(tmp_path, LID), "lid")
     assert "own elements: none" in found.describe()
-    assert not found.native.contacts and not found.native.besides
+    assert not found.native.contacts and not found.native.unmodelled
 
 
 CAP = """<robot name="bottle">{more}<link name="base"/><link name="helper"/>

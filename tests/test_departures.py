@@ -13,7 +13,7 @@ from joda.commands.improve import _departures as told_by_improve
 from joda.component import Component
 from joda.diagnosis import adding
 from joda.diagnosis.adding import OWN, Error, add_effect
-from joda.diagnosis.departures import Departures, departures, given_parts, moved, restored
+from joda.diagnosis.departures import Departures, changed_parts, departures, given_parts, restored
 from joda.diagnosis.improvement import Step
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import Trials
@@ -54,7 +54,7 @@ def test_what_moved_by_more_than_its_doubt_is_told_and_can_be_put_back(rng, way)
         far = rng.random(3) < 0.5
         factors = 1 + way * np.where(far, rng.uniform(0.31, 1.0, 3), rng.uniform(0, 0.29, 3))
         fitted = times(given, factors, sizes)
-        parts = moved(given, fitted, "detent_internal")
+        parts = changed_parts(given, fitted, "detent_internal")
         assert len(parts) == far.sum()
         told = departures(given, fitted, "detent_internal").changed or ""
         for number, (name, unit) in enumerate((("friction", "N·m"), ("damping", "N·m·s/rad"))):
@@ -68,7 +68,7 @@ def test_what_moved_by_more_than_its_doubt_is_told_and_can_be_put_back(rng, way)
         assert whole.effects == given.effects
         assert whole.channels.conservative == fitted.channels.conservative
         back = restored(fitted, given, parts)
-        assert moved(given, back, "detent_internal") == ()
+        assert changed_parts(given, back, "detent_internal") == ()
         assert back.channels.conservative == fitted.channels.conservative
         others = np.flatnonzero(~far)
         for number in others[others < 2]:
@@ -79,7 +79,7 @@ def test_what_moved_by_more_than_its_doubt_is_told_and_can_be_put_back(rng, way)
 def test_a_curve_that_changes_at_one_place_is_told_there():
     given = LID.with_component("friction", level("native friction", 1.0))
     bent = Component(label="native friction", interval=(0, 1), x=(0, 0.5, 1), y=(1, 1, 2))
-    (part,) = moved(given, LID.with_component("friction", bent), "backlash")
+    (part,) = changed_parts(given, LID.with_component("friction", bent), "backlash")
     assert part.described == "native friction 1 → 2 N·m at s = 1.00"
 
 
@@ -87,8 +87,8 @@ def test_a_number_of_either_sign_counts_too():
     given = LID.with_effect(GravityOffset(sin=0.5, cos=-1.0))
     for cos, far in ((-1.0, 0), (-1.0 + 0.9 * SETTINGS.adding.model_error, 0), (0.2, 1)):
         new = LID.with_effect(GravityOffset(sin=0.5, cos=cos))
-        assert len(moved(given, new, "detent_internal")) == far
-        assert moved(given, new, "gravity_offset") == ()  # that was added to
+        assert len(changed_parts(given, new, "detent_internal")) == far
+        assert changed_parts(given, new, "gravity_offset") == ()  # that was added to
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_where_no_fit_is_better_its_own_numbers_are_held_as_given(rubbing, monke
     channels = rubbing.profile.channels.model_copy(update={"friction": friction})
     worse = rubbing.profile.model_copy(update={"channels": channels})
     worse = worse.with_component("friction", level(ADDED, RUBS))
-    monkeypatch.setattr(Trials, "reshaped", lambda self, *_: [self.tried(worse)])
+    monkeypatch.setattr(Trials, "refined_shapes", lambda self, *_: [self.tried(worse)])
     added_effect = add_effect(*parted(rubbing), ADDED)
     assert added_effect.effect == ADDED, added_effect.reason
     own, added = (part.y for part in added_effect.profile.channels.friction.components)
@@ -164,7 +164,7 @@ def test_where_no_fit_is_better_its_own_numbers_are_held_as_given(rubbing, monke
 
 def test_what_is_held_stays_while_all_else_is_fitted(rubbing):
     start = without_its_own(rubbing.profile)
-    parts = moved(rubbing.profile, start, ADDED)
+    parts = changed_parts(rubbing.profile, start, ADDED)
     trials = Trials(*parted(rubbing))
     for one in trials.holding(restored(start, rubbing.profile, parts), parts, lambda what: None):
         own, added = (part.y for part in one.profile.channels.friction.components)

@@ -180,7 +180,8 @@ def test_a_wrong_effect_never_raises_the_error(hidden):
 
 @pytest.mark.long
 def test_the_stairs_never_rise(hidden, monkeypatch):
-    monkeypatch.setattr(improvement, "MOST", 1)
+    one = replace(improvement.ADDING, max_effects=1)
+    monkeypatch.setattr(improvement, "ADDING", one)
     page = hidden.folder / "story.html"
     output = hidden.folder / "improved.xml"
     result = improve(hidden.folder / "model.xml", "joint", hidden.runs, output, report=page)
@@ -234,7 +235,7 @@ def mistaken(tmp_path):
     (tmp_path / "d.json").write_text(json.dumps(content))
     (tmp_path / "adequate.json").write_text('{"verdict": "adequate", "effects": []}')
     (tmp_path / "other.json").write_text(json.dumps(content | {"joint": "drawer"}))
-    (tmp_path / "strange.json").write_text('{"effects": [{"effect": "magic"}]}')
+    (tmp_path / "uncatalogued_forms.json").write_text('{"effects": [{"effect": "magic"}]}')
     (tmp_path / "text.json").write_text("{\nno")
     (tmp_path / "list.json").write_text("[]")
     (tmp_path / "degrees.csv").write_text(
@@ -261,7 +262,7 @@ ADD = "add model.xml run1.csv --joint joint -o new.xml --diagnosis"
         (f"{ADD} text.json", "text.json, line 2: not JSON"),
         (f"{ADD} list.json", "list.json: key 'effects' is missing"),
         (f"{ADD} adequate.json", "adequate.json: names no effect to add (verdict: adequate)"),
-        (f"{ADD} strange.json", "no effect 'magic'; there are"),
+        (f"{ADD} uncatalogued_forms.json", "no effect 'magic'; there are"),
         (f"{ADD} d.json --effect magic", "no effect 'magic'; there are"),
         (
             f"{ADD} other.json",

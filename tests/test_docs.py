@@ -80,7 +80,7 @@ def test_the_tutorial_finds_the_closer_and_mends_the_model(my_door):
     found = re.search(r"direction_dependent_damping: .*? ([\d.]+) ± ", "\n".join(told))
     assert float(found[1]) == pytest.approx(3, rel=0.05)  # as the page's real.json has it
     assert "By direction" in told[-2]
-    assert "All windows of 0.4 s are missed by less than 3 times the noise" in told[-1]
+    assert "The error of every segment of 0.4 s is less than 3 times the noise" in told[-1]
 
 
 @pytest.mark.long

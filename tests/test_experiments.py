@@ -15,7 +15,7 @@ from joda.commands.experiments.baselines import Baseline, fit_forces, fit_motion
 from joda.commands.experiments.gallery import Shown, gallery, span
 from joda.commands.experiments.subject import Subject
 from joda.commands.experiments.table import CASES
-from joda.commands.experiments.tried import WAYS, try_case
+from joda.commands.experiments.trial import WAYS, try_case
 from joda.component import Component
 from joda.profile import Channel, Channels, Profile, Resistance
 from joda.scenes.model import load_model

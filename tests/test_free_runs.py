@@ -1,4 +1,4 @@
-"""What free runs as a whole tell, in which errors add up that windows cannot see."""
+"""What free runs as a whole tell, in which errors add up that segments cannot see."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from lids import FRICTION, INERTIA, RATE, SCENE, SIGMA, SPAN, thrown
 
 from joda import compare
 from joda.diagnosis.baseline import fit_baseline
-from joda.diagnosis.coverage import too_little
+from joda.diagnosis.data_sufficiency import too_little
 from joda.diagnosis.free_runs import free_runs
 from joda.diagnosis.verdict import diagnosed
 from joda.errors import JodaError
@@ -106,7 +106,7 @@ def test_what_errors_of_a_force_make_is_no_drift(rng):
 
 @pytest.mark.sweep(1, "free runs")
 def test_a_small_fault_under_a_force_is_not_cleared(tmp_path):
-    """Friction a tenth off in pushed runs, each window of which hides it."""
+    """Friction a tenth off in pushed runs, each segment of which hides it."""
     model = """<mujoco><compiler angle="radian"/><option timestep=".002"/><worldbody><body>
       <joint name="j" range="-9 9" limited="true" damping="{}"/>
       <inertial pos="0 0 0" mass="1" diaginertia=".5 .5 .5"/></body></worldbody></mujoco>"""
@@ -171,7 +171,7 @@ def test_a_run_in_which_the_joint_rests_counts_with_all_its_samples(tmp_path, rn
 
 
 def louder(measured, folder, rng, times):
-    """The same runs with more noise, so that no window tells anything."""
+    """The same runs with more noise, so that no segment tells anything."""
     files = [folder / run.name for run in measured.runs]
     for run, file in zip(measured.runs, files, strict=True):
         noise = times * SIGMA * rng.standard_normal(len(run.time))
@@ -186,7 +186,7 @@ def louder(measured, folder, rng, times):
 @pytest.mark.sweep(1, "free runs")
 @pytest.mark.parametrize("times", [1.08, 0.93])
 def test_a_friction_that_only_whole_runs_tell_is_told(tmp_path, rng, times):
-    """Eight or seven percent of friction, in a noise that hides it in windows."""
+    """Eight or seven percent of friction, in a noise that hides it in segments."""
     quiet = thrown(tmp_path, rng, 3, drag=1e-6, friction=times * FRICTION)
     measured = louder(quiet, tmp_path, rng, 25)
     found = free_runs(measured, fit_baseline(measured))
@@ -235,8 +235,8 @@ def test_a_joint_at_rest_tells_nothing(tmp_path, rng):
 
 
 @pytest.mark.parametrize("moves", [True, False])
-def test_a_quick_motion_tells_even_where_each_short_window_has_little_of_it(tmp_path, rng, moves):
-    """Of a coarse encoder: 3 rad within 0.1 s, in windows of a dozen samples."""
+def test_a_quick_motion_tells_even_where_each_short_segment_has_little_of_it(tmp_path, rng, moves):
+    """Of a coarse encoder: 3 rad within 0.1 s, in segments of a dozen samples."""
     (tmp_path / "model.xml").write_text(SCENE)
     files = [tmp_path / f"run{k}.csv" for k in range(3)]
     time = np.arange(0, 0.6, 1e-3)

@@ -61,7 +61,7 @@ def test_in_mujoco_the_true_profile_moves_as_in_the_simulator(number):
     _, held_out = read(case)
     true = held_out.changed(true_profile(case, held_out.profile))
     pairs = zip(true.runs, true.sigma, strict=True)
-    missed = [rms(w.misfit) for run, sigma in pairs for w in true.replayer.windows(run, sigma)]
+    missed = [rms(w.misfit) for run, sigma in pairs for w in true.replayer.segments(run, sigma)]
     # a half, as windows that end in a knock, or go over a barrier or just not, tell of luck
     part = 0.25 if effect == "end_stop_restitution" else 0.5
     assert np.quantile(missed, part) < 3 * case.noise
@@ -83,7 +83,7 @@ def test_a_master_seed_gives_the_same_jobs_and_every_effect_in_turn():
 def test_the_families_line_has_every_effect_of_each_and_is_judged_by_the_seal(capsys):
     jobs = [job_of(5, "families", k, "switches") for k in range(len(spread("switches")))]
     hidden = {(job.effect, job.forced) for job in jobs}
-    assert {(name, True) for name in (None, *EFFECTS, *FAMILIES["switches"].beyond)} <= hidden
+    assert {(name, True) for name in (None, *EFFECTS, *FAMILIES["switches"].uncatalogued)} <= hidden
     assert ("backlash", False) not in hidden and ("detent_internal", False) in hidden
     said = {"probability": 0.95, "indistinguishable_from": []}
     rows = []
@@ -122,7 +122,7 @@ def test_a_curve_gets_as_many_control_points_as_the_data_support():
 def test_cases_of_all_families_are_mixed(hides, forced):
     jobs = mixed(5, hides, forced, 12)
     assert len({job.family for job in jobs[:4]}) == 4
-    beyond = [job.effect in FAMILIES[job.family].beyond for job in jobs]
+    beyond = [job.effect in FAMILIES[job.family].uncatalogued for job in jobs]
     assert all(beyond) if hides == "outside" else not any(beyond)
     assert all((job.effect is None) == (hides == "nothing") for job in jobs)
     assert {job.forced for job in jobs} == ({True, False} if hides == "nothing" else {forced})

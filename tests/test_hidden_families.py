@@ -11,7 +11,7 @@ from hidden_model import true_profile
 import joda
 from joda import JodaError
 from joda.diagnosis.adding import error
-from joda.hidden import EFFECTS, FAMILIES, draw, memory, rubbing, shapes, write
+from joda.hidden import EFFECTS, FAMILIES, draw, friction_laws, memory, shapes, write
 from joda.hidden.cases import PARTIAL, VISIBLE
 from joda.hidden.drag import Orifice
 from joda.hidden.laws import ForceAlong
@@ -59,8 +59,8 @@ def test_the_first_family_draws_what_it_drew_before_there_were_others(args, expe
 def test_every_family_hides_every_effect_and_laws_of_no_catalogue():
     for family in FAMILIES.values():
         assert tuple(family.known) == EFFECTS
-        assert len(family.beyond) >= 6
-        assert not set(family.beyond) & set(EFFECTS)
+        assert len(family.uncatalogued) >= 6
+        assert not set(family.uncatalogued) & set(EFFECTS)
 
 
 @pytest.mark.slow
@@ -237,23 +237,26 @@ def test_a_dead_centre_is_left_and_a_well_is_not():
 
 @pytest.mark.slow
 def test_springs_and_frictions_of_a_joint_hold_below_their_limit():
-    laws = [rubbing.PowerStribeck(0.5, 0.3, 1.0), rubbing.RationalStribeck(0.5, 0.3)]
-    laws += [memory.RunningIn(0.5, 1.0), rubbing.FrictionAlong(0.5, shapes.Trapezoid(0, 1, 0.1))]
+    laws = [friction_laws.PowerStribeck(0.5, 0.3, 1.0), friction_laws.RationalStribeck(0.5, 0.3)]
+    laws += [
+        memory.RunningIn(0.5, 1.0),
+        friction_laws.PositionFriction(0.5, shapes.Trapezoid(0, 1, 0.1)),
+    ]
     for law in laws:
         truth = Truth(joint(), 0.2, 0.0, (law,))
         assert (move(truth, force=0.69)[1] == 0).all()
         assert move(truth, force=0.72)[1][-1] > 0
-    loaded = Truth(joint(), 0.2, 0.0, (rubbing.LoadedContact(0.5, 1.0),))
+    loaded = Truth(joint(), 0.2, 0.0, (friction_laws.LoadedContact(0.5, 1.0),))
     assert (move(loaded, force=0.3)[1] == 0).all()
-    bearing = Truth(joint(), 0.0, 0.0, (rubbing.LoadedBearing(0.5, 0.3),))
+    bearing = Truth(joint(), 0.0, 0.0, (friction_laws.LoadedBearing(0.5, 0.3),))
     v = move(bearing, force=1.0)[2][-1]
     assert v == pytest.approx(1 - 0.5 * (np.hypot(1, 0.3) - 0.3), rel=1e-6)
 
 
 def test_stribeck_frictions_fall_as_their_formulas():
     for law, left in (
-        (rubbing.PowerStribeck(0.5, 0.3, 1.0), lambda v: 0.5 * np.exp(-v / 0.3)),
-        (rubbing.RationalStribeck(0.5, 0.3), lambda v: 0.5 / (1 + (v / 0.3) ** 2)),
+        (friction_laws.PowerStribeck(0.5, 0.3, 1.0), lambda v: 0.5 * np.exp(-v / 0.3)),
+        (friction_laws.RationalStribeck(0.5, 0.3), lambda v: 0.5 / (1 + (v / 0.3) ** 2)),
     ):
         v = move(Truth(joint(), 0.2, 1.0, (law,)), v=0.8, force=1.0, seconds=20, h=1e-3)[2][-1]
         assert 0.2 + v + left(v) == pytest.approx(1.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from joda import JodaError
-from joda.hidden import EFFECTS, OUTSIDE, draw, laws, rubbing, write
+from joda.hidden import EFFECTS, UNCATALOGUED, draw, friction_laws, laws, write
 from joda.hidden.cases import PARTIAL, VISIBLE
 from joda.hidden.joint import base_model, draw_truth
 from joda.hidden.simulator import Tape, simulate
@@ -73,12 +73,12 @@ def test_terminal_velocities():
     )
     drag = Truth(joint(), 0.2, 0.0, (laws.Drag(0.2),))
     assert move(drag, force=1.0, seconds=30, h=1e-2)[2][-1] == pytest.approx(2.0)
-    root = Truth(joint(hi=1000.0), 0.0, 0.0, (rubbing.RootDamping(0.5),))
+    root = Truth(joint(hi=1000.0), 0.0, 0.0, (friction_laws.RootDamping(0.5),))
     assert move(root, force=1.0, seconds=120, h=1e-2)[2][-1] == pytest.approx(4.0)
 
 
 def test_stribeck_friction_in_steady_motion():
-    truth = Truth(joint(), 0.2, 1.0, (rubbing.Stribeck(0.5, 0.3),))
+    truth = Truth(joint(), 0.2, 1.0, (friction_laws.Stribeck(0.5, 0.3),))
     v = move(truth, v=0.5, force=1.0, seconds=20, h=1e-3)[2][-1]
     assert 0.2 + v + 0.5 * np.exp(-((v / 0.3) ** 2)) == pytest.approx(1.0)
 
@@ -99,10 +99,10 @@ def test_a_maxwell_element_relaxes():
 
 
 def test_load_and_direction_decide_friction():
-    held = Truth(joint(cos=0.5, kind="slide"), 0.1, 0.0, (rubbing.Loaded(0.5),))
+    held = Truth(joint(cos=0.5, kind="slide"), 0.1, 0.0, (friction_laws.LoadFriction(0.5),))
     assert move(held, force=-0.7)[2][-1] == 0
     assert move(held, force=-0.71)[2][-1] < 0.02
-    one_way = Truth(joint(), 0.1, 0.0, (rubbing.Rub(0.5, -1.0, 2.0, 0.0, -1),))
+    one_way = Truth(joint(), 0.1, 0.0, (friction_laws.IntervalFriction(0.5, -1.0, 2.0, 0.0, -1),))
     assert move(one_way, force=1.0)[2][-1] == pytest.approx(0.9)
     assert move(one_way, force=-1.0)[2][-1] == pytest.approx(-0.4)
 
@@ -163,7 +163,7 @@ def test_a_seed_gives_the_same_case():
     assert draw(2, None, forced=False).model != one.model
 
 
-NAMES = [*EFFECTS, *OUTSIDE, "added_inertia"]
+NAMES = [*EFFECTS, *UNCATALOGUED, "added_inertia"]
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from joda.diagnosis.baseline import RESTITUTION, fit_baseline
-from joda.diagnosis.impacts import AROUND, mean_of, speed_ratios
+from joda.diagnosis.impacts import IMPACT_SAMPLES, mean_of, speed_ratios
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
@@ -150,7 +150,8 @@ def test_a_buffer_that_throws_back_hardly_more_than_the_models_stop_is_none(tmp_
     for run, speed in zip(runs, rng.uniform(0.4, 1.2, len(runs)), strict=True):
         position = buffered(rng.uniform(0.1, 0.3), speed, rate, 1.2)
         off = int(np.argmax(position > 0.5)) + round(2 / rate * HERTZ)
-        position = position[: off + AROUND - 1]  # too few samples to tell the speed after it
+        # too few samples to tell the speed after it
+        position = position[: off + IMPACT_SAMPLES - 1]
         time = np.arange(len(position)) / HERTZ
         noisy = position + SIGMA * rng.standard_normal(len(time))
         write_run(run, Run(run.name, time, noisy, None, 0 * time, False))
@@ -158,7 +159,7 @@ def test_a_buffer_that_throws_back_hardly_more_than_the_models_stop_is_none(tmp_
     assert found.verdict == "adequate"
 
 
-def test_windows_by_themselves_are_missed_as_among_all(tmp_path):
+def test_segments_by_themselves_are_missed_as_among_all(tmp_path):
     baseline = fit_baseline(slide(tmp_path, 0.1, 0.6, np.random.default_rng()))
     segments, simulator = baseline.estimator.segments, baseline.base.simulator(baseline.fit.x)
     kept = segments.impacts

@@ -76,7 +76,7 @@ def finding(effect):
 def said(verdict, *effects):
     effects = [*map(finding, effects)]
     told = SimpleNamespace(
-        verdict=verdict, effects=effects, corrections=(), summary="The end.", doubt=None
+        verdict=verdict, effects=effects, corrections=(), summary="The end.", confounder=None
     )
     unexplained_by = verdict == "unexplained"
     return SimpleNamespace(

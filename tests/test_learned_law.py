@@ -11,16 +11,16 @@ from joda import add
 from joda.commands.add import sentences
 from joda.commands.hidden_effect import _judged_law
 from joda.diagnosis.adding import error
-from joda.diagnosis.learning.account import Account, account
-from joda.diagnosis.learning.account import sentences as account_sentences
-from joda.diagnosis.learning.choosing import Learning, learn
 from joda.diagnosis.learning.ensemble import Number, drawn, of_memory
 from joda.diagnosis.learning.fitting import Learner
 from joda.diagnosis.learning.formula import _period, _sets, _solved
+from joda.diagnosis.learning.gaussian_process import modes_of, nearness
 from joda.diagnosis.learning.law import Law, Terms
 from joda.diagnosis.learning.library import of_speed
 from joda.diagnosis.learning.nearest import Nearest
-from joda.diagnosis.learning.smooth import modes_of, nearness
+from joda.diagnosis.learning.report import Account, account
+from joda.diagnosis.learning.report import sentences as account_sentences
+from joda.diagnosis.learning.term_selection import Learning, learn
 from joda.diagnosis.phrases import named
 from joda.diagnosis.split import parted
 from joda.hidden import draw, write
@@ -216,7 +216,7 @@ def test_the_nearest_known_effect_is_told_with_what_it_misses(times):
     told = Account(**none, along=False, memory="none", nearest=nearest, unit="rad", force_unit="")
     last = account_sentences(told)[-1]
     assert last.startswith("Nearest of what has a name: viscous damping; with it")
-    assert last.endswith(f"missed by {times:.2g} times what it is missed by with the law.")
+    assert last.endswith(f"the held-out error is {times:.2g} times that of the law.")
 
 
 def test_the_demo_judges_what_was_learned():

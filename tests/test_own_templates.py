@@ -11,7 +11,7 @@ from wheel import SCENE, pushed
 from joda import JodaError, add, attach, diagnose
 from joda.component import Component
 from joda.diagnosis.hypotheses import hypotheses
-from joda.diagnosis.rivals import indistinguishable, kinds_of
+from joda.diagnosis.indistinguishable import indistinguishable, kinds_of
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.units import units_of
 from joda.estimation.problem import segments_for

@@ -1,4 +1,4 @@
-"""The paired test of held-out windows and runs, and what is implausible to add."""
+"""The paired test of held-out segments and runs, and what is implausible to add."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from test_compare import door, runs_of, scene_of
 from joda.component import Component
 from joda.diagnosis.adding import Error
 from joda.diagnosis.paired_test import improves, risen
-from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
+from joda.diagnosis.plausible import Needs, implausible, unvisited_interval, unvisited_shape
 from joda.diagnosis.settings import SETTINGS
 from joda.effects import StribeckFriction
 from joda.measured.reading import read_measured
@@ -32,11 +32,11 @@ from joda.refining.acceptance import refused
         ([np.inf] * 6, [1.0] * 6, True),
     ],
 )
-def test_windows_are_better_only_beyond_chance(before, after, better):
+def test_segments_are_better_only_beyond_chance(before, after, better):
     assert improves(np.array(before), np.array(after)) == better
 
 
-def test_of_many_windows_chance_is_rarely_called_better():
+def test_of_many_segments_chance_is_rarely_called_better():
     rng = np.random.default_rng()
     pairs = rng.lognormal(1.0, 1.0, (300, 2, 30))
     assert np.mean([improves(*pair) for pair in pairs]) < 0.1  # 5 %, and chance
@@ -102,9 +102,9 @@ def test_an_effect_is_not_placed_where_nobody_was(measured):
     a, b = unvisited_part(near, (0.0, 0.3))[0]
     assert (a, b) == (0.0, 0.3)
     assert visited_share(near, (0.0, 0.3)) == 0.0
-    assert "hardly any run visited s = 0.00 to 0.30" in unseen_place(near, (0.0, 0.3))
-    assert unseen_place(measured, None) is None
-    assert unseen_place(near, (0.0, 1.0)) is None  # a law, not a place
+    assert "hardly any run visited s = 0.00 to 0.30" in unvisited_interval(near, (0.0, 0.3))
+    assert unvisited_interval(measured, None) is None
+    assert unvisited_interval(near, (0.0, 1.0)) is None  # a law, not a place
 
 
 @pytest.mark.parametrize(
@@ -126,31 +126,31 @@ def test_no_effect_turns_or_grows_where_no_run_was(measured, x, y, said):
     seen = measured.with_runs([replace(own, position=there)], [0])
     part = Component(label="detent_internal", interval=(0, 1), x=x, y=y)
     profile = measured.profile.with_component("conservative", part)
-    reason = unseen_shape((seen,), profile, "detent_internal", measured.profile)
+    reason = unvisited_shape((seen,), profile, "detent_internal", measured.profile)
     assert reason is None if said is None else reason.startswith(said), reason
-    assert unseen_shape((seen, measured), profile, "detent_internal", measured.profile) is None
+    assert unvisited_shape((seen, measured), profile, "detent_internal", measured.profile) is None
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("whole", "windows", "apart", "said"),
+    ("whole", "segments", "apart", "said"),
     [
         ((0.1, 0.01), (0.05, 0.002), None, None),
         ((0.1, 0.01), (0.05, 0.002), (0.1, 0.104), None),
-        ((0.1, 0.01), (0.05, 0.002), (0.1, 0.2), "held out (--check) is missed by 0.2"),
-        ((0.1, 0.2), (0.05, 0.06), None, "missed by 0.2 instead of 0.1"),
+        ((0.1, 0.01), (0.05, 0.002), (0.1, 0.2), "held out (--check) is 0.2 with it"),
+        ((0.1, 0.2), (0.05, 0.06), None, "the free-run error is 0.2 instead of 0.1"),
         ((0.1, 0.2), (0.05, 0.002), None, None),  # near a barrier whole runs part
-        ((0.731, 0.775), (0.413, 0.396), None, "missed by 0.775 instead of 0.731 in whole runs"),
-        ((0.1, 0.1), (0.05, 0.05), None, "missed by 0.1 instead of 0.1"),
-        ((0.415, 0.694), (0.342, 0.14), None, "missed by 0.694 instead of 0.415 in whole runs"),
-        ((0.75, 0.454), (0.34, 0.174), None, "still be missed by 0.174 instead of 0.34 in windows"),
+        ((0.731, 0.775), (0.413, 0.396), None, "free-run error is 0.775 instead of 0.731"),
+        ((0.1, 0.1), (0.05, 0.05), None, "free-run error is 0.1 instead of 0.1"),
+        ((0.415, 0.694), (0.342, 0.14), None, "would still be 0.694 instead of 0.415"),
+        ((0.75, 0.454), (0.34, 0.174), None, "of what was fitted would still be 0.174"),
         ((0.0004, 0.0005), (0.0004, 0.0005), None, None),  # all of it noise
     ],
 )
-def test_refine_writes_nothing_that_is_worse(whole, windows, apart, said, tmp_path):
+def test_refine_writes_nothing_that_is_worse(whole, segments, apart, said, tmp_path):
     measured = read_measured(scene_of(door(), tmp_path), "joint", runs_of(door(), tmp_path, 1))
     held = apart and (Error(apart[0], 0.01), Error(apart[1], 0.01))
-    fitted = tuple(Error(*both) for both in zip(whole, windows, strict=True))
+    fitted = tuple(Error(*both) for both in zip(whole, segments, strict=True))
     same = measured.profile, measured.profile
     reason = refused(fitted, held or None, 1e-3, same, Needs(measured))
     assert (reason is None) if said is None else (said in reason)

@@ -16,7 +16,7 @@ from joda.diagnosis.hypotheses.effects import KNOTS, from_effects
 from joda.diagnosis.hypotheses.intervals import NARROWEST, ends
 from joda.diagnosis.hypotheses.templates import WELLS
 from joda.diagnosis.hypothesis_fits import beside, joined, price
-from joda.diagnosis.ranking import evidence, hopeful, weigh
+from joda.diagnosis.ranking import evidence, hopeful, select
 from joda.diagnosis.search import NARROWED, _shown_without_impacts, narrowed, rank
 from joda.diagnosis.selection import Evidence, Selection, closer_counts, decide, pooled
 from joda.diagnosis.settings import SETTINGS
@@ -121,7 +121,7 @@ def test_where_the_model_leaves_only_noise_few_are_fitted_to_the_end(monkeypatch
     monkeypatch.setattr(search, "SEARCH", replace(search.SEARCH, rough_gain=-np.inf))
     whole = rank(baseline)
     assert some < (len(refined) - some) / 2
-    assert weigh(few).verdict == weigh(whole).verdict == "adequate"
+    assert select(few).verdict == select(whole).verdict == "adequate"
     assert evidence(whole).gain - evidence(few).gain < 20
 
 
@@ -158,7 +158,7 @@ def test_progress_counts_and_never_exceeds_the_total(ranked, progress):
     assert progress[-1][0] > 0.8 * progress[-1][1]
 
 
-def test_the_best_are_fitted_to_longer_windows_from_where_they_were(measured, baseline, ranked):
+def test_the_best_are_fitted_to_longer_segments_from_where_they_were(measured, baseline, ranked):
     """There the others leave a larger part of what the true one does."""
     longer = fit_baseline(measured, 3 * baseline.estimator.segments.length, baseline.fit.x)
     closer = narrowed(longer, ranked)
@@ -175,7 +175,7 @@ def test_the_best_are_fitted_to_longer_windows_from_where_they_were(measured, ba
     assert len(longer.estimator.segments.at) < len(baseline.estimator.segments.at)
 
 
-def test_ends_are_asked_last_where_windows_without_knocks_tell_of_an_effect(baseline, ranked):
+def test_ends_are_asked_last_where_segments_without_knocks_tell_of_an_effect(baseline, ranked):
     noise = float(baseline.estimator.samples)
 
     def tells(without, with_it):
@@ -228,10 +228,10 @@ def test_a_well_is_tried_where_the_other_was_found(baseline):
     assert np.allclose(tried.trials[:, -2:], [(0.6, 0.9), (0.6, 1.0), (0.3, 0.9)])
 
 
-def test_in_longer_windows_an_effect_must_leave_nothing_but_noise(ranked):
-    assert weigh(ranked).verdict == weigh(ranked, wholly=True).verdict == "missing_effect"
+def test_in_longer_segments_an_effect_must_leave_nothing_but_noise(ranked):
+    assert select(ranked).verdict == select(ranked, wholly=True).verdict == "missing_effect"
     more = replace(ranked, level=2 * SETTINGS.selection.noise_square)
-    strange = weigh(more, wholly=True)
+    strange = select(more, wholly=True)
     assert strange.verdict == "unexplained"
     assert strange.probabilities[0] <= 0.5  # and an unknown one is as likely
 
@@ -319,7 +319,7 @@ def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
     clear = replace(
         ranked, baseline=replace(ranked.baseline, fit=far), level=1.0, n_effective=estimator.samples
     )
-    own = weigh(clear).excess[0]
+    own = select(clear).excess[0]
 
     def verdict(*parts):
         """Where the first effects leave these parts of the excess."""
@@ -332,7 +332,7 @@ def test_two_that_are_nearly_as_good_only_resemble_what_is_missing(ranked):
         ]
         coarse = replace(candidates[0].hypothesis, misfit_tolerance=SETTINGS.tolerances.known_shape)
         candidates[0] = replace(candidates[0], hypothesis=coarse)
-        return weigh(replace(clear, candidates=tuple(candidates))).verdict
+        return select(replace(clear, candidates=tuple(candidates))).verdict
 
     assert verdict(0.15, 0.6) == "missing_effect"
     assert verdict(0.15, 0.18) == "unexplained"

@@ -14,7 +14,7 @@ from assets import SHARED
 from scipy import signal
 
 from joda.diagnosis.adding import add_effect
-from joda.diagnosis.learning.choosing import learn
+from joda.diagnosis.learning.term_selection import learn
 from joda.diagnosis.split import parted
 from joda.diagnosis.verdict import diagnosed
 from joda.joints.resistance import damping, friction_bounds

@@ -14,9 +14,9 @@ from joda.measured.runs import Run
 from joda.measured.scene_log import SceneRun, read_scene_run
 from joda.mjx.shooting import Scene
 from joda.profile import CHANNELS, Channel, Channels, Joint, Profile, Resistance
-from joda.refining.choosing import together
 from joda.refining.engine import JointEngine
 from joda.refining.scene import SceneEngine
+from joda.refining.scene_or_joint import together
 from joda.refining.shooting import Shooting
 
 QUIET = 1e-4

@@ -151,7 +151,7 @@ def test_where_only_knocks_have_been_nothing_was_measured(tmp_path):
     assert last < 0.98
 
 
-def test_a_fit_takes_a_windows_start_anew_where_that_is_better():
+def test_a_fit_takes_a_segments_start_anew_where_that_is_better():
     """Over an edge between two sides a start does not come back by small steps."""
     segments = cut(0.5 + 0.2 * np.sin(3 * STEP * np.arange(2000)))
     estimator = SegmentEstimator(segments, np.ones(len(segments.count), bool))
@@ -309,8 +309,8 @@ def test_starts_of_a_joint_that_runs_away_are_found_from_what_is_early_in_a_segm
     segments = segments_of(runs, 3 * [SIGMA], 2.0, -1.0, 1.0, STEP, 0.9)
     assert len(segments.at) == 3
     begun = np.stack([start, start, start - [0.0, 0.07]])
-    doubt = np.tile([10 * SIGMA, 0.1], (3, 1))
-    off = replace(segments, start=begun, prior_std=doubt)
+    prior_std = np.tile([10 * SIGMA, 0.1], (3, 1))
+    off = replace(segments, start=begun, prior_std=prior_std)
     estimator = SegmentEstimator(off, np.ones(3, bool))
     alone = estimator._descended(Hill(), begun, estimator.squares(Hill(), begun)[1], 8)
     assert np.array_equal(alone.squares > 10 * segments.count, [False, False, True])
@@ -389,7 +389,7 @@ def test_when_a_force_jumped_between_two_samples_is_not_known():
 def _spans(segments):
     """First and last times of the segments that have enough samples."""
     rows = [row[row >= 0] for row in segments.rows]
-    return [segments.time[row[[0, -1]]] for row in rows if len(row) >= smoothing.LEAST]
+    return [segments.time[row[[0, -1]]] for row in rows if len(row) >= smoothing.MIN_SAMPLES]
 
 
 def test_a_good_fit_stays_as_it_is(tmp_path):
@@ -475,7 +475,7 @@ def test_a_long_segment_with_a_knock_ends_where_the_joint_stays():
     assert segments.impacts[:leaves].any() and not segments.impacts[leaves:].any()
 
 
-def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
+def test_a_short_stroke_is_cut_into_short_segments_up_to_the_knock():
     """Full stroke in 20 ms, at 1 kHz, and then rest at the end."""
     t = STEP * np.arange(300)
     run = run_of(np.minimum(0.05 + (t / 0.02) ** 2, 1.0))
@@ -490,7 +490,7 @@ def test_a_short_stroke_is_cut_into_short_windows_up_to_the_knock():
     ("timestep", "length", "usual", "step"),
     [(2e-3, 0.1, 0.1, 1 / 1500), (5e-4, 0.45, 0.45, 3e-3), (5e-4, 1.5, 0.45, 3e-3)],
 )
-def test_steps_are_short_for_the_windows(timestep, length, usual, step):
+def test_steps_are_short_for_the_segments(timestep, length, usual, step):
     assert _step(timestep, length, usual, STEPS) == pytest.approx(step)
 
 

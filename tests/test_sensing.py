@@ -16,8 +16,8 @@ from joda.measured.sensing import RIGHT, Sensing
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.attaching import attached
+from joda.scenes.mass_attributes import Heavier
 from joda.scenes.model import describe_joint
-from joda.scenes.weights import Heavier
 
 PENDULUM = """<mujoco>
   <compiler angle="radian"/>

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from joda import JodaError, compare, compare_all, diagnose_all, improve_all
-from joda.measured.others import force_of_others
+from joda.measured.contact_samples import NEAR, touching
+from joda.measured.coupling import coupling_force
 from joda.measured.reading import read_measured
 from joda.measured.scene_replay import replayed_together
-from joda.measured.touching import NEAR, touching
 
 ARM = """<mujoco>
   <compiler angle="radian"/>
@@ -146,7 +146,7 @@ def test_the_force_of_the_others_is_that_of_a_planar_arm():
         - m2 * 9.81 * c2 * np.cos(q[0] + q[1])  # about +y a weight at +x pulls towards +q
     )
     alone = inertia * a[1] - m2 * 9.81 * c2 * np.cos(q[1])
-    found = force_of_others(arm, 1, time, {0: q[0], 1: q[1]})
+    found = coupling_force(arm, 1, time, {0: q[0], 1: q[1]})
     inner = slice(40, -40)  # the ends are smoothed from one side
     np.testing.assert_allclose(found[inner], (alone - torque)[inner], atol=0.02)
     assert np.ptp(found) > 1.0

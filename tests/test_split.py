@@ -95,12 +95,12 @@ def test_where_nothing_is_missed_nothing_can_be_told(tmp_path, rng):
     measured = thrown(tmp_path, rng, 2, drag=1e-7)
     added_effect = add_effect(*parted(measured), "quadratic_damping")
     assert added_effect.effect is None
-    assert "by no more than the noise even without it" in added_effect.reason
+    assert "no more than the noise even without it" in added_effect.reason
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3, 12])
-def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, count):
+def test_a_diagnosis_holds_out_segments_in_which_the_joint_moves(tmp_path, rng, count):
     measured = thrown(tmp_path, rng, count, drag=0.02 if count < 4 else 0.1)
     baseline = fit_baseline(measured)
     held = Holdout(baseline, measured)
@@ -116,7 +116,7 @@ def test_a_diagnosis_holds_out_windows_in_which_the_joint_moves(tmp_path, rng, c
 
 
 @pytest.mark.slow
-def test_where_windows_held_out_tell_nothing_all_are_in_turn(tmp_path, rng):
+def test_where_segments_held_out_tell_nothing_all_are_in_turn(tmp_path, rng):
     """An effect that acts where only the runs that are fitted went is not denied by the others."""
     measured = thrown(tmp_path, rng, 12, drag=0.1)
     told = Holdout(fit_baseline(measured), measured)
@@ -133,8 +133,8 @@ def test_where_nothing_was_held_out_nothing_is_missed():
     assert robust_rms([], 1e-3) == robust_rms([np.zeros(0)], 1e-3) == 0.0
 
 
-def test_of_windows_held_out_one_that_goes_astray_does_not_decide(rng):
-    """As a window in which the joint goes over a barrier, and did not: all others are nearer."""
+def test_of_segments_held_out_one_that_goes_astray_does_not_decide(rng):
+    """As a segment in which the joint goes over a barrier, and did not: all others are nearer."""
     count, noise = rng.integers(12, 20), 10 ** rng.uniform(-5, -2)
     sizes = np.sort(rng.integers(30, 60, count))
     for size in (1.0, 5.0, 200.0):
@@ -146,7 +146,7 @@ def test_of_windows_held_out_one_that_goes_astray_does_not_decide(rng):
     assert robust_rms(astray, noise) < robust_rms(before, noise)
 
 
-def test_windows_follow_the_blocks(tmp_path, rng):
+def test_segments_follow_the_blocks(tmp_path, rng):
     """The middle of each segment that is held out is in a block that is, of nearly its length."""
     measured = thrown(tmp_path, rng, 3, drag=0.02)
     for length in (0.1, 0.3):

@@ -20,8 +20,8 @@ from joda.measured.reading import read_measured
 from joda.measured.replay import Start
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run, arrival
-from joda.scenes.besides import acting_besides
 from joda.scenes.limits import SecondStop, stiffness_of
+from joda.scenes.unmodelled import unmodelled_elements
 
 SIGMA, EVERY, STEP = 2e-4, 2, 0.002
 SLIDE = """<mujoco>
@@ -222,7 +222,7 @@ def test_what_stops_a_joint_besides_is_simulated_as_mujoco_does(tmp_path, rng, e
     scene = write(tmp_path, SLIDE.format(SOFTER, besides), "scene.xml")
     measured = read_measured(scene, "slide", files)
     assert measured.joint_model.second == replace(STIFFER, end=end)
-    assert not acting_besides(mujoco.MjModel.from_xml_path(str(scene)), 0)
+    assert not unmodelled_elements(mujoco.MjModel.from_xml_path(str(scene)), 0)
     model, replayer = mujoco.MjModel.from_xml_path(str(scene)), measured.replayer
     for run in measured.runs:
         data, path = mujoco.MjData(model), []

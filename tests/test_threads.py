@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from joda import compare, refine
 from joda.diagnosis.adding import add_effect
 from joda.diagnosis.improvement import improved
-from joda.diagnosis.learning.choosing import learn
+from joda.diagnosis.learning.term_selection import learn
 from joda.diagnosis.verdict import diagnosed
 from joda.threads import one_blas_thread
 

@@ -15,7 +15,7 @@ from joda.commands.hidden_effect import _judged
 from joda.diagnosis import report
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.corrections import errors_beside_a_force, numbers, off
-from joda.diagnosis.coverage import moved_one_way
+from joda.diagnosis.data_sufficiency import moved_one_way
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.phrases import explained, named, words_of
 from joda.diagnosis.selection import Selection

@@ -76,7 +76,7 @@ def test_what_segments_hardly_show_whole_runs_name(tmp_path, rng):
     assert first.fit.loss < 0.5 * whole.ranking.baseline.fit.loss
     assert told.effects[0].magnitude == pytest.approx(more, rel=0.25)
     if told.verdict == "missing_effect":  # else segments held out are missed as much
-        assert told.summary.endswith("Windows show nothing of it; whole runs do.")
+        assert told.summary.endswith("Segments show nothing of it; free runs do.")
     else:
         assert told.summary.startswith("Whole runs. ")
 

@@ -14,7 +14,7 @@ from joda.errors import JodaError
 
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks; UTF-32 begins so too."""
-MOST = 50
+MAX_NAME = 50
 """Letters of a name that go into a file's name; a file system has room for 255 bytes of it."""
 LARGEST = 20_000_000
 """Bytes of a JSON file that is read; what joda writes has a thousandth of it."""
@@ -130,7 +130,7 @@ def fresh(name: str) -> Path:
 
 def file_name(name: str) -> str:
     """A part of a file's name that stands for `name`: no path, nothing special, not too long."""
-    return re.sub(r"[^\w.-]+", "_", name)[:MOST].strip("._-") or "joint"
+    return re.sub(r"[^\w.-]+", "_", name)[:MAX_NAME].strip("._-") or "joint"
 
 
 def make_folder(path: Path) -> None:

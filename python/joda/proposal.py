@@ -17,7 +17,7 @@ Factor = Annotated[float, Field(ge=0, le=100)]
 
 NARROWEST = 1e-3
 """Narrowest interval of an effect, in normalised position."""
-MOST_EFFECTS = 100
+MAX_EFFECTS = 100
 """A joint has three or four; more would only be slow."""
 
 
@@ -86,6 +86,6 @@ class Proposal(File):
     @model_validator(mode="after")
     def _check_count(self) -> Self:
         count = len(self.effect_proposals)
-        if count > MOST_EFFECTS:
-            raise ValueError(f"{count} effects are proposed; a joint has at most {MOST_EFFECTS}")
+        if count > MAX_EFFECTS:
+            raise ValueError(f"{count} effects are proposed; a joint has at most {MAX_EFFECTS}")
         return self

@@ -16,14 +16,14 @@ from joda.hidden.laws import State
 from joda.hidden.truth import Play, Truth
 from joda.measured import smoothing
 from joda.measured.measured_joint import Measured
-from joda.measured.replay import START, TRIES, WINDOW
+from joda.measured.replay import SEGMENT_LENGTH, START, TRIES
 
 H = 2e-4
 """Step of the true model's replay, s."""
 
 
 def true_error(case: Case) -> float:
-    """RMS error (rad or m) of the true joint on the held-out runs in windows of 0.4 s.
+    """RMS error (rad or m) of the true joint on the held-out runs in segments of 0.4 s.
 
     As `Replayer.windows` does it, and as easily misled by a knock: from starts that are fitted
     within their measurement's error, under the measured force, linear between samples. What has a
@@ -31,7 +31,7 @@ def true_error(case: Case) -> float:
     delay's memory and a disturbance's clock are left out.
     """
     pieces = [piece for k, run in enumerate(case.held_out) for piece in _pieces(k, run)]
-    starts, doubts = (np.array([getattr(p, key) for p in pieces]) for key in ("start", "doubt"))
+    starts, spread = (np.array([getattr(p, key) for p in pieces]) for key in ("start", "prior_std"))
     forces = np.repeat(np.array([p.force for p in pieces]).T, 3, axis=1)
     memory = {}
     if any(isinstance(law, State | Play) for law in case.truth.hidden):
@@ -42,7 +42,7 @@ def true_error(case: Case) -> float:
     least, misfits = np.full(len(pieces), np.inf), [np.zeros(0)] * len(pieces)
     for _ in range(TRIES):
         moved = np.clip(best + move, -START, START)
-        q, v = np.reshape((starts + doubts * moved)[:, None] + doubts[:, None] * off, (-1, 2)).T
+        q, v = np.reshape((starts + spread * moved)[:, None] + spread[:, None] * off, (-1, 2)).T
         path = _replayed(case.truth, forces, q, v, memory).reshape(len(forces), -1, 3)
         for k, p in enumerate(pieces):
             near = np.stack([np.interp(p.time, H * np.arange(len(path)), x) for x in path[:, k].T])
@@ -59,24 +59,24 @@ def true_error(case: Case) -> float:
 
 @dataclass(frozen=True)
 class Piece:
-    """A window of a run: its samples, their times from its begin, measured start, force."""
+    """A segment of a run: its samples, their times from its begin, measured start, force."""
 
     run: int
     begin: float
     time: np.ndarray
     position: np.ndarray
     start: tuple[float, float]
-    doubt: tuple[float, float]
+    prior_std: tuple[float, float]
     force: np.ndarray
     sigma: float
 
 
 def _pieces(number: int, run) -> Iterator[Piece]:
     sigma = smoothing.noise(run.time, run.position)
-    count = max(int((run.time[-1] - run.time[0]) / WINDOW + 1e-9), 1)
-    for begin in run.time[0] + WINDOW * np.arange(count):
-        inside = (run.time >= begin - 1e-9) & (run.time <= begin + WINDOW + 1e-9)
-        if np.count_nonzero(inside) < smoothing.LEAST:
+    count = max(int((run.time[-1] - run.time[0]) / SEGMENT_LENGTH + 1e-9), 1)
+    for begin in run.time[0] + SEGMENT_LENGTH * np.arange(count):
+        inside = (run.time >= begin - 1e-9) & (run.time <= begin + SEGMENT_LENGTH + 1e-9)
+        if np.count_nonzero(inside) < smoothing.MIN_SAMPLES:
             continue
         x = smoothing.smooth(run.time, run.position, np.array([begin]), sigma)
         yield Piece(
@@ -86,7 +86,7 @@ def _pieces(number: int, run) -> Iterator[Piece]:
             run.position[inside],
             (x.position[0], x.velocity[0]),
             (x.position_error[0], x.velocity_error[0]),
-            np.interp(begin + H * np.arange(round(WINDOW / H) + 1), run.time, run.force),
+            np.interp(begin + H * np.arange(round(SEGMENT_LENGTH / H) + 1), run.time, run.force),
             sigma,
         )
 

@@ -20,7 +20,7 @@ from hidden_cases import read
 from neural_network import Moved, Network, Replays
 
 from joda.diagnosis.adding import clearly, error, fallen, replayed
-from joda.diagnosis.learning.choosing import learn
+from joda.diagnosis.learning.term_selection import learn
 from joda.diagnosis.paired_test import worse
 from joda.diagnosis.shape_refinement import Likelihood
 from joda.diagnosis.split import parted
@@ -152,7 +152,7 @@ def main() -> None:
     seed = None if given.seed == "fresh" else int(given.seed)
     entropy = np.random.SeedSequence(seed).entropy % 2**32 if seed is None else seed
     print(f"seed {entropy}")
-    rng, laws = np.random.default_rng(entropy), tuple(FAMILIES["laboratory"].beyond)
+    rng, laws = np.random.default_rng(entropy), tuple(FAMILIES["laboratory"].uncatalogued)
     for number in range(given.cases):
         effect, seed = laws[number % len(laws)], int(rng.integers(2**31))
         if number < given.skip:

@@ -103,7 +103,8 @@ class Network:
         return best
 
     def _descent(self, segments, descent):
-        """`EVERY` iterations over a network's numbers and the windows' starts in their doubts."""
+        """`EVERY` iterations over a network's numbers and the segments' starts in prior standard
+        deviations."""
         counts = segments.usable
         ends = np.append(segments.at[1:], len(segments.force))
         force = _filled(segments.force, segments.at, ends)

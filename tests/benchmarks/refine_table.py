@@ -107,7 +107,7 @@ def problem_of(found: Context, start: Profile, runs, kinds=("values", "intervals
 
 
 def missed(found: Context, profile: Profile, runs, windows: bool = False) -> float:
-    """RMS misfit of whole runs, or of windows of 0.4 s, rad or m."""
+    """RMS misfit of whole runs, or of segments of 0.4 s, rad or m."""
     one = problem_of(found, profile, runs)
     return one.shooting.rms(one.long if windows else one.whole, one.parameters.start)
 

@@ -47,7 +47,7 @@ from joda.hidden.cases import VISIBLE
 from joda.measured import smoothing
 from joda.measured.measured_joint import Measured
 from joda.measured.reading import read_measured
-from joda.measured.replay import WINDOW
+from joda.measured.replay import SEGMENT_LENGTH
 
 Array = np.ndarray
 
@@ -79,7 +79,7 @@ def case_of(seed: int, effect: str | None) -> Case:
 # --- mujoco.sysid
 @dataclass(frozen=True)
 class Piece:
-    """A window of a run; times from its begin, s.
+    """A segment of a run; times from its begin, s.
 
     Attributes:
         time, position: of its samples, rad or m.
@@ -96,11 +96,11 @@ class Piece:
 def pieces_of(measured: Measured) -> list[Piece]:
     """All runs in windows."""
     h, out = measured.timestep, []
-    t = h * np.arange(round(WINDOW / h) + 1)
+    t = h * np.arange(round(SEGMENT_LENGTH / h) + 1)
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        for begin in np.arange(run.time[0], run.time[-1] - WINDOW + 1e-9, WINDOW):
-            inside = (run.time > begin + h) & (run.time <= begin + WINDOW + 1e-9)
-            if np.count_nonzero(inside) < smoothing.LEAST:
+        for begin in np.arange(run.time[0], run.time[-1] - SEGMENT_LENGTH + 1e-9, SEGMENT_LENGTH):
+            inside = (run.time > begin + h) & (run.time <= begin + SEGMENT_LENGTH + 1e-9)
+            if np.count_nonzero(inside) < smoothing.MIN_SAMPLES:
                 continue
             x = smoothing.smooth(run.time, run.position, np.array([begin]), sigma)
             start = np.array([x.position, x.velocity])

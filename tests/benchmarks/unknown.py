@@ -13,7 +13,7 @@ import numpy as np
 from hidden_cases import read
 
 from joda.diagnosis.adding import error
-from joda.diagnosis.learning.choosing import learn
+from joda.diagnosis.learning.term_selection import learn
 from joda.diagnosis.split import parted
 from joda.hidden import FAMILIES, draw
 
@@ -85,7 +85,7 @@ def main() -> None:
     seed = None if given.seed == "fresh" else int(given.seed)
     entropy = np.random.SeedSequence(seed).entropy % 2**32 if seed is None else seed
     print(f"seed {entropy}")
-    rng, laws, rows = np.random.default_rng(entropy), tuple(FAMILIES[given.family].beyond), []
+    rng, laws, rows = np.random.default_rng(entropy), tuple(FAMILIES[given.family].uncatalogued), []
     for number in range(given.cases):
         effect = laws[number % len(laws)]
         row = examined(int(rng.integers(2**31)), effect, given.family)

@@ -77,7 +77,12 @@ def spread(family: str) -> list[tuple[str | None, bool]]:
     """What the cases of group `families` hide, in turn, and whether force is recorded."""
     named: list[tuple[str | None, bool]] = [(name, True) for name in EFFECTS]
     named += [(name, False) for name in unforced(family)]
-    return [(None, True), (None, False), *named, *((one, True) for one in FAMILIES[family].beyond)]
+    return [
+        (None, True),
+        (None, False),
+        *named,
+        *((one, True) for one in FAMILIES[family].uncatalogued),
+    ]
 
 
 def job_of(master: int, group: str, number: int, family: str = FAMILY) -> Job:
@@ -100,7 +105,7 @@ def job_of(master: int, group: str, number: int, family: str = FAMILY) -> Job:
     if group == "free":
         return replace(one, effect=turn(unforced(family)), forced=False)
     if group == "outside" and number % 2 == 0:
-        return replace(one, effect=turn(tuple(FAMILIES[family].beyond), number // 2))
+        return replace(one, effect=turn(tuple(FAMILIES[family].uncatalogued), number // 2))
     if group == "outside":
         effect = turn(EFFECTS, number // 2)
         return replace(one, effect=effect, exclude=(effect,))
@@ -137,7 +142,7 @@ def mixed(master: int, hides: str, forced: bool, most: int) -> list[Job]:
     """
     each = []
     for family in sorted(set(FAMILIES) - {"field"}):
-        every, beyond = spread(family), FAMILIES[family].beyond
+        every, beyond = spread(family), FAMILIES[family].uncatalogued
         kinds = ["outside" if e in beyond else "effect" if e else "nothing" for e, _ in every]
         places = [
             k

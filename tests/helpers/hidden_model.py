@@ -15,7 +15,7 @@ from joda.effects import (
     QuadraticDamping,
     StribeckFriction,
 )
-from joda.hidden import laws, masses, rubbing, truth
+from joda.hidden import friction_laws, laws, masses, truth
 from joda.hidden.cases import Case
 from joda.profile import Channels, Profile, Resistance
 
@@ -59,15 +59,15 @@ def _with(profile: Profile, law: laws.Law) -> Profile:
                 direction=_way(law.direction), y=(law.size, law.size)
             )
             return profile.with_effect(effect)
-        case rubbing.Rub() if law.direction:
+        case friction_laws.IntervalFriction() if law.direction:
             effect = AsymmetricFriction(direction=_way(law.direction), y=(law.size, law.size))
             return profile.with_effect(effect)
         case laws.Drag():
             return profile.with_effect(QuadraticDamping(direction="both", y=(law.size, law.size)))
-        case rubbing.Stribeck():
+        case friction_laws.Stribeck():
             effect = StribeckFriction(velocity=law.velocity, exponent=2.0, y=(law.size, law.size))
             return profile.with_effect(effect)
-        case rubbing.Loaded():
+        case friction_laws.LoadFriction():
             return profile.with_effect(LoadDependentFriction(coefficient=law.coefficient))
         case truth.Bristle():
             effect = PreslidingFriction(stiffness=law.stiffness, damping=law.damping, breakaway=0.0)
@@ -89,7 +89,7 @@ def _with(profile: Profile, law: laws.Law) -> Profile:
         channel, y = "damping", -law.force(s, s, np.ones_like(s), zero)
     elif isinstance(law, laws.Force):
         channel, y = "conservative", law.force(s, s, np.zeros_like(s), zero)
-    elif isinstance(law, rubbing.Rub | rubbing.FrictionAlong):
+    elif isinstance(law, friction_laws.IntervalFriction | friction_laws.PositionFriction):
         channel, y = "friction", law.limit(s, zero, zero, zero, zero)
     else:
         raise NotImplementedError(type(law).__name__)

@@ -13,11 +13,11 @@ from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error,
 from joda.diagnosis.applied_corrections import from_report
 from joda.diagnosis.end_stops import stops_described
 from joda.diagnosis.findings import read_diagnosis
-from joda.diagnosis.learning.account import Account, account, learned_picture
-from joda.diagnosis.learning.account import sentences as law_sentences
-from joda.diagnosis.learning.choosing import learn
 from joda.diagnosis.learning.fitting import Learned
 from joda.diagnosis.learning.law import LABEL
+from joda.diagnosis.learning.report import Account, account, learned_picture
+from joda.diagnosis.learning.report import sentences as law_sentences
+from joda.diagnosis.learning.term_selection import learn
 from joda.diagnosis.outcome import (
     NO_TRUST,
     beside,
@@ -267,7 +267,7 @@ def _no_help(told: dict[str, Any], effect: str) -> str | None:
 def _in_doubt(told: dict[str, Any]) -> str | None:
     """Why nothing is added before somebody asks for it by name, a clause; None if nothing is in
     doubt."""
-    doubt = told.get("doubt")
+    doubt = told.get("confounder")
     return f"{doubt}; --effect adds it all the same" if isinstance(doubt, str) else None
 
 

@@ -16,14 +16,14 @@ from joda.measured.comparison import Comparison, sentences
 from joda.measured.curves import curve_error, curves_verdict, failing_force
 from joda.measured.driven import ALL, named_joints
 from joda.measured.errors import Errors, errors, known
-from joda.measured.failing import LENGTHS, Failing, where, window_rows
+from joda.measured.failing_intervals import LENGTHS, Failing, where, window_rows
 from joda.measured.maps import SHOWN, Replayed, draw_curves, draw_maps, draw_runs
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import rms
 from joda.measured.reading import read_measured
 from joda.measured.replay import left_out
 from joda.measured.scene_replay import Together, replayed_together
-from joda.measured.stepping import timestep_note
+from joda.measured.timestep_error import timestep_note
 from joda.measured.visited import unvisited
 from joda.pictures.page import page, paragraph, table
 from joda.pictures.page import picture as embedded

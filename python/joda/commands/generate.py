@@ -17,7 +17,7 @@ from joda.propose.generation import ROUNDS, Generated, begin, check_rounds, choo
 from joda.propose.history import History
 from joda.propose.joints import PassedOver, only_joint
 from joda.propose.session import Progress, silent
-from joda.scenes.shelf import loading_once
+from joda.scenes.model_cache import loading_once
 from joda.template import read_templates
 from joda.terminal import options
 from joda.terminal.progress import progress_bar, spinner

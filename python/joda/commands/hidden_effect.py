@@ -13,8 +13,8 @@ from joda.commands.compare import compare
 from joda.commands.diagnose import diagnose
 from joda.commands.diagnose import sentences as of_diagnosis
 from joda.diagnosis.findings import Diagnosis, Finding
-from joda.diagnosis.learning.account import sentences as law_sentences
 from joda.diagnosis.learning.law import LABEL
+from joda.diagnosis.learning.report import sentences as law_sentences
 from joda.diagnosis.overlap import overlap
 from joda.diagnosis.phrases import named, percent
 from joda.errors import JodaError

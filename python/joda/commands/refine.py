@@ -11,7 +11,7 @@ import typer
 from numpy.typing import NDArray
 
 from joda.diagnosis.adding import Error, error
-from joda.diagnosis.coverage import hardly_moved
+from joda.diagnosis.data_sufficiency import hardly_moved
 from joda.diagnosis.outcome import parting
 from joda.diagnosis.plausible import Needs
 from joda.diagnosis.shape_refinement import resolved
@@ -32,11 +32,11 @@ from joda.pictures.changes import changes
 from joda.pictures.style import png
 from joda.profile import Profile
 from joda.refining.acceptance import refused
-from joda.refining.choosing import together
 from joda.refining.curvefit import CurveProblem
 from joda.refining.engine import JointEngine, noise
 from joda.refining.fitting import Problem
 from joda.refining.refinement import extrapolated, history, picture, unseen
+from joda.refining.scene_or_joint import together
 from joda.scenes.attaching import attached
 from joda.scenes.context import Context, context
 from joda.scenes.model import find_joint, joint_name, load_model

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline, fit_baseline
-from joda.diagnosis.coverage import at_rest
+from joda.diagnosis.data_sufficiency import at_rest
 from joda.diagnosis.departures import FAITHFUL, Departures, departures, given_parts, restored
 from joda.diagnosis.end_stops import fitted_stops
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.overlap import overlap
 from joda.diagnosis.paired_test import MISSED_MORE, risen, worse
-from joda.diagnosis.plausible import Needs, implausible, unseen_place, unseen_shape
+from joda.diagnosis.plausible import Needs, implausible, unvisited_interval, unvisited_shape
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import (
     LONGEST,
@@ -37,14 +37,13 @@ from joda.profile import Profile
 from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
 
-NO_LESS = "it does not lower the error on what was held out of the fit"
+NO_LESS = "it does not lower the held-out error"
 OWN = (
     "the model's own numbers, fitted without it, do as well on what was held out; joda refine fits "
     "them"
 )
 NOTHING_LEFT = (
-    "what was held out of the fit is missed by no more than the noise even without it, so that it "
-    "cannot tell"
+    "the held-out error is no more than the noise even without it, so that it cannot tell"
 )
 STRENGTHS = (1.0, 3.0, 10.0)
 """Of an effect whose place is known: the trials, in units of the usual one."""
@@ -57,7 +56,7 @@ class Error:
     Attributes:
         whole: RMS of open-loop replays of whole runs or blocks, rad or m; None where none can be
             replayed, as the force at its beginning is unknown, or there are only curves.
-        window: RMS of windows of 0.4 s, rad or m; of curves the force's, N·m or N.
+        window: RMS of segments of 0.4 s, rad or m; of curves the force's, N·m or N.
     """
 
     whole: float | None
@@ -116,7 +115,7 @@ def add_effect(
     """Adds an effect, if that is plausible and runs held out are clearly better with it.
 
     Of what is tried, the likeliest is taken that makes those runs likelier, their error less in
-    windows (a paired test) and not more as a whole, and exerts no force that nothing needs. It may
+    segments (a paired test) and not more as a whole, and exerts no force that nothing needs. It may
     change what the model gave, or act elsewhere than near, only if no other is nearly as good.
 
     Args:
@@ -129,14 +128,14 @@ def add_effect(
         given: the profile of the model as it was given; None: the joint's as it is.
     """
     before, replays = replayed(held)
-    if reason := at_rest(train) or unseen_place(train, near):
+    if reason := at_rest(train) or unvisited_interval(train, near):
         return AddedEffect(train.profile, None, before, before, reason)
     progress("the effect's own numbers")
     given = given or train.profile
     baseline = fit_baseline(train)
     begin = starts(baseline, effect, direction, near)
     trials = Trials(train, held, effect == RESTITUTION, begin[0] if begin else None)
-    tried = [one for start in begin for one in trials.reshaped(start, effect, progress)]
+    tried = [one for start in begin for one in trials.refined_shapes(start, effect, progress)]
     loss = trials.unseen.loss(train.profile)
 
     needs = Needs(train)
@@ -146,7 +145,7 @@ def add_effect(
         reasons = []
         for one in sorted(some, key=lambda one: one.score):
             reason = implausible(needs, one.profile, effect)
-            reason = reason or unseen_shape((train, held), one.profile, effect, train.profile)
+            reason = reason or unvisited_shape((train, held), one.profile, effect, train.profile)
             if not reason and not clearly(one.unseen, loss):
                 reason = NO_LESS
             if not reason:  # replays take longest
@@ -186,7 +185,7 @@ def add_effect(
     if departs.parts:
         progress("the model's own numbers without the effect")
         own = checked(baseline.base.written(baseline.fit.x))
-        without = likeliest(trials.reshaped(own, effect, progress))
+        without = likeliest(trials.refined_shapes(own, effect, progress))
         if _as_good(without, first):
             return AddedEffect(train.profile, None, before, before, OWN)
     return AddedEffect(first.profile, effect, before, after, departs=departs)
@@ -243,11 +242,12 @@ def by_all(
 
 
 def fallen(before: Error, after: Error) -> bool:
-    """Whether windows are missed by less, or whole runs where windows are too short to show it."""
-    windows = after.window < SETTINGS.adding.max_segment_error * before.window
+    """Whether the segment error is smaller, or that of free runs where segments are too short to
+    show it."""
+    in_segments = after.window < SETTINGS.adding.max_segment_error * before.window
     if before.whole is None or after.whole is None:
-        return windows
-    return windows or (
+        return in_segments
+    return in_segments or (
         after.whole < SETTINGS.adding.whole_run_fall * before.whole and after.window < before.window
     )
 

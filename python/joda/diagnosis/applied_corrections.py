@@ -7,7 +7,7 @@ from typing import Any
 
 from joda.measured.measured_joint import Measured
 from joda.measured.sensing import RIGHT, Sensing
-from joda.scenes.weights import Heavier
+from joda.scenes.mass_attributes import Heavier
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class AppliedCorrections:
         return measured.sensed(self.sensing).changed(joint_model=joint_model)
 
 
-def righted(values: Mapping[str, float]) -> AppliedCorrections:
+def applied_corrections(values: Mapping[str, float]) -> AppliedCorrections:
     """By the numbers' names: factors of the body, and numbers of a `Sensing`; others are left."""
     mass, inertia, gravity = (values.get(name, 1.0) for name in ("mass", "inertia", "gravity"))
     heavier = Heavier(mass * inertia, mass * gravity, values.get("center_of_mass", 0.0))
@@ -53,5 +53,5 @@ def from_report(corrections: Sequence[Any], driven: bool) -> AppliedCorrections 
             values[name] = float(number)
     if driven:
         values.pop("time_delay", None)
-    found = righted(values)
+    found = applied_corrections(values)
     return None if found == AppliedCorrections(None, RIGHT) else found

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.diagnosis.applied_corrections import AppliedCorrections, righted
+from joda.diagnosis.applied_corrections import AppliedCorrections, applied_corrections
 from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.findings import Correction
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 ALSO_AN_EFFECT: NuisanceName = "force_offset"
 """A number in whose place an effect always explains as much: a constant force."""
-LEAST_FACTOR = 1e-3
+MIN_FACTOR = 1e-3
 """Below which a factor of the model's own strengths counts as that."""
 LONGEST = 1.5
 """Length of the segments in which numbers are fitted at last, s."""
@@ -105,26 +105,28 @@ class Calibration:
         )
 
     @property
-    def righted(self) -> AppliedCorrections:
+    def applied(self) -> AppliedCorrections:
         """What is to be set right."""
-        return self._righted(self.fit.x)
+        return self._applied(self.fit.x)
 
     def of(self, measured: Measured) -> Measured:
         """A joint and its runs with the numbers set right, which are known as well as that."""
         left = {
             str(name): float(error) for name, error in zip(self.names, self.errors, strict=True)
         }
-        return replace(self.righted.of(measured), loose=left)
+        return replace(self.applied.of(measured), loose=left)
 
     def drawn(self) -> list[AppliedCorrections]:
         """The same with numbers that are as likely, within the errors of these."""
         rng, count = np.random.default_rng(0), len(self.names)
         off = rng.multivariate_normal(np.zeros(count), self.covariance, DRAWS, method="svd")
         strengths, own = np.split(self.fit.x, [len(self.fit.x) - count])
-        return [self._righted(np.append(strengths, own + one)) for one in off]
+        return [self._applied(np.append(strengths, own + one)) for one in off]
 
-    def _righted(self, x: Array) -> AppliedCorrections:
-        return righted({str(name): value for name, value in self.numbers.values(x).items()})
+    def _applied(self, x: Array) -> AppliedCorrections:
+        return applied_corrections(
+            {str(name): value for name, value in self.numbers.values(x).items()}
+        )
 
     def beats(
         self, baseline: Baseline, candidates: Sequence[FittedHypothesis], clearly: bool
@@ -186,7 +188,7 @@ class Calibrator:
 def _longer(measured: Measured, found: Calibration) -> Calibration:
     """The same fitted on in long segments, in which a small error shows; as it was where its
     numbers are others there."""
-    longest = longest_followed(found.righted.of(measured), LONGEST)
+    longest = longest_followed(found.applied.of(measured), LONGEST)
     estimator, own = as_recorded(measured, found, longest)
     start = estimator.started(own.make(found.fit.x)).start
     fit = estimator.fit(own.make, own.unknowns, found.fit.x, start)
@@ -372,7 +374,7 @@ def _concluded(
     samples = max(estimator.samples, 1.0)
     left, before = excess(fit.loss, samples), excess(baseline.fit.loss, samples)
     base = own.base
-    off = np.log(np.maximum(fit.x[: base.count], LEAST_FACTOR)) / base.unknowns.prior_std
+    off = np.log(np.maximum(fit.x[: base.count], MIN_FACTOR)) / base.unknowns.prior_std
     if "force_scale" in names and len(off):  # masses and strengths may all be off by one factor
         off = off - off.mean()
     usual = float(off @ off) < SETTINGS.corrections.surprising**2  # else something resists

@@ -18,7 +18,7 @@ EFFECTS = "effects"
 
 
 @dataclass(frozen=True)
-class Moved:
+class ChangedPart:
     """A component or an effect that a model gave, changed by a fit by much (`model_error`).
 
     Attributes:
@@ -42,7 +42,7 @@ class Departures:
         elsewhere: that its effect acts elsewhere than diagnosed, a sentence; None if it does not.
     """
 
-    parts: tuple[Moved, ...] = ()
+    parts: tuple[ChangedPart, ...] = ()
     changed: str | None = None
     elsewhere: str | None = None
 
@@ -67,7 +67,7 @@ def departures(
         effect: its name.
         near: where it was diagnosed, in normalised position, if that is known.
     """
-    parts = moved(given, profile, effect)
+    parts = changed_parts(given, profile, effect)
     changed = elsewhere = None
     if parts:
         percent = 100 * SETTINGS.adding.model_error
@@ -86,7 +86,7 @@ def departures(
     return Departures(parts, changed, elsewhere)
 
 
-def moved(given: Profile, profile: Profile, effect: str) -> tuple[Moved, ...]:
+def changed_parts(given: Profile, profile: Profile, effect: str) -> tuple[ChangedPart, ...]:
     """What a fit has changed of what a model gave.
 
     Args:
@@ -99,30 +99,32 @@ def moved(given: Profile, profile: Profile, effect: str) -> tuple[Moved, ...]:
         old, new = (getattr(one.channels, name).components for one in (given, profile))
         for number, pair in enumerate(zip(old, new, strict=False)):
             if pair[0].label != effect and (told := _curve(*pair, name, given.joint)):
-                out.append(Moved(name, number, told))
+                out.append(ChangedPart(name, number, told))
     now, listed = {one.key: one for one in profile.effects}, written_as(effect)
     for old in given.effects:
         new = now[old.key]
         if old.effect != listed and _differs(old, new):
-            out.append(Moved(EFFECTS, old.key, f"{old.described()} → {new.described()}"))
+            out.append(ChangedPart(EFFECTS, old.key, f"{old.described()} → {new.described()}"))
     return tuple(out)
 
 
-def given_parts(given: Profile, effect: str) -> tuple[Moved, ...]:
+def given_parts(given: Profile, effect: str) -> tuple[ChangedPart, ...]:
     """All that a model gave, but what has an effect's name."""
     channels = [(name, getattr(given.channels, name).components) for name in CHANNELS]
     curves = [
-        Moved(name, number, one.label)
+        ChangedPart(name, number, one.label)
         for name, components in channels
         for number, one in enumerate(components)
         if one.label != effect
     ]
     listed = written_as(effect)
-    others = [Moved(EFFECTS, one.key, one.key) for one in given.effects if one.effect != listed]
+    others = [
+        ChangedPart(EFFECTS, one.key, one.key) for one in given.effects if one.effect != listed
+    ]
     return (*curves, *others)
 
 
-def restored(profile: Profile, given: Profile, parts: Collection[Moved]) -> Profile:
+def restored(profile: Profile, given: Profile, parts: Collection[ChangedPart]) -> Profile:
     """The profile with some parts as the model gave them."""
     back = {(part.where, part.what) for part in parts}
     channels = {}

@@ -232,7 +232,7 @@ def _visits(measured: Measured) -> _Visits | None:
         (run.part(part), sigma)
         for run, sigma in zip(measured.runs, measured.sigma, strict=True)
         for part in visits(run, (lo, hi), CLEAR * sigma, (BEFORE * around, AFTER * around))
-        if part.stop - part.start >= smoothing.LEAST
+        if part.stop - part.start >= smoothing.MIN_SAMPLES
     ]
     if not pairs:
         return None

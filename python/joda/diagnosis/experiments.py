@@ -139,7 +139,7 @@ def menu(means: ExperimentalLimits) -> Iterator[Motion]:
         for middle in (0.25, 0.5, 0.75):
             swing = 0.01 * (1 + t) * np.sin(2 * np.pi * t / 1.5)
             yield Motion(
-                f"Push to and fro around q = {lo + middle * span:.3g} {unit}, at first by "
+                f"Push in both directions around q = {lo + middle * span:.3g} {unit}, at first by "
                 f"{0.01 * span:.2g} {unit}, then more and more up to {0.07 * span:.2g} {unit}, a "
                 "turn every 0.75 s, for 6 s, and record the force.",
                 middle + swing,

@@ -103,8 +103,8 @@ class Diagnosis:
         notes: what is suspicious about the data.
         contacts: of the scene that resist the joint where it was measured.
         corrections: numbers of the model that the data contradict, apart from what is missing.
-        doubt: why the first effect may be none however well it explains the runs, a clause: then it
-            is added only if it is asked for by name. None if nothing speaks for that.
+        confounder: of the measurement, that would look as the first effect does, a clause: then
+            that is added only if it is asked for by name. None if there is none.
         unexplained_probability: that what is missing is none of the known effects, by the same map
             as theirs; None where nothing was weighed, or more than that map decided.
     """
@@ -120,7 +120,7 @@ class Diagnosis:
     notes: tuple[str, ...]
     contacts: tuple[Contact, ...]
     corrections: tuple[Correction, ...] = ()
-    doubt: str | None = None
+    confounder: str | None = None
     unexplained_probability: float | None = None
 
     def to_json(self) -> str:

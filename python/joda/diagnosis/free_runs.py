@@ -64,7 +64,7 @@ def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = (
         return [_replayer(measured, baseline, x, finest) for x in drawn_strengths(baseline)]
 
     @cache
-    def righted() -> list[Replayer]:
+    def corrected() -> list[Replayer]:
         return [_replayer(other, baseline, baseline.fit.x, finest) for other in others]
 
     @cache
@@ -89,7 +89,7 @@ def worst(measured: Measured, baseline: Baseline, others: Sequence[Measured] = (
         if missed <= SETTINGS.whole_runs.max_multiple:
             return missed
         moved = [other.whole(part, start, True)[there] - path[there] for other in drawn()]
-        for other, with_it in zip(righted(), others, strict=True):
+        for other, with_it in zip(corrected(), others, strict=True):
             run = with_it.runs[number]  # a delay leaves it without some of its samples
             force = np.interp(part.time, run.time, run.force)
             zero = float(np.median(np.interp(part.time, run.time, run.position) - part.position))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import Baseline, fit_baseline
-from joda.diagnosis.coverage import moved_one_way
+from joda.diagnosis.data_sufficiency import moved_one_way
 from joda.diagnosis.free_runs import FreeRuns, free_runs
 from joda.diagnosis.plausible import Needs
 from joda.diagnosis.ranking import Ranking, evidence, hopeful, shows

@@ -29,25 +29,25 @@ Array = NDArray[np.float64]
 
 MOVES = (0.1, 0.04, 0.015)
 """How far ends of intervals are moved on trial, in normalised position."""
-FAR = 10.0
+TRIAL_STEPS = 10.0
 """How far other numbers are moved, in their steps."""
 WIDE = 2.0
 """How far a search begins to look, in those."""
 SEARCHED, SETTLING = 15, 4
 """Models that it tries for each number, and iterations that fit the starts of one."""
-FEW = 4
+ITERATIONS = 4
 """Iterations after that."""
 ROUGH = 3
 """Iterations in which segments that are far off count in full; as many again of the best trials."""
 BEST = 3
 """How many trials of a hypothesis with many are fitted."""
-APART = 0.06
+MIN_DIFFERENCE = 0.06
 """How much these must differ in one of their numbers."""
 FINEST = 3
 """How many times the places at which a size differs along the way become more."""
-LOST = 10.0
+MAX_RESIDUAL = 10.0
 """Mean square residual of segments, in the median, from which a model's fit leads nowhere."""
-MANY = 4000
+MANY_SAMPLES = 4000
 """Samples that count as many: from there on, what was fitted first is hardly in the way."""
 
 
@@ -123,7 +123,9 @@ def initial_points(
 
     A factor that is far off may stand in for what is missing; many samples lead back from there.
     """
-    far = estimator.samples < MANY and np.any(np.abs(fit.x - given.x) > SETTINGS.search.stand_in)
+    far = estimator.samples < MANY_SAMPLES and np.any(
+        np.abs(fit.x - given.x) > SETTINGS.search.stand_in
+    )
     fits = [fit, given] if far else [fit]
     wide = [CAUCHY_SCALE * usual(estimator, one) for one in fits]
     return tuple(
@@ -177,7 +179,7 @@ def screened(
         apart = [
             np.abs(hypothesis.trials[k] - hypothesis.trials[c])[1:].max(initial=0.0) for c in chosen
         ]
-        if min(apart, default=1.0) > APART:
+        if min(apart, default=1.0) > MIN_DIFFERENCE:
             chosen.append(int(k))
     return [out[k] for k in chosen]
 
@@ -207,7 +209,7 @@ def coarse(
         for fit in best(point, screened(estimator, base, point, hypothesis), hypothesis.kept)
     ]
     segments, first = estimator.segments, points[0]
-    if usual(estimator, first.fit) >= LOST and segments.pushed:
+    if usual(estimator, first.fit) >= MAX_RESIDUAL and segments.pushed:
         given = replace(first.fit, x=base.unknowns.mean, start=segments.start)
         near = balanced(segments, base.profile, base.joint_model, hypothesis)
         found += best(replace(first, fit=given), near, 1)
@@ -291,12 +293,12 @@ def perturbed(
     first = base.count
     places = [(k, by) for by in MOVES for k in range(n - found.hypothesis.ends, n)]
     own = n - found.hypothesis.ends - found.hypothesis.factors
-    shapes = [(k, FAR * unknowns.step[k]) for k in range(first, own)]
+    shapes = [(k, TRIAL_STEPS * unknowns.step[k]) for k in range(first, own)]
     for k, by in places + shapes:
         for way in (-by, by):
             x = best.x.copy()
             x[k] += way
-            trial = estimator.fit(make, unknowns, x, best.start, FEW)
+            trial = estimator.fit(make, unknowns, x, best.start, ITERATIONS)
             if trial.loss < best.loss - SETTINGS.search.equal_loss:
                 best = estimator.fit(make, unknowns, trial.x, trial.start)
     return _free(
@@ -326,7 +328,7 @@ def simplex_searched(
     """The candidate after a search without derivatives, in which every segment's start is fitted
     anew: where a joint sticks and slips, the loss is jagged."""
     make, unknowns = joined(base, found.hypothesis)
-    scale, k = FAR * unknowns.step, len(unknowns.step)
+    scale, k = TRIAL_STEPS * unknowns.step, len(unknowns.step)
 
     def at(z: Array) -> Array:
         return np.clip(found.fit.x + scale * z, unknowns.low, unknowns.high)

@@ -20,15 +20,15 @@ IMPACTS = SETTINGS.impacts
 
 Array = NDArray[np.float64]
 
-MOST = 24
+MAX_SEGMENTS = 24
 """Segments with impacts at an end from which on only some are looked at."""
 RATIOS = np.linspace(0.2, 0.95, 11)
 """Restitutions that are tried."""
-FEWEST = 3
+MIN_RATIOS = 3
 """Restitutions between which the best one is told, at the least."""
 SHORTEST, TIMES = 6, 8
 """Steps that an impact lasts at the least without damping, and how many durations are tried."""
-AROUND = 5
+IMPACT_SAMPLES = 5
 """Samples before and after an impact that tell its speeds."""
 IMPACT_TIME = 0.6
 """In which a joint goes through its range towards an impact, s."""
@@ -174,15 +174,15 @@ def impacts_at(segments: Segments, base: BaseModel, given: JointModel) -> dict[i
                 continue
             ratios = np.append(RATIOS, mean)
         tried = np.unique(ratios[(ratios > own + IMPACTS.min_restitution) & (ratios <= RATIOS[-1])])
-        if len(tried) < FEWEST:
+        if len(tried) < MIN_RATIOS:
             continue
         out[side] = Impacts(some_of(segments, numbers), given, own, times, tried)
     return out
 
 
 def some_of(segments: Segments, numbers: NDArray[np.intp]) -> SegmentEstimator:
-    """Of the segments with these numbers, or of `MOST` of them at most, evenly spread."""
-    kept = np.isin(np.arange(len(segments.at)), numbers[:: len(numbers) // MOST + 1])
+    """Of the segments with these numbers, or of `MAX_SEGMENTS` of them at most, evenly spread."""
+    kept = np.isin(np.arange(len(segments.at)), numbers[:: len(numbers) // MAX_SEGMENTS + 1])
     return SegmentEstimator(segments.only(kept), np.ones(int(kept.sum()), bool))
 
 
@@ -235,7 +235,10 @@ def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Ar
     for k in np.flatnonzero(np.isin(sides, ends)):
         row = segments.rows[k]
         own = row[row >= 0]
-        near = max(own[0] - AROUND, 0), min(own[-1] + 1 + 2 * AROUND, len(segments.time))
+        near = (
+            max(own[0] - IMPACT_SAMPLES, 0),
+            min(own[-1] + 1 + 2 * IMPACT_SAMPLES, len(segments.time)),
+        )
         t, y = segments.time[slice(*near)], segments.position[slice(*near)]
         pushed = segments.force[segments.step[slice(*near)]] / base.joint_model.inertia
         noise = 1 / float(segments.sharpness[k, 0])
@@ -245,8 +248,8 @@ def speed_ratios(segments: Segments, base: BaseModel, ends: Sequence[int]) -> Ar
             inside[np.argmin(away)] = False
         first = int(np.argmin(inside))  # at the end
         back = first + int(np.argmax(inside[first:]))  # off it again
-        parts = slice(first - AROUND, first), slice(back, back + AROUND)
-        if first < AROUND or back == first or back + AROUND > len(t):
+        parts = slice(first - IMPACT_SAMPLES, first), slice(back, back + IMPACT_SAMPLES)
+        if first < IMPACT_SAMPLES or back == first or back + IMPACT_SAMPLES > len(t):
             continue
         if not inside[parts[1]].all() or (np.diff(t[parts[0].start : parts[1].stop]) <= 0).any():
             continue  # it hops there, or another run begins

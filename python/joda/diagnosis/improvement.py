@@ -78,14 +78,14 @@ def improved(
         the stairs, the first one the model as it was; and why there are no more, a sentence.
     """
     steps = [Step(None, measured.profile, error(parts[1]))]
-    why = f"{ADDING.most_effects} effects were added; that is as many as are tried."
+    why = f"{ADDING.max_effects} effects were added; that is as many as are tried."
     try:
         if measured.joint_model.servo and (
             first := _numbers_first(parts, steps[0].error, progress)
         ):
             parts = _driven(parts, first.servo)
             steps.append(first)
-        while len(steps) <= ADDING.most_effects:
+        while len(steps) <= ADDING.max_effects:
             progress("diagnose")
             given = steps[-1].profile
             found = diagnosed(_with(parts, given)[0], calibrate=len(steps) == 1)
@@ -94,13 +94,13 @@ def improved(
                 if not (more := _calibrated(parts, steps[-1], found, progress)):
                     why = NOTHING_HELPS
                     break
-                parts = _righted(parts, found.calibration.righted)
+                parts = _corrected(parts, found.calibration.applied)
                 steps += more
                 if steps[-1].profile is not given:
                     continue
                 own = tuple(one for one in own if one not in steps[-1].corrections)
             steps[-1] = replace(steps[-1], diagnosis=said)
-            if said.doubt:
+            if said.confounder:
                 why = said.summary
                 break
             anew = found.calibration or not steps[-1].corrections
@@ -159,8 +159,8 @@ def _calibrated(parts: Parts, last: Step, found: Diagnosed, progress: Progress) 
     or else together with the model's own that were found off beside them, or with the effect that
     was; none if it does not."""
     assert found.calibration
-    right, said = found.calibration.righted, found.diagnosis
-    beside = _with(_righted(parts, right), last.profile)
+    right, said = found.calibration.applied, found.diagnosis
+    beside = _with(_corrected(parts, right), last.profile)
     after = error(beside[1])
     own = tuple(one for one in said.corrections if one.parameter in found.calibration.names)
     alone = Step(None, last.profile, after, said, corrections=own, right=right)
@@ -173,7 +173,7 @@ def _calibrated(parts: Parts, last: Step, found: Diagnosed, progress: Progress) 
     return [alone, *stairs] if stairs and fallen(last.error, stairs[-1].error) else []
 
 
-def _righted(parts: Parts, right: AppliedCorrections) -> Parts:
+def _corrected(parts: Parts, right: AppliedCorrections) -> Parts:
     """Both with numbers set right."""
     train, held = parts
     return right.of(train), right.of(held)
@@ -217,7 +217,7 @@ def _next(parts: Parts, last: Step, latest: Diagnosed, progress: Progress) -> li
     if latest.unexplained_by and not last.added and not parts[0].joint_model.servo:
         train = parts[0].changed(last.profile)
         known, found = False, pairs(train, latest.unexplained_by, progress)
-    for number, (first, *second) in enumerate(found[: ADDING.most_tried]):
+    for number, (first, *second) in enumerate(found[: ADDING.max_tried]):
         if known and number and first.probability < ADDING.min_probability:
             return []
         most = ADDING.max_error if known or not number else ADDING.max_error_unlikely

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 NO_TRUST: Mapping[str, float] = MappingProxyType({})
 """Nothing is told of how far off a number may be."""
 PARTED = 5.0
-"""Whole runs that are missed by so many times more than windows have parted from the measured."""
+"""Whole runs that are missed by so many times more than segments have parted from the measured."""
 
 
 def read_runs(
@@ -120,26 +120,28 @@ def scene_files(
 
 
 def parting(after: Error, noise: float, blocks: bool) -> list[str]:
-    """A sentence where what was held out parts as a whole although windows of it do not."""
+    """A sentence where what was held out parts as a whole although segments of it do not."""
     if after.whole is None or after.window > MULTIPLE * noise:
         return []
     if after.whole < PARTED * max(after.window, noise):
         return []
     return [
-        f"{wholes(blocks).capitalize()} still part from the measured ones although windows of "
-        "0.4 s hardly do: a small error adds up over a run, or decides near a barrier or at rest "
-        "where the joint goes."
+        f"Free runs{' of blocks' if blocks else ''} still part from the measured ones although "
+        "segments of 0.4 s hardly do: a small error adds up over a run, or decides near a barrier "
+        "or at rest where the joint goes."
     ]
 
 
 def wholes(blocks: bool) -> str:
-    """What is replayed as a whole: runs that were held out, or blocks of them."""
-    return "whole blocks" if blocks else "whole runs"
+    """The error of what is replayed as a whole: runs that were held out, or blocks of them."""
+    return "free-run error of blocks" if blocks else "free-run error"
 
 
 def nearby(error: Error, blocks: bool) -> str:
-    """What the error that every effect must lower is of; blocks may be shorter than a window."""
-    return "force" if error.whole is None else f"windows of {'up to ' if blocks else ''}0.4 s"
+    """What the error that every effect must lower is of; blocks may be shorter than a segment."""
+    if error.whole is None:
+        return "force"
+    return f"segment error ({'up to ' if blocks else ''}0.4 s)"
 
 
 def errors_described(before: Error, after: Error, noise: float, unit: str, blocks: bool) -> str:

@@ -7,7 +7,7 @@ from joda.diagnosis.baseline import Baseline, CoarseFit, fit_baseline
 from joda.diagnosis.findings import Finding
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.hypothesis_fits import FittedHypothesis
-from joda.diagnosis.ranking import Ranking, weigh
+from joda.diagnosis.ranking import Ranking, select
 from joda.diagnosis.report import finding
 from joda.diagnosis.search import rank
 from joda.diagnosis.shape_refinement import checked
@@ -55,6 +55,6 @@ def _even(baseline: Baseline, candidate: FittedHypothesis) -> FittedHypothesis:
 
 def _found(measured: Measured, ranking: Ranking, most: int) -> list[Finding]:
     """The likeliest candidates of a ranking, told."""
-    selection, held = weigh(ranking), Holdout(ranking.baseline, measured)
+    selection, held = select(ranking), Holdout(ranking.baseline, measured)
     likeliest = range(len(ranking.candidates[:most]))
     return [finding(measured, ranking, held, k, selection) for k in likeliest]

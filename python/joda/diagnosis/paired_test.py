@@ -13,15 +13,15 @@ ADDING = SETTINGS.adding
 Array = NDArray[np.float64]
 
 EXACT, DRAWS = 12, 4000
-"""Windows up to which all signs are gone through; else so many are drawn."""
-MISSED_MORE = "what was held out of the fit, replayed as a whole from its start, is missed by more"
+"""Segments up to which all signs are gone through; else so many are drawn."""
+MISSED_MORE = "the free-run error of what was held out of the fit is larger with it"
 
 
 def worse(before: Errors, after: Errors) -> str | None:
     """Why a model is not better than before on runs held out, as a clause; None if it is.
 
-    Windows are paired; whole runs, or blocks of them, must not be missed by more. What is weak, as
-    a drag, shows in whole runs only: then each of these must be missed by much less, and windows
+    Segments are paired; whole runs, or blocks of them, must not be missed by more. What is weak, as
+    a drag, shows in whole runs only: then each of these must be missed by much less, and segments
     not by clearly more.
     """
     pairs = [
@@ -34,20 +34,20 @@ def worse(before: Errors, after: Errors) -> str | None:
         for one in zip(pairs[2][:, None], pairs[3][:, None], strict=True)
     )
     if not improves(pairs[0], pairs[1]) and not (shows_late and not improves(pairs[1], pairs[0])):
-        return "held-out segments are not missed by clearly less with it (paired test)"
+        return "with it the held-out segment error is not clearly smaller (paired test)"
     if risen(pairs[2], pairs[3]) > ADDING.max_rise:
         return MISSED_MORE
     return None
 
 
 def improves(before: Array, after: Array) -> bool:
-    """Whether windows are missed by less, beyond chance.
+    """Whether segments are missed by less, beyond chance.
 
     A sign-flip test (Fisher 1935) of the mean change of log(1 + error²), in units of the noise, so
-    that no single window decides.
+    that no single segment decides.
 
     Args:
-        before, after: errors of the same windows in units of the noise, shape (n,).
+        before, after: errors of the same segments in units of the noise, shape (n,).
     """
     finite = np.isfinite(before) | np.isfinite(after)
     before, after = (np.minimum(x[finite], 1e6) for x in (before, after))

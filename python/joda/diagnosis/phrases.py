@@ -131,7 +131,7 @@ def explained(
     return (
         f"{name[0].upper()}{name[1:]}{placed(interval, joint)}{way}, {value:.3g} "
         f"\N{PLUS-MINUS SIGN} {error:.2g}{of}{largest}: {shows}. {extrapolated(unvisited)}"
-        f"With it, held-out segments are missed by {after:.2g} "
+        f"With it, the held-out segment error is {after:.2g} "
         f"instead of {before:.2g} {error_unit} (noise {noise:.2g} {error_unit}).{told}"
     )
 

@@ -48,7 +48,7 @@ def implausible(needs: "Needs", profile: Profile, effect: str | None = None) -> 
     )
 
 
-def unseen_place(measured: Measured, interval: Interval | None) -> str | None:
+def unvisited_interval(measured: Measured, interval: Interval | None) -> str | None:
     """Why nothing can be added at an interval, as a clause; None if runs have been there.
 
     What acts all over the range is a law, and no run needs to have been everywhere for it.
@@ -61,7 +61,7 @@ def unseen_place(measured: Measured, interval: Interval | None) -> str | None:
     return f"hardly any run visited s = {a:.2f} to {b:.2f}, where it acts"
 
 
-def unseen_shape(
+def unvisited_shape(
     parts: Sequence[Measured], profile: Profile, effect: str, given: Profile
 ) -> str | None:
     """Why what is added cannot be told from the runs, as a clause: where none was it turns, or is
@@ -180,7 +180,7 @@ class Needs:
 
 def _speed(time: Array, position: Array) -> float:
     """Largest over a few samples, so that noise hardly counts."""
-    n = min(smoothing.LEAST, len(time) - 1)
+    n = min(smoothing.MIN_SAMPLES, len(time) - 1)
     return float(np.max(np.abs(position[n:] - position[:-n]) / (time[n:] - time[:-n])))
 
 

@@ -123,14 +123,14 @@ def _gain(ranking: Ranking) -> float:
     return gain - max(float(each[estimator.counts].max()), 0.0)
 
 
-def weigh(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Selection:
+def select(ranking: Ranking, strictness: float = 1.0, wholly: bool = False) -> Selection:
     """`decide` on a ranking's evidence."""
     return decide(evidence(ranking), strictness, wholly)
 
 
 def hopeful(few: Ranking) -> bool:
     """Whether, by the best effects that are fitted, some might explain the runs."""
-    return sum(weigh(few).probabilities) > SETTINGS.selection.promising
+    return sum(select(few).probabilities) > SETTINGS.selection.promising
 
 
 def shows(

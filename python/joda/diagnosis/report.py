@@ -1,14 +1,14 @@
 """What is reported of a ranking: findings with sizes and sentences, and what to record next."""
 
 from joda.diagnosis import sentences
-from joda.diagnosis.coverage import moved_one_way
+from joda.diagnosis.data_sufficiency import moved_one_way
 from joda.diagnosis.experiments import Model, means_of, next_experiment, there_and_back
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.hypothesis_fits import joined
+from joda.diagnosis.indistinguishable import indistinguishable, kinds_of
 from joda.diagnosis.phrases import explained, named, words_of
 from joda.diagnosis.ranking import Ranking
-from joda.diagnosis.rivals import indistinguishable, kinds_of
 from joda.diagnosis.selection import Selection
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.uncertainty import uncertainty

@@ -107,7 +107,7 @@ def narrowed(
         start = estimator.started(make(found.fit.x)).start
         return baseline.refined(CoarseFit(found.hypothesis, (replace(found.fit, start=start),)))
 
-    def unstuck(pair: tuple[FittedHypothesis, FittedHypothesis]) -> FittedHypothesis:
+    def perturbed_if_stuck(pair: tuple[FittedHypothesis, FittedHypothesis]) -> FittedHypothesis:
         found, now = pair
         calm = _only_noise(found, before.baseline.estimator)
         fell = now.fit.loss > least.fit.loss + SEARCH.rough_gain and found.fit.loss < was.fit.loss
@@ -118,7 +118,7 @@ def narrowed(
         work = _Work(pool, progress, 2 * len(tried))
         pairs = list(zip(tried, work.all(again, tried), strict=True))
         was, least = min(pairs, key=lambda pair: pair[1].fit.loss)
-        candidates = work.all(unstuck, pairs)
+        candidates = work.all(perturbed_if_stuck, pairs)
         baseline = _restarted(baseline, candidates)
     there = [one for one in candidates if not one.vanished]
     return Ranking(baseline, *scored(estimator, there), restitution=before.restitution)

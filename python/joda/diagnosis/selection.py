@@ -113,7 +113,7 @@ def decide(
     own, left = max(found.own - noise, 0.0), left - noise
     part = settings.share_in_noise if found.noisy else found.misfit_tolerance
     least = max(
-        settings.least_share * own,
+        settings.min_share * own,
         min(settings.unknown_share * own, settings.unknown_excess),
     )
     beside = settings.rival_share * left[1:].min(initial=np.inf)

@@ -26,7 +26,7 @@ UNEVEN = (
 )
 DRIFTING = (
     "Something is missing that no known effect explains: segments show nothing beyond the noise, "
-    "but whole runs are missed by up to {:.0f} times what noise, start and force explain."
+    "but the free-run error is up to {:.0f} times what noise, initial state and force explain."
 )
 SLOWLY = (
     "Something is missing that no known effect explains: segments show nothing beyond the noise, "
@@ -35,35 +35,35 @@ SLOWLY = (
 )
 TOGETHER = (
     "Either the model's own numbers are off, or something is missing, and these runs cannot tell "
-    "which: as it stands the model leaves more of whole free runs than noise makes, and with other "
-    "numbers it would not."
+    "which: as it stands the model leaves more of whole unforced runs than noise makes, and with "
+    "other numbers it would not."
 )
 WITH_THESE = "as it stands the model {}.{} With these there is {} that an effect would explain."
 BEYOND_NOISE = "nothing beyond the noise ({:.2g} {})"
 NUMBERS_OFF = " Its own numbers are off: {}.{}"
 NONE_MISSING = "No effect is missing, but "
-WHOLE = "misses whole runs by up to {:.0f} times the noise"
-FREELY = "leaves more of whole free runs than noise makes"
+WHOLE = "has free-run errors of up to {:.0f} times the noise"
+FREELY = "leaves more of whole unforced runs than noise makes"
 WITHOUT = (
-    " As it stands it misses whole runs by up to {:.0f} times the noise all the same, and with its "
-    "numbers fitted by up to {:.1f} times what noise, start and force explain; joda compare says "
-    "where."
+    " As it stands its free-run error is up to {:.0f} times the noise all the same, and with its "
+    "numbers fitted up to {:.1f} times what noise, initial state and force explain; joda compare "
+    "says where."
 )
 ADRIFT = (
     " But more is left of whole runs than noise of position and force makes: a small fault of the "
     "model, or what the force did between its samples."
 )
 AT_ENDS = (
-    " From where the joint comes to an end of its range, whole runs are missed by up to {:.0f} "
-    "times what noise, start and force explain, and by {:.1f} times with other ends: {}; joda "
+    " From where the joint comes to an end of its range, the free-run error is up to {:.0f} "
+    "times what noise, initial state and force explain, and {:.1f} times with other ends: {}; joda "
     "improve writes them."
 )
 BEYOND_ENDS = (
     "Something at the ends of the range is missing that no known effect explains: within it there "
-    "is {}, but from where the joint comes to an end, whole runs are missed by up to {:.0f} times "
-    "what noise, start and force explain, whatever the stops (solreflimit, solimplimit).{}"
+    "is {}, but from where the joint comes to an end, the free-run error is up to {:.0f} times "
+    "what noise, initial state and force explain, whatever the stops (solreflimit, solimplimit).{}"
 )
-WHOLLY = " Windows show nothing of it; whole runs do."
+WHOLLY = " Segments show nothing of it; free runs do."
 PRESS = (
     "Press the joint slowly against either end and let it go, and let it come there slowly and "
     "fast, with the force: that parts the stop from a force close to it."

@@ -26,7 +26,7 @@ class SelectionSettings:
             (loss).
         min_gain_per_sample: the same, per sample (loss per sample).
         share_in_noise: a where more than noise is left of all.
-        least_share: part of e₀ that an unknown effect leaves at the least.
+        min_share: part of e₀ that an unknown effect leaves at the least.
         unknown_share: part of e₀ that any true effect may leave, up to `unknown_excess`.
         unknown_excess: see there; noise is not known better (per sample).
         rival_share: part of the second's excess that an unknown one leaves at most.
@@ -61,7 +61,7 @@ class SelectionSettings:
     min_gain: float = 60.0
     min_gain_per_sample: float = 0.02
     share_in_noise: float = 0.1
-    least_share: float = 0.01
+    min_share: float = 0.01
     unknown_share: float = 0.12
     unknown_excess: float = 0.12
     rival_share: float = 0.5
@@ -375,9 +375,9 @@ class AddingSettings:
         chance: largest probability of as clear an improvement by chance (probability).
         changed: by how much a window's error must change to count (noises).
         min_segments: of fewer that change none may become worse, and all together must be better
-            (windows).
+            (segments).
         max_rise: how many times the geometric mean of the errors of whole runs may become.
-        whole_run_fall: to what part that must fall, in every one, where windows are too short to
+        whole_run_fall: to what part that must fall, in every one, where segments are too short to
             show an effect.
         silent: error before, up to which what was held out tells nothing (noises).
         max_segment_error: part of the error before, and of the loss, to which an effect must bring
@@ -390,8 +390,8 @@ class AddingSettings:
         model_error: how far off a number of the model as given may be (relative standard
             deviation).
         min_overlap: of where an effect acts and where it was diagnosed (intersection over union).
-        most_effects: that `improve` adds (effects).
-        most_tried: of one diagnosis, the likeliest first (effects).
+        max_effects: that `improve` adds (effects).
+        max_tried: of one diagnosis, the likeliest first (effects).
         min_probability: of one that is tried besides the first (probability).
         max_error: part of the error held out to which a likely effect must bring it.
         max_error_unlikely: the same of one that is tried because nothing is likely, and the first
@@ -412,8 +412,8 @@ class AddingSettings:
     factor_gain: float = 10.0
     model_error: float = 0.3
     min_overlap: float = 0.5
-    most_effects: int = 5
-    most_tried: int = 3
+    max_effects: int = 5
+    max_tried: int = 3
     min_probability: float = 0.1
     max_error: float = 0.95
     max_error_unlikely: float = 0.8

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from joda._core import JointSimulator
 from joda.component import Component, Curve
-from joda.diagnosis.departures import EFFECTS, Moved
+from joda.diagnosis.departures import EFFECTS, ChangedPart
 from joda.diagnosis.hypothesis_fits import usual
 from joda.diagnosis.settings import SETTINGS
 from joda.effects import EndStopRestitution
@@ -127,7 +127,7 @@ class Trials:
         price = ADDING.control_point * sum(len(part.x) for part in _parts(profile))
         return Tried(profile, loss, self.seen.loss(profile) + loss + price)
 
-    def reshaped(
+    def refined_shapes(
         self, profile: Profile, effect: str, progress: Callable[[str], None]
     ) -> list[Tried]:
         """A profile, and what fits of all its numbers make of it.
@@ -152,7 +152,7 @@ class Trials:
         return found + self._fits(likeliest(found).profile, self.last, progress, what, law=law)
 
     def holding(
-        self, profile: Profile, parts: Collection[Moved], progress: Callable[[str], None]
+        self, profile: Profile, parts: Collection[ChangedPart], progress: Callable[[str], None]
     ) -> list[Tried]:
         """What fits of all other numbers make of a profile, while some parts stay as they are.
 
@@ -171,13 +171,13 @@ class Trials:
         lengths: Sequence[float],
         progress: Callable[[str], None],
         what: str,
-        parts: Collection[Moved] = (),
+        parts: Collection[ChangedPart] = (),
         law: Profile | None = None,
     ) -> list[Tried]:
         """Fits in longer and longer segments, each from what the one before found."""
         found = []
         for length in lengths:
-            progress(what + (f", windows of {length:.2g} s" if self.train.runs else ""))
+            progress(what + (f", segments of {length:.2g} s" if self.train.runs else ""))
             profile = refitted(self.train, profile, length, parts, law)
             found.append(self.tried(profile))
         return found
@@ -259,7 +259,7 @@ def refitted(
     train: Measured,
     profile: Profile,
     length: float,
-    parts: Collection[Moved] = (),
+    parts: Collection[ChangedPart] = (),
     law: Profile | None = None,
 ) -> Profile:
     """All numbers of a profile fitted, near where they were.
@@ -373,7 +373,7 @@ def _value(curve: Curve, x: float) -> float:
     return float(evaluate(Channel(components=(part,)), np.array([x]))[0][0])
 
 
-def _held(parameters: Parameters, parts: Collection[Moved]) -> NDArray[np.bool_]:
+def _held(parameters: Parameters, parts: Collection[ChangedPart]) -> NDArray[np.bool_]:
     """Which numbers are of some parts of the profile, shape (n,)."""
     there = {(part.where, part.what) for part in parts}
     keys = [one.key for one in parameters.profile.effects]

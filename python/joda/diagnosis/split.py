@@ -27,13 +27,13 @@ from joda.measured.runs import Run
 
 Flags = NDArray[np.bool_]
 
-FEWEST = 4
+MIN_RUNS = 4
 """Runs or curves of which some are held out whole; of fewer, parts of each."""
 SHOWS = 0.05
 """Part of what the run that is missed most shows; one that is to judge shows more."""
 LENGTHS = (2.0, 1.0, 0.5, 0.25)
 """Of blocks, in segments of the diagnosis: the longest of which there are enough are taken."""
-ENOUGH = 8
+MIN_BLOCKS = 8
 """Blocks in which the joint moves."""
 SAMPLES = 12
 """Of a block at the least, where the run has as many."""
@@ -73,7 +73,7 @@ def held_blocks(measured: Measured, judges: Segments | None = None) -> list[Bloc
     """
     runs = [Block(k, slice(0, len(run.time))) for k, run in enumerate(measured.runs)]
     moving = [block for block in runs if _moves(measured, block)]
-    if len(moving) >= FEWEST:
+    if len(moving) >= MIN_RUNS:
         missed = _missed(measured, judges or segments_for(measured, LONGEST, fine=False))
         ranked = sorted(moving, key=lambda block: -missed[block.run])
         third = 2 if missed[ranked[2].run] > SHOWS * missed.max() else 1
@@ -84,7 +84,7 @@ def held_blocks(measured: Measured, judges: Segments | None = None) -> list[Bloc
             block for k, run in enumerate(measured.runs) for block in _cut(k, run, factor * length)
         ]
         moving = [block for block in blocks if _moves(measured, block)]
-        if len(moving) >= ENOUGH:
+        if len(moving) >= MIN_BLOCKS:
             break
     return (moving if len(moving) > 1 else blocks)[1::4]
 
@@ -92,7 +92,7 @@ def held_blocks(measured: Measured, judges: Segments | None = None) -> list[Bloc
 def held_segments(measured: Measured, segments: Segments) -> Flags:
     """Which of the segments of these measurements are held out, by their middles; shape (m,)."""
     if not measured.runs:
-        few = len(measured.curves) < FEWEST
+        few = len(measured.curves) < MIN_RUNS
         return np.asarray(np.arange(len(segments.at)) % 4 == 2 if few else segments.run % 4 == 3)
     held = np.zeros(len(segments.at), bool)
     middle = segments.time[segments.rows[np.arange(len(held)), segments.count // 2]]
@@ -126,7 +126,7 @@ def held_out(measured: Measured, held: Measured) -> str:
 def _cut(number: int, run: Run, length: float) -> list[Block]:
     """A run in blocks of about some length (s), of as many samples each."""
     n = len(run.time)
-    most = max(n // SAMPLES, min(FEWEST, n // smoothing.LEAST), 1)
+    most = max(n // SAMPLES, min(MIN_RUNS, n // smoothing.MIN_SAMPLES), 1)
     count = int(np.clip(round(float(np.ptp(run.time)) / length), 1, most))
     edges = np.arange(count + 1) * n // count
     return [Block(number, slice(int(a), int(b))) for a, b in pairwise(edges)]
@@ -149,7 +149,7 @@ def _moves(measured: Measured, block: Block) -> bool:
     known = run.position[~np.isnan(run.force)]
     least = TRAVEL * np.ptp(measured.profile.joint.range)
     enough = max(least, NOISES * measured.sigma[block.run])
-    return len(known) >= smoothing.LEAST and bool(np.ptp(known) > enough)
+    return len(known) >= smoothing.MIN_SAMPLES and bool(np.ptp(known) > enough)
 
 
 def _between(measured: Measured, held: list[Block]) -> list[Block]:
@@ -159,7 +159,7 @@ def _between(measured: Measured, held: list[Block]) -> list[Block]:
         own = [block.samples for block in held if block.run == number]
         edges = [0, *(edge for part in own for edge in (part.start, part.stop)), len(run.time)]
         pieces = (slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True))
-        out += [Block(number, p) for p in pieces if p.stop - p.start >= smoothing.LEAST]
+        out += [Block(number, p) for p in pieces if p.stop - p.start >= smoothing.MIN_SAMPLES]
     return out
 
 
@@ -177,7 +177,7 @@ def _of(measured: Measured, blocks: list[Block]) -> Measured:
 
 def _parted_curves(measured: Measured) -> tuple[Measured, Measured]:
     curves, ways = measured.curves, (False, True)
-    if len(curves) >= FEWEST:
+    if len(curves) >= MIN_RUNS:
         parts = [[one for k, one in enumerate(curves) if (k % 4 == 3) == way] for way in ways]
     else:
         parts = [[one.part(_held(one) == way) for one in curves] for way in ways]
@@ -187,5 +187,5 @@ def _parted_curves(measured: Measured) -> tuple[Measured, Measured]:
 def _held(curve: QuasiStaticComparison) -> Flags:
     """Which samples of a curve are held out, shape (n,)."""
     n = len(curve.direction)
-    stretch = np.arange(n) * min(STRETCHES, max(n // STRETCH, FEWEST)) // n
+    stretch = np.arange(n) * min(STRETCHES, max(n // STRETCH, MIN_RUNS)) // n
     return np.asarray(stretch % 4 == 2)

@@ -10,15 +10,15 @@ from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import compared
 from joda.template import Template
 
-STILL = " With it held-out segments are still missed by {:.0f} times the noise."
+STILL = " With it the held-out segment error is still {:.0f} times the noise."
 SAME = (
     ": the joint was moved in one direction only, or nearly so, where a resistance and a force "
     "over position are the same"
 )
 ENDS_LEFT = "The ends of the range throw the joint back more than the model's: not explained."
 BLIND = (
-    " With its own numbers fitted the model misses held-out segments by less than what was taken "
-    "for noise, part of which may be what the joint does between two samples: record faster."
+    " With its own numbers fitted the held-out segment error is less than what was taken for "
+    "noise, part of which may be what the joint does between two samples: record faster."
 )
 
 
@@ -35,7 +35,7 @@ def summarised(
     floor: float,
     one_way: bool,
     restitution: bool,
-    doubt: str | None = None,
+    confounder: str | None = None,
     templates: Mapping[str, Template] | None = None,
 ) -> str:
     """The verdict in a sentence, where something is missing.
@@ -50,7 +50,7 @@ def summarised(
         floor: noise of the measurement, in the unit of the errors held out.
         one_way: whether the joint was moved in one direction only.
         restitution: of the ends, as in `Ranking`.
-        doubt: of `one_factor` or `other_unit`: then it is a candidate.
+        confounder: of `one_factor` or `other_unit`: then it is a candidate.
         templates: by name, which call effects what they call them; None: the library's.
     """
     name = first.name
@@ -63,7 +63,7 @@ def summarised(
     if not helps(first, floor):
         return (
             f"Something is missing that no known effect explains. Best guess: {name} ({likely}); "
-            "but with it held-out segments are missed as much."
+            "but with it the held-out segment error is as large."
         )
     after = first.held_out_error_after
     far = far_off(first, floor)
@@ -71,7 +71,7 @@ def summarised(
     probability = _sum(first, selection) if others else first.probability
     head = (
         "Best guess:"
-        if blind or far or doubt or probability <= SETTINGS.selection.likely
+        if blind or far or confounder or probability <= SETTINGS.selection.likely
         else "The model lacks"
     )
     more = BLIND if blind else STILL.format(after / floor) if far else ""

@@ -38,7 +38,7 @@ ITERATIONS = 3
 """Of the fit of all others there."""
 DRAWS = 200
 """Bootstrap samples."""
-FEW_RUNS = 5
+MIN_RUNS = 5
 """Of fewer runs, segments are drawn instead."""
 SHAPE = {
     SETTINGS.tolerances.known_law: ERRORS.known_law,
@@ -274,7 +274,7 @@ def _bootstrap(
     estimator = fitted.estimator
     run = estimator.segments.run
     runs = np.unique(run[estimator.counts])
-    block = run if len(runs) >= FEW_RUNS else np.arange(len(run))
+    block = run if len(runs) >= MIN_RUNS else np.arange(len(run))
     blocks = np.unique(block[estimator.counts])
     Hb = np.stack([H[block == b].sum(axis=0) for b in blocks])
     gb = np.stack([g[block == b].sum(axis=0) for b in blocks])

@@ -24,15 +24,15 @@ from joda.diagnosis.corrections import (
     off_without,
     one_factor,
 )
-from joda.diagnosis.coverage import at_rest, moved_one_way, too_little, too_noisy
+from joda.diagnosis.data_sufficiency import at_rest, moved_one_way, too_little, too_noisy
 from joda.diagnosis.end_stops import OtherEnds, suited, with_other_ends
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.horizons import HorizonSearch, looked
 from joda.diagnosis.joint_calibration import jointly, needed
-from joda.diagnosis.plausible import Needs, unseen_place
-from joda.diagnosis.ranking import Ranking, hopeful, weigh
+from joda.diagnosis.plausible import Needs, unvisited_interval
+from joda.diagnosis.ranking import Ranking, hopeful, select
 from joda.diagnosis.report import experiment_for, finding, likeliest_findings, reported
 from joda.diagnosis.search import Progress, rank
 from joda.diagnosis.selection import Evidence, Selection
@@ -154,7 +154,7 @@ def _together(
         return None
     free = replace(measured, loose=widths)
     ranking = rank(fit_baseline(free), exclude, progress, hopeful, Needs(measured).allow)
-    if not weigh(ranking).likely:
+    if not select(ranking).likely:
         return None
     other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
     if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
@@ -221,7 +221,7 @@ def _concluded(
     every = likeliest_findings(measured, ranking, selection)
     sized = [k for k, one in every.items() if one.sized]
     experiment = experiment_for(measured, ranking, selection, one_way)
-    if not sized or unseen_place(measured, every[sized[0]].interval):
+    if not sized or unvisited_interval(measured, every[sized[0]].interval):
         why = ENDS_LEFT if ranking.restitution else sentences.NO_EFFECT
         if sized:
             there = every[sized[0]].interval
@@ -261,20 +261,21 @@ def _missing(
     (number, first), *_ = findings.items()
     verdict = selection.verdict if helps(first, measured.floor) else "unexplained"
     base, candidate = ranking.baseline.base, ranking.candidates[number]
-    doubt = (_forced(measured) and one_factor(base, candidate)) or other_unit(measured)
+    confounder = (_forced(measured) and one_factor(base, candidate)) or other_unit(measured)
     one_way = moved_one_way(measured)
-    how = selection, measured.floor, one_way, ranking.restitution, doubt
+    how = selection, measured.floor, one_way, ranking.restitution, confounder
     summary = summarised(first, *how, measured.templates)
-    sure = verdict == "missing_effect" and not doubt  # else they stand in for what is not known
+    # the model's own numbers stand in for what is not known, unless the effect is sure
+    sure = verdict == "missing_effect" and not confounder
     beside = [(ranking.candidates[k], one.probability) for k, one in findings.items()]
     own = numbers_beside(ranking.baseline, beside) if sure else ()
-    summary += f" But {doubt}." if doubt else off_beside(own)
+    summary += f" But {confounder}." if confounder else off_beside(own)
     told = tuple(findings.values())
     worth = tuple(one for one in told if one.probability >= SETTINGS.naming.worth_naming)
     report = replace(
         reported(measured, verdict, summary, worth, experiment),
         corrections=corrections(own, measured.profile.joint, SETTINGS.corrections.min_off_beside),
-        doubt=doubt,
+        confounder=confounder,
         unexplained_probability=selection.unknown if verdict == selection.verdict else None,
     )
     servo = (
@@ -290,7 +291,7 @@ def _missing(
     )
     profile = candidate.written(base) if worth else None
     diagnosis = Diagnosed(report, profile, told, unexplained_by, corrected=servo)
-    return diagnosis if sure or doubt else _driven(diagnosis, ranking.baseline)
+    return diagnosis if sure or confounder else _driven(diagnosis, ranking.baseline)
 
 
 def _driven(found: Diagnosed, baseline: Baseline) -> Diagnosed:
@@ -342,9 +343,9 @@ def _adequate(
         surely = _beside_a_force(measured, baseline, denying)
         pairs = zip(own, surely, strict=True)
         if not all(sure.off(least) for one, sure in pairs if one.off(least)):
-            experiment = experiment_for(measured, ranking, weigh(ranking), one_way=True)
+            experiment = experiment_for(measured, ranking, select(ranking), one_way=True)
             summary = f"{sentences.EITHER.format(off(own, least))}{SAME}."
-            return _unexplained(measured, summary + _doubted(measured), experiment)
+            return _unexplained(measured, summary + _confounded(measured), experiment)
         own = surely
     numbers_off, forced = off(own, least), _forced(measured)
     sure = heavier(own) if numbers_off and not forced else 0.0
@@ -361,12 +362,14 @@ def _adequate(
         summary = _suffices(measured, numbers_off, left.whole, bool(denying), same)
         if ends:
             summary += sentences.AT_ENDS.format(left.whole, ends.times, ends.changes)
-    doubt = _doubted(measured)
+    confounder = _confounded(measured)
     verdict: Verdict = "unexplained" if denied else "adequate"
-    report = reported(measured, verdict, summary + doubt, (), sentences.PRESS if denied else None)
+    report = reported(
+        measured, verdict, summary + confounder, (), sentences.PRESS if denied else None
+    )
     report = replace(report, corrections=corrections(own, measured.profile.joint, least))
     driven = baseline.base.joint_model.servo is not None
-    if doubt or (all_alike and forced and not driven):
+    if confounder or (all_alike and forced and not driven):
         return Diagnosed(report)
     found = Diagnosed(report, corrected=corrected(baseline, own, least, told.fit.x))
     if ends and denied:
@@ -378,10 +381,10 @@ def _unexplained(measured: Measured, summary: str, experiment: str | None) -> Di
     return Diagnosed(reported(measured, "unexplained", summary, (), experiment))
 
 
-def _doubted(measured: Measured) -> str:
+def _confounded(measured: Measured) -> str:
     """That the force may be in another unit, if so."""
-    doubt = other_unit(measured)
-    return f" But {doubt}." if doubt else ""
+    confounder = other_unit(measured)
+    return f" But {confounder}." if confounder else ""
 
 
 def _drifting(free: FreeRuns | None, missed: float) -> str:
@@ -460,13 +463,13 @@ def _by_whole_runs(
         plain: what is said where that is nothing.
     """
     whole = in_whole_runs(measured, ranking, stops)
-    again, selection = whole.ranking, weigh(whole.ranking)
+    again, selection = whole.ranking, select(whole.ranking)
     if selection.verdict == "adequate":
         return _by_other_numbers(measured, whole, stops) or plain
     if selection.share > SETTINGS.whole_runs.max_share:
         return plain
     every = likeliest_findings(measured, again, selection)
-    if not every[0].sized or unseen_place(measured, every[0].interval):
+    if not every[0].sized or unvisited_interval(measured, every[0].interval):
         return plain
     report, given = plain.diagnosis, plain.diagnosis.summary
     found = _missing(measured, again, selection, every, report.next_experiment, None)
@@ -524,7 +527,7 @@ def _heavier(
     for number, candidate in enumerate(ranking.candidates):
         if candidate.hypothesis.effect == HEAVIER:
             held = Holdout(ranking.baseline, measured)
-            one = finding(measured, ranking, held, number, weigh(ranking))
+            one = finding(measured, ranking, held, number, select(ranking))
             before = held.as_given  # without it, it is the model's numbers that are off
             one = replace(one, probability=probability, held_out_error_before=before)
             summary = heavier_summary(one, numbers_off)
@@ -535,8 +538,8 @@ def _heavier(
 
 def _report_uneven(measured: Measured) -> str:
     """How far off the curves are; where their unit is in doubt, that is asked first."""
-    if doubt := other_unit(measured):
-        return f"{doubt[0].upper()}{doubt[1:]}."
+    if confounder := other_unit(measured):
+        return f"{confounder[0].upper()}{confounder[1:]}."
     missed = rms(np.concatenate([curve.excess for curve in measured.curves]))
     return sentences.UNEVEN.format(missed, measured.unit, measured.floor)
 

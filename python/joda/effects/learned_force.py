@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from joda.component import MAX_VALUE, MIN_WIDTH, numbers
 from joda.effects.base import TABLE, Effect, Motion, parameter
 
-LEAST_STEP = 1e-9
+MIN_STEP = 1e-9
 """Narrowest gap between velocities of a table, rad/s or m/s: less is rest."""
 EDGE = 0.02
 """Part of the joint's range within which the table fades to nothing, inside an end of its interval
@@ -75,7 +75,7 @@ class LearnedForce(Effect):
         if not _rises(self.positions, MIN_WIDTH) or self.positions[0] < 0 or self.positions[-1] > 1:
             raise ValueError("positions must increase from 0 or more to 1 or less")
         v = self.velocities
-        if not _rises(v, LEAST_STEP) or 0 not in v[1:-1] or max(-v[0], v[-1]) > MAX_VALUE:
+        if not _rises(v, MIN_STEP) or 0 not in v[1:-1] or max(-v[0], v[-1]) > MAX_VALUE:
             raise ValueError("velocities must increase from below 0 to above it, with 0 among them")
         return self
 

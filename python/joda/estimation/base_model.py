@@ -21,12 +21,12 @@ BASE_STD = 0.15
 """How far off (one standard deviation, relative) the model's own strengths may be."""
 DRIVEN_STD = 3.0
 """The same of joints that an actuator drives, whose friction few models know."""
-GAIN_AT_MOST, GAIN_STD = 7.0, 0.7
+MAX_GAIN, GAIN_STD = 7.0, 0.7
 """Largest logarithm of the factor by which an actuator's gain may be off, and its prior
 standard deviation."""
 HELD = 1e-6
 """Prior standard deviation of a number that is not there."""
-DELAY_AT_MOST, DELAY_STD = 0.1, 0.02
+MAX_DELAY, DELAY_STD = 0.1, 0.02
 """Longest delay of commands, and its prior standard deviation, s."""
 FAR_AWAY = ((-4.0, -2.0, 10.0), (-2.0, -1.0, 3.0), (2.0, 1.0, 1.0))
 """Logarithms of gain and damping, and factors of friction, from which fits begin besides."""
@@ -170,8 +170,8 @@ def _of_servo(servo: Servo, trust: Trust) -> Unknowns:
         trust.width("time_delay", DELAY_STD),
     )
     return Unknowns(
-        low=np.array([-GAIN_AT_MOST, -GAIN_AT_MOST, 0.0]),
-        high=np.array([GAIN_AT_MOST, GAIN_AT_MOST, DELAY_AT_MOST]),
+        low=np.array([-MAX_GAIN, -MAX_GAIN, 0.0]),
+        high=np.array([MAX_GAIN, MAX_GAIN, MAX_DELAY]),
         step=np.array([0.01, 0.01, 2e-4]),
         mean=np.array([0.0, 0.0, servo.delay]),
         prior_std=np.maximum(prior_std, HELD),

@@ -44,11 +44,11 @@ USUAL: dict[NuisanceName, float] = {
 """How far off they usually are (one standard deviation): factors relatively, an offset of the force
 in units of its root mean square, a delay in s, a position's zero in ranges, the direction of the
 centre of mass as seen from the hinge in rad: an encoder's zero stands in for it unless told."""
-FULL_SCALE, MOST_OFFSET = 0.04, 0.2
+FULL_SCALE, MAX_OFFSET = 0.04, 0.2
 """How far off an offset of the force usually is, of the largest force, if that is more: of joints
 that go by themselves most of the time; and the most, of the root mean square: an offset that is
 about all that was recorded is a force that was held against."""
-MOST = {"factor": 7.0, "time_delay": 0.1}
+MAX_VALUES = {"factor": 7.0, "time_delay": 0.1}
 """Largest logarithm of a factor, and longest delay (s)."""
 FAR = 20.0
 """The same of offsets, in what they usually are."""
@@ -57,7 +57,7 @@ STEPS = {"factor": 0.01, "time_delay": 2e-4, "other": 0.05}
 
 NEAR_END = 0.1
 """How near an end of the range runs come at least that may tell of a position's zero, in ranges."""
-LEAST, TENTH = {"factor": 0.02, "time_delay": 1e-3}, 0.1
+MIN_ERRORS, MIN_OTHER_ERROR = {"factor": 0.02, "time_delay": 1e-3}, 0.1
 """By how much a logarithm or a delay (s) must be off to be worth a word; others by this part of
 what they usually are."""
 
@@ -118,7 +118,7 @@ class Nuisances:
         most, step = [], []
         for name, width in zip(self.names, self.prior_stds, strict=True):
             kind = _kind(name)
-            most.append(MOST.get(kind, FAR * width))
+            most.append(MAX_VALUES.get(kind, FAR * width))
             step.append(STEPS.get(kind, STEPS["other"] * width))
         high = np.array(most)
         none = np.zeros(len(prior_std))
@@ -142,7 +142,10 @@ class Nuisances:
     def little(self, x: Array) -> list[bool]:
         """Which of them are off by too little to be worth a word."""
         own = zip(self.names, self.prior_stds, x[self.base.count :], strict=True)
-        least = (LEAST.get(_kind(name), TENTH * width) - abs(value) for name, width, value in own)
+        least = (
+            MIN_ERRORS.get(_kind(name), MIN_OTHER_ERROR * width) - abs(value)
+            for name, width, value in own
+        )
         return [float(left) > 0 for left in least]
 
     def body(self, joint_model: JointModel, x: Array) -> JointModel:
@@ -237,7 +240,7 @@ def nuisances_of(measured: Measured, base: BaseModel) -> Nuisances:
     force = np.concatenate([run.force for run in measured.runs if run.forced] or [np.zeros(1)])
     mean, largest = float(np.sqrt(np.nanmean(force**2))), float(np.nanmax(np.abs(force)))
     usual["force_offset"] = min(
-        max(usual["force_offset"] * mean, FULL_SCALE * largest), MOST_OFFSET * mean
+        max(usual["force_offset"] * mean, FULL_SCALE * largest), MAX_OFFSET * mean
     )
     usual["position_offset"] *= float(np.ptp(joint.range))
     weight = max(map(abs, measured.context.gravity_force))

@@ -8,7 +8,7 @@ import numpy as np
 from joda.estimation.base_model import BaseModel, base_of
 from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.quasi_static import QuasiStaticJoint, curve_segments
-from joda.estimation.segmentation import BEYOND, segments_of
+from joda.estimation.segmentation import OUTSIDE_NOISES, segments_of
 from joda.estimation.segments import Segments
 from joda.joints.divergence import linearized
 from joda.joints.joint_model import JointModel
@@ -93,4 +93,4 @@ def _yields(measured: Measured) -> bool:
         np.abs(run.position - np.clip(run.position, *measured.profile.joint.range)) / sigma
         for run, sigma in zip(measured.runs, measured.sigma, strict=True)
     )
-    return sum(int(np.sum(noises > BEYOND)) for noises in beyond) > STRAYS
+    return sum(int(np.sum(noises > OUTSIDE_NOISES)) for noises in beyond) > STRAYS

@@ -46,7 +46,7 @@ NOTHING = 1e-5
 SIGNED = ("sin", "cos", "force")
 """Numbers of effects that may have either sign."""
 LARGEST = {"breakaway": 1.0, "restitution": 0.95, "share": 0.99}
-LEAST_LEFT = 0.02
+MIN_FACTOR_LEFT = 0.02
 """Least part of an effect's number that a fit may leave."""
 
 PRIOR_STD: dict[Kind, float] = {
@@ -373,7 +373,7 @@ def _effect(
             continue
         for index, one in enumerate(value if isinstance(value, tuple) else (value,)):
             if key not in SIGNED:
-                least = 0.0 if key == "y" else LEAST_LEFT
+                least = 0.0 if key == "y" else MIN_FACTOR_LEFT
                 rows.append(({len(slots): 1.0}, least))
             if (most := largest.get(key, np.inf)) < np.inf:
                 rows.append(({len(slots): -1.0}, -most / _effect_scale(effect, key)))

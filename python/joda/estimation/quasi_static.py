@@ -19,7 +19,7 @@ SAMPLES = 12
 
 
 @dataclass(frozen=True)
-class CurveWindows(Segments):
+class CurveSegments(Segments):
     """Pieces of curves; `position` is the measured force, N·m or N.
 
     Attributes:
@@ -33,7 +33,7 @@ class CurveWindows(Segments):
         """Not needed: nothing begins anywhere."""
         return False
 
-    def coarser(self) -> "CurveWindows":
+    def coarser(self) -> "CurveSegments":
         """Themselves: nothing moves."""
         return self
 
@@ -53,7 +53,7 @@ class QuasiStaticJoint(JointModel):
 
 def curve_segments(
     curves: Sequence[QuasiStaticComparison], found: Context, timestep: float
-) -> CurveWindows:
+) -> CurveSegments:
     """Curves of a joint in pieces; samples whose direction of travel is not known are left out.
 
     Args:
@@ -86,7 +86,7 @@ def curve_segments(
             return np.full(n, np.nan)
 
     spread = np.where(rows >= 0, prior_std[rows], np.inf)
-    return CurveWindows(
+    return CurveSegments(
         h=timestep,
         length=timestep,
         force=force,

@@ -19,9 +19,9 @@ SPEEDS = 10_000
 """Most speeds of a run that are looked at."""
 TRAVEL = 0.15
 """What part of the range a segment goes through at the usual speed."""
-FEWEST = 12
+MIN_SAMPLES = 12
 """Samples that a segment has at least."""
-MOST, RESTING, SELDOM = 160, 4, 8
+MAX_SAMPLES, MAX_REST_SAMPLES, REST_STRIDE = 160, 4, 8
 """Samples of a stretch of usual length that count at most; of more, every second or third does. Of
 one in which the joint rests so few do, of a longer rest only in every so many stretches: they are
 all the same sample."""
@@ -46,7 +46,7 @@ after stays where it was moved to, and a free one goes on. Where a force or damp
 how it goes on is less well known, so many of the largest may be no more than all others."""
 SHARED = 1e-3
 """Variance, in units of a sample's own, above which a segment's samples share it."""
-BEYOND = 4.0
+OUTSIDE_NOISES = 4.0
 """Noises outside its range at which a joint is beyond it."""
 CLEAR = 1.5
 """How much larger the noise of fast samples must be to count as such."""
@@ -123,10 +123,11 @@ def segments_of(
                     push[left] = np.hypot(push[left], inertia * thrown)
             many = len(begins)
             segment = np.searchsorted(begins, index, side="right") - 1
-            enough = np.bincount(segment, minlength=many) >= smoothing.LEAST
+            enough = np.bincount(segment, minlength=many) >= smoothing.MIN_SAMPLES
             start, prior_std = starts(time, position, time[0] + h * begins, sigma)
             seen = np.minimum(np.searchsorted(index, begins), len(index) - 1)
-            clear = _inside(*place_noise)[seen] > BEYOND  # not beyond the end that threw it back
+            # not beyond the end that threw it back
+            clear = _inside(*place_noise)[seen] > OUTSIDE_NOISES
             start[clear, 0] = np.clip(start[clear, 0], lo, lo + span)
             force = np.interp(time[0] + h * np.arange(steps), time, run.force[piece])
             fresh = np.arange(many) == 0
@@ -224,7 +225,7 @@ def _length(runs: Sequence[Run], sigmas: Sequence[float], span: float) -> float:
 
 def shortest(runs: Sequence[Run]) -> float:
     """How long segments of runs are at least for their samples to tell of the joint, s."""
-    return FEWEST * float(np.median(np.concatenate([np.diff(run.time) for run in runs])))
+    return MIN_SAMPLES * float(np.median(np.concatenate([np.diff(run.time) for run in runs])))
 
 
 def _speeds(run: Run, sigma: float, apart: float) -> Array:
@@ -236,8 +237,8 @@ def _speeds(run: Run, sigma: float, apart: float) -> Array:
 
 
 def _thinned(chunk: Integers, noises: Array, free: bool) -> NDArray[np.bool_]:
-    """Which samples are kept: at most `MOST` of a chunk of usual length, evenly; where the joint
-    rests, few, and of few chunks, if no force tells how much holds it.
+    """Which samples are kept: at most `MAX_SAMPLES` of a chunk of usual length, evenly; where the
+    joint rests, few, and of few chunks, if no force tells how much holds it.
 
     Args:
         chunk: of each sample, increasing.
@@ -250,8 +251,10 @@ def _thinned(chunk: Integers, noises: Array, free: bool) -> NDArray[np.bool_]:
     for begin, many in zip(first, count, strict=True):
         own = slice(begin, begin + many)
         rested = rested + 1 if free and _rest(noises[own]) else 0
-        if rested == 0 or rested % SELDOM == 1:
-            kept[begin : begin + many : -(-many // (RESTING if rested else MOST))] = True
+        if rested == 0 or rested % REST_STRIDE == 1:
+            kept[
+                begin : begin + many : -(-many // (MAX_REST_SAMPLES if rested else MAX_SAMPLES))
+            ] = True
     return kept
 
 
@@ -269,7 +272,7 @@ def _spread(time: Array, position: Array, sigma: float) -> Array:
     smooth = np.convolve(slope, np.full(9, 1 / 9), mode="same")
     fast = smooth > np.quantile(smooth, 0.7)
     fast[[0, 1, -2, -1]] = False
-    if len(time) < 5 or fast.sum() < FEWEST:
+    if len(time) < 5 or fast.sum() < MIN_SAMPLES:
         return np.full(len(time), sigma)
     own = smoothing.deviation(smoothing.departures(time, position)[fast[2:-2]])
     late = np.sqrt(max(own**2 - (CLEAR * sigma) ** 2, 0.0)) / np.median(smooth[fast])
@@ -396,13 +399,13 @@ def _before_impacts(
         hit = rows[k][impact]
         hits[hit] = True
         before = impact - APPROACH
-        joined = k > 0 and impacts[k - 1] is None and many[k - 1] + before >= 2 * FEWEST
-        if before >= FEWEST:
+        joined = k > 0 and impacts[k - 1] is None and many[k - 1] + before >= 2 * MIN_SAMPLES
+        if before >= MIN_SAMPLES:
             more.append(hit - APPROACH)
         elif joined:  # the segment before ends there
             more.append(hit - APPROACH)
             fewer.append(begins[k])
-        elif impact >= smoothing.LEAST:  # a short stroke: up to the impact itself
+        elif impact >= smoothing.MIN_SAMPLES:  # a short stroke: up to the impact itself
             more.append(hit)
     kept = np.setdiff1d(begins, np.array(fewer, int))
     return np.union1d(kept, index[np.array(more, int)] // GRID * GRID), hits
@@ -416,7 +419,7 @@ def _inside(s: Array, noise: Array) -> Array:
 def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -> Integers:
     """Where segments begin, also where one that began beyond the range comes back into it: what an
     end that yields does to the joint is not known."""
-    beyond = _inside(s, noise) < -BEYOND
+    beyond = _inside(s, noise) < -OUTSIDE_NOISES
     more = []
     for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
         own = beyond[row[row >= 0]]
@@ -430,7 +433,7 @@ def _where_it_stays(
 ) -> Integers:
     """Where long segments begin, also within a stay at an end of `chunk` steps or more: what is
     after half of these tells of the joint, whatever the end did to it before."""
-    at_end = np.abs(np.minimum(s, 1 - s)) < BEYOND * noise
+    at_end = np.abs(np.minimum(s, 1 - s)) < OUTSIDE_NOISES * noise
     rows = rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins))
     more = []
     for row, impact in zip(rows, _impact_of_each(rows, s, noise), strict=True):
@@ -452,7 +455,7 @@ def _leaves(begins: Integers, index: Integers, s: Array, noise: Array) -> list[s
     found = []
     for row in rows_of(np.searchsorted(begins, index, side="right") - 1, len(begins)):
         own = inside[row[row >= 0]]
-        clear = int(np.argmax(own >= BEYOND)) if len(own) else 0
+        clear = int(np.argmax(own >= OUTSIDE_NOISES)) if len(own) else 0
         if clear:
             there = int(np.flatnonzero(np.append(0.0, own[1:clear]) <= 1)[-1])
             found.append(slice(row[there], row[clear]))
@@ -490,7 +493,7 @@ def _stays(rows: Integers, s: Array, noise: Array) -> Integers:
         if not len(own) or np.ptp(s[own] / noise[own]) > STILL:
             continue
         for side, away in ((-1, s[own]), (1, 1 - s[own])):
-            if np.abs(away.mean()) < BEYOND * noise[own].mean():
+            if np.abs(away.mean()) < OUTSIDE_NOISES * noise[own].mean():
                 stays[own] = side
     return stays
 

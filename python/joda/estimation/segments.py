@@ -262,8 +262,8 @@ def evenly(
     )[0]
     speed = np.gradient(path, h)
     start = np.stack([path[at], np.where(free[at], speed[at], velocity[at])], axis=1)
-    window = np.searchsorted(at, np.arange(n), side="right") - 1
-    rows = rows_of(window, len(at))
+    segment = np.searchsorted(at, np.arange(n), side="right") - 1
+    rows = rows_of(segment, len(at))
     return Segments(
         h=h,
         length=length,
@@ -286,9 +286,9 @@ def evenly(
     )
 
 
-def rows_of(window: Integers, count: int) -> Integers:
+def rows_of(segment: Integers, count: int) -> Integers:
     """Samples of each segment, filled up with -1."""
-    groups = [np.flatnonzero(window == k) for k in range(count)]
+    groups = [np.flatnonzero(segment == k) for k in range(count)]
     out = np.full((count, max(map(len, groups), default=0)), -1)
     for row, group in zip(out, groups, strict=True):
         row[: len(group)] = group

@@ -6,7 +6,7 @@ from xml.etree import ElementTree as ET
 
 from joda.exporting.markup import angles, child, rendered, text
 from joda.exporting.nearest import Nearest
-from joda.exporting.tree import LEAST_MASS, LEAST_MOMENT, Array, Link, Shape, unique
+from joda.exporting.tree import MIN_MASS, MIN_MOMENT, Array, Link, Shape, unique
 
 VERSION = "1.9"
 KINDS = {"fixed": "fixed", "slide": "prismatic"}
@@ -55,10 +55,10 @@ def _link(model: ET.Element, link: Link, links: Sequence[Link], meshes: Mapping[
     _pose(element, link.position, link.turn, **relative)
     inertial = child(element, "inertial")  # without it a link weighs 1 kg
     _pose(inertial, link.centre, link.principal)
-    child(inertial, "mass", text(max(link.mass, LEAST_MASS)))
+    child(inertial, "mass", text(max(link.mass, MIN_MASS)))
     inertia = child(inertial, "inertia")
     for tag, moment in zip(("ixx", "iyy", "izz"), link.moments.tolist(), strict=True):
-        child(inertia, tag, text(max(moment, LEAST_MOMENT)))
+        child(inertia, tag, text(max(moment, MIN_MOMENT)))
     for number, shape in enumerate(link.shapes):
         for use in (*["visual"] * shape.seen, *["collision"] * shape.collides):
             part = child(element, use, name=f"{use}_{number}")

@@ -12,7 +12,7 @@ from joda.files import file_name
 
 Array = NDArray[np.float64]
 
-LEAST_MASS, LEAST_MOMENT = 1e-9, 1e-12
+MIN_MASS, MIN_MOMENT = 1e-9, 1e-12
 """Of a link in SDF and USD (kg, kg·m²), where what has no mass of its own is given one."""
 SHOWN = 3
 """Geoms of lower groups are seen, as in MuJoCo's viewer."""

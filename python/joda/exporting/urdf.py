@@ -5,7 +5,7 @@ from xml.etree import ElementTree as ET
 
 from joda.exporting.markup import angles, child, rendered, text
 from joda.exporting.nearest import Nearest
-from joda.exporting.tree import LEAST_MASS, LEAST_MOMENT, Array, Link, Shape, rotated
+from joda.exporting.tree import MIN_MASS, MIN_MOMENT, Array, Link, Shape, rotated
 
 NO_LIMIT = "1e6"
 """Of effort and velocity, which URDF wants to be told."""
@@ -43,8 +43,8 @@ def _link(root: ET.Element, link: Link, meshes: Mapping[int, str]) -> None:
         # else its shapes are taken to weigh, and what moves must not weigh nothing
         inertial = child(element, "inertial")
         _origin(inertial, link.centre, link.principal)
-        child(inertial, "mass", value=text(max(link.mass, LEAST_MASS)))
-        least = (text(max(moment, LEAST_MOMENT)) for moment in link.moments)
+        child(inertial, "mass", value=text(max(link.mass, MIN_MASS)))
+        least = (text(max(moment, MIN_MOMENT)) for moment in link.moments)
         moments = dict(zip(("ixx", "iyy", "izz"), least, strict=True))
         child(inertial, "inertia", ixy="0", ixz="0", iyz="0", **moments)
     for number, shape in enumerate(link.shapes):

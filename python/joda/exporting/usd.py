@@ -14,8 +14,8 @@ import numpy as np
 from joda.errors import JodaError
 from joda.exporting.nearest import Nearest
 from joda.exporting.tree import (
-    LEAST_MASS,
-    LEAST_MOMENT,
+    MIN_MASS,
+    MIN_MOMENT,
     Array,
     Link,
     Shape,
@@ -105,9 +105,9 @@ def _link(
     if link.parent >= 0:  # else it is the world
         UsdPhysics.RigidBodyAPI.Apply(prim)
         mass = UsdPhysics.MassAPI.Apply(prim)  # without it the mass is that of the shapes
-        mass.CreateMassAttr(max(link.mass, LEAST_MASS))
+        mass.CreateMassAttr(max(link.mass, MIN_MASS))
         mass.CreateCenterOfMassAttr(Gf.Vec3f(*link.centre.tolist()))
-        moments = np.maximum(link.moments, LEAST_MOMENT)
+        moments = np.maximum(link.moments, MIN_MOMENT)
         mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
         mass.CreatePrincipalAxesAttr(Gf.Quatf(*link.principal.tolist()))
     for number, shape in enumerate(link.shapes):

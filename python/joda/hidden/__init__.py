@@ -3,7 +3,7 @@
 Its laws are analytic, and it shares nothing with MuJoCo, the plugin or the templates.
 """
 
-from joda.hidden.cases import EFFECTS, OUTSIDE, Case, draw, write
+from joda.hidden.cases import EFFECTS, UNCATALOGUED, Case, draw, write
 from joda.hidden.families import FAMILIES
 
-__all__ = ["EFFECTS", "FAMILIES", "OUTSIDE", "Case", "draw", "write"]
+__all__ = ["EFFECTS", "FAMILIES", "UNCATALOGUED", "Case", "draw", "write"]

@@ -15,7 +15,7 @@ DRAWS = 8
 """Of the noise."""
 BEGIN = 0.1
 """Longest begin of a run that tells its start, s."""
-LEAST = 8
+MIN_SAMPLES = 8
 """Fewest samples of it."""
 CLOSE = 1.2
 """RMS distance of the samples from a parabola, standard deviations, up to which it fits."""
@@ -73,11 +73,11 @@ def achievable(
 
 def _start(run: Run, sigma: float) -> tuple[float, float]:
     """Position and velocity by a parabola over the longest begin of a run that it fits."""
-    count = max(int(np.searchsorted(run.time, BEGIN, side="right")), LEAST)
+    count = max(int(np.searchsorted(run.time, BEGIN, side="right")), MIN_SAMPLES)
     while True:
         time, position = run.time[:count], run.position[:count]
         parabola = np.polyfit(time, position, 2)
         misfit = np.sqrt(np.mean(np.square(np.polyval(parabola, time) - position)))
-        if misfit <= CLOSE * sigma or count == LEAST:
+        if misfit <= CLOSE * sigma or count == MIN_SAMPLES:
             return float(parabola[2]), float(parabola[1])
-        count = max(3 * count // 4, LEAST)
+        count = max(3 * count // 4, MIN_SAMPLES)

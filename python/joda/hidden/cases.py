@@ -25,7 +25,7 @@ from joda.measured.runs import Run
 FAMILY = "laboratory"
 EFFECTS = tuple(FAMILIES[FAMILY].known)
 """Effects that a diagnosis knows by name; every family has all of them."""
-OUTSIDE = tuple(FAMILIES[FAMILY].beyond)
+UNCATALOGUED = tuple(FAMILIES[FAMILY].uncatalogued)
 """Effects that it does not know, of the first family."""
 PUSHED = FAMILIES[FAMILY].pushed
 """Effects of the first family that need a recorded force."""

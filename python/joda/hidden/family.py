@@ -18,7 +18,7 @@ class Family:
         name: of the family.
         joint: what the base model calls its joint.
         known: effects that a diagnosis knows by name.
-        beyond: effects that no catalogue has.
+        uncatalogued: effects that no catalogue has.
         pushed: effects that do not show without a recorded force.
         draw_truth: a joint that hides nothing yet, for the effects' names and whether it is pushed.
         draw_encoder: how a joint is measured.
@@ -28,7 +28,7 @@ class Family:
     name: str
     joint: str
     known: Mapping[str, Builder]
-    beyond: Mapping[str, Builder]
+    uncatalogued: Mapping[str, Builder]
     pushed: tuple[str, ...]
     draw_truth: Callable[[np.random.Generator, Sequence[str], bool], Truth]
     draw_encoder: Callable[[np.random.Generator, Joint], Encoder]
@@ -37,4 +37,4 @@ class Family:
     @property
     def builders(self) -> dict[str, Builder]:
         """All effects."""
-        return {**self.known, **self.beyond}
+        return {**self.known, **self.uncatalogued}

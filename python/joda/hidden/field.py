@@ -17,10 +17,10 @@ from joda.hidden.gestures import Session, perform, shove, some, sweep, toss, tra
 from joda.hidden.instrument import drawn
 from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
-from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Hidden, Sampler
 from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
+from joda.hidden.uncatalogued import UNCATALOGUED as SHARED
 
 TIMED = "periodic_disturbance"
 SLOW = 0.7, 2.0
@@ -107,10 +107,10 @@ def _any_of(name: str) -> Builder:
 
 
 KNOWN: dict[str, Builder] = {name: _any_of(name) for name in household.KNOWN}
-STRANGE: dict[str, Builder] = {
+UNCATALOGUED: dict[str, Builder] = {
     name: law
-    for name, law in (BEYOND | household.STRANGE).items()
+    for name, law in (SHARED | household.UNCATALOGUED).items()
     if name != "actuation_delay"  # a wrong clock is one of the numbers here
 }
 
-FIELD = Family("field", "joint", KNOWN, STRANGE, (), _truth, _encoder, _move)
+FIELD = Family("field", "joint", KNOWN, UNCATALOGUED, (), _truth, _encoder, _move)

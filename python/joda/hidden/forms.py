@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from joda.hidden import laws, masses, rubbing, stops, truth
+from joda.hidden import friction_laws, laws, masses, stops, truth
 from joda.hidden.laws import Force, Friction, Shape
 from joda.hidden.sampler import Builder, Hidden, Sampler, everywhere
 from joda.hidden.shapes import Well, extent, peak
@@ -37,7 +37,7 @@ def friction(shape_of: ShapeOf, least: float, most: float, one_way: bool = False
 
     def build(sampler: Sampler) -> Hidden:
         shape, size, way = shape_of(sampler), sampler.force(least, most), sampler.way() * one_way
-        law = rubbing.FrictionAlong(size / peak(shape), shape, way)
+        law = friction_laws.PositionFriction(size / peak(shape), shape, way)
         if one_way:
             return everywhere(law, size, sampler.unit(), way)
         return Hidden((law,), _placed(shape), size, sampler.unit())

@@ -9,17 +9,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from joda.hidden import forms, memory, rubbing, shapes, strange
+from joda.hidden import forms, friction_laws, memory, shapes, uncatalogued_forms
 from joda.hidden.drag import DragAlong
 from joda.hidden.family import Family
 from joda.hidden.gestures import Session, perform, press, shove, some, toss, trembling
 from joda.hidden.laws import Shape
 from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp, release
-from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
+from joda.hidden.uncatalogued import UNCATALOGUED as SHARED
 
 WEIGHTY = ("load_dependent_friction",)
 TIMED = "periodic_disturbance"
@@ -164,7 +164,7 @@ KNOWN: dict[str, Builder] = {
     "position_dependent_friction": forms.friction(_zone, 0.25, 0.8),
     "position_dependent_damping": forms.damping(_zone),
     "stribeck_friction": forms.stribeck(
-        lambda sampler, size, slow: rubbing.PowerStribeck(size, slow, 1.0)
+        lambda sampler, size, slow: friction_laws.PowerStribeck(size, slow, 1.0)
     ),
     "asymmetric_friction": forms.friction(_sloping, 0.15, 0.5, one_way=True),
     "direction_dependent_damping": forms.damping(_sloping, one_way=True),
@@ -172,20 +172,20 @@ KNOWN: dict[str, Builder] = {
     "presliding_friction": forms.presliding(
         lambda sampler, size, stiffness: memory.slips(size, stiffness, 4), (0.004, 0.06)
     ),
-    "load_dependent_friction": forms.loaded(lambda sampler, size: rubbing.Loaded(size)),
+    "load_dependent_friction": forms.loaded(lambda sampler, size: friction_laws.LoadFriction(size)),
     "added_inertia": forms.inertia(forms.rigid),
     "gravity_offset": forms.weight(lambda sampler: sampler.between(0, 2 * np.pi)),
     "backlash": forms.behind((0.01, 0.05), (0.5, 0.85), (100.0, 160.0)),
     "end_stop_restitution": forms.rebound(soft=True, both=0.3),
 }
-STRANGE: dict[str, Builder] = {
-    "maxwell_relaxation": strange.two_relaxations,
-    "friction_ageing": strange.ageing,
-    "warming_up": BEYOND["warming_up"],
-    "pulling_cable": BEYOND["pulling_cable"],
-    "air_cushion": strange.cushion,
-    "lost_motion_damper": strange.lost_motion,
-    "periodic_disturbance": BEYOND["periodic_disturbance"],
+UNCATALOGUED: dict[str, Builder] = {
+    "maxwell_relaxation": uncatalogued_forms.two_relaxations,
+    "friction_ageing": uncatalogued_forms.ageing,
+    "warming_up": SHARED["warming_up"],
+    "pulling_cable": SHARED["pulling_cable"],
+    "air_cushion": uncatalogued_forms.cushion,
+    "lost_motion_damper": uncatalogued_forms.lost_motion,
+    "periodic_disturbance": SHARED["periodic_disturbance"],
 }
 
-HOUSEHOLD = Family("household", "door", KNOWN, STRANGE, (), _truth, _encoder, _move)
+HOUSEHOLD = Family("household", "door", KNOWN, UNCATALOGUED, (), _truth, _encoder, _move)

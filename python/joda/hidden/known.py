@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.hidden import laws, rubbing, truth
+from joda.hidden import friction_laws, laws, truth
 from joda.hidden.laws import Law
 from joda.hidden.sampler import Builder, Hidden, Sampler, everywhere
 
@@ -22,12 +22,14 @@ def _catch(sampler: Sampler, force: float, interval: tuple[float, float]) -> tup
     """Friction in the interval of a latch, in half of the draws."""
     if sampler.chance():
         return ()
-    return (rubbing.Rub(force * sampler.between(0.05, 0.2), *interval, 0.01),)
+    return (friction_laws.IntervalFriction(force * sampler.between(0.05, 0.2), *interval, 0.01),)
 
 
 def _constant_friction(sampler: Sampler) -> Hidden:
     force, (a, b, edge) = sampler.force(0.15, 0.6), _whole(sampler, sampler.bare.friction)
-    return Hidden((rubbing.Rub(force, a, b, edge),), _clip(a, b), force, sampler.unit())
+    return Hidden(
+        (friction_laws.IntervalFriction(force, a, b, edge),), _clip(a, b), force, sampler.unit()
+    )
 
 
 def _constant_damping(sampler: Sampler) -> Hidden:
@@ -114,7 +116,7 @@ def _along(sampler: Sampler) -> tuple[laws.Along, tuple[float, float]]:
 
 def _friction_along(sampler: Sampler) -> Hidden:
     (course, interval), force = _along(sampler), sampler.force(0.2, 0.7)
-    return Hidden((rubbing.FrictionAlong(force, course),), interval, force, sampler.unit())
+    return Hidden((friction_laws.PositionFriction(force, course),), interval, force, sampler.unit())
 
 
 def _damping_along(sampler: Sampler) -> Hidden:
@@ -125,12 +127,14 @@ def _damping_along(sampler: Sampler) -> Hidden:
 def _stribeck(sampler: Sampler) -> Hidden:
     force, joint = sampler.force(0.1, 0.35), sampler.joint
     slow = sampler.between(0.03, 0.2) * joint.span / joint.time
-    return everywhere(rubbing.Stribeck(force, slow), force, sampler.unit())
+    return everywhere(friction_laws.Stribeck(force, slow), force, sampler.unit())
 
 
 def _asymmetric(sampler: Sampler) -> Hidden:
     force, way = sampler.force(0.15, 0.5), sampler.way()
-    return everywhere(rubbing.Rub(force, -1.0, 2.0, 0.0, way), force, sampler.unit(), way)
+    return everywhere(
+        friction_laws.IntervalFriction(force, -1.0, 2.0, 0.0, way), force, sampler.unit(), way
+    )
 
 
 def _one_way_damping(sampler: Sampler) -> Hidden:
@@ -156,7 +160,7 @@ def _presliding(sampler: Sampler) -> Hidden:
 
 def _loaded(sampler: Sampler) -> Hidden:
     coefficient = sampler.size(0.12, 0.5)
-    return everywhere(rubbing.Loaded(coefficient), coefficient, "1")
+    return everywhere(friction_laws.LoadFriction(coefficient), coefficient, "1")
 
 
 def _inertia(sampler: Sampler) -> Hidden:

@@ -11,8 +11,8 @@ from joda.hidden.family import Family
 from joda.hidden.joint import draw_truth
 from joda.hidden.known import KNOWN
 from joda.hidden.measuring import draw_encoder, move
-from joda.hidden.outside import BEYOND
 from joda.hidden.truth import Truth
+from joda.hidden.uncatalogued import UNCATALOGUED
 
 HEAVY = ("actuation_delay",)
 WEIGHTY = ("load_dependent_friction",)
@@ -33,7 +33,7 @@ LABORATORY = Family(
     "laboratory",
     "joint",
     KNOWN,
-    BEYOND,
+    UNCATALOGUED,
     ("backlash", "actuation_delay"),
     _truth,
     draw_encoder,

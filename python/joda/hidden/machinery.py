@@ -9,17 +9,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from joda.hidden import forms, memory, rubbing, shapes, strange
+from joda.hidden import forms, friction_laws, memory, shapes, uncatalogued_forms
 from joda.hidden.drag import DragAlong
 from joda.hidden.family import Family
 from joda.hidden.gestures import Session, perform, press, shove, some, steps, sweep, toss, track
 from joda.hidden.laws import Shape
 from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp, reversals
-from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
+from joda.hidden.uncatalogued import UNCATALOGUED as SHARED
 
 WEIGHTY = ("load_dependent_friction",)
 TIMED = "periodic_disturbance"
@@ -151,7 +151,9 @@ KNOWN: dict[str, Builder] = {
     "position_dependent_friction": forms.friction(_zone, 0.2, 0.8),
     "position_dependent_damping": forms.damping(_zone),
     "stribeck_friction": forms.stribeck(
-        lambda sampler, size, slow: rubbing.PowerStribeck(size, slow, sampler.between(0.5, 2.0))
+        lambda sampler, size, slow: friction_laws.PowerStribeck(
+            size, slow, sampler.between(0.5, 2.0)
+        )
     ),
     "asymmetric_friction": forms.friction(_rippled, 0.12, 0.5, one_way=True),
     "direction_dependent_damping": forms.damping(_rippled, one_way=True),
@@ -163,21 +165,21 @@ KNOWN: dict[str, Builder] = {
         (0.002, 0.05),
     ),
     "load_dependent_friction": forms.loaded(
-        lambda sampler, size: rubbing.LoadedContact(size, sampler.joint.force)
+        lambda sampler, size: friction_laws.LoadedContact(size, sampler.joint.force)
     ),
     "added_inertia": forms.inertia(forms.attached),
     "gravity_offset": forms.weight(lambda sampler: sampler.between(0, 2 * np.pi)),
     "backlash": forms.behind((0.005, 0.03), (0.3, 0.7), (50.0, 100.0)),
     "end_stop_restitution": forms.rebound(soft=True, both=0.7),
 }
-STRANGE: dict[str, Builder] = {
-    "maxwell_relaxation": strange.two_relaxations,
-    "warming_up": BEYOND["warming_up"],
-    "running_in": strange.running_in,
-    "periodic_disturbance": strange.switching,
-    "sloshing_load": strange.sloshing,
-    "speed_governor": strange.governor,
-    "air_cushion": strange.cushion,
+UNCATALOGUED: dict[str, Builder] = {
+    "maxwell_relaxation": uncatalogued_forms.two_relaxations,
+    "warming_up": SHARED["warming_up"],
+    "running_in": uncatalogued_forms.running_in,
+    "periodic_disturbance": uncatalogued_forms.switching,
+    "sloshing_load": uncatalogued_forms.sloshing,
+    "speed_governor": uncatalogued_forms.governor,
+    "air_cushion": uncatalogued_forms.cushion,
 }
 
-MACHINERY = Family("machinery", "axis", KNOWN, STRANGE, (), _truth, _encoder, _move)
+MACHINERY = Family("machinery", "axis", KNOWN, UNCATALOGUED, (), _truth, _encoder, _move)

@@ -11,7 +11,7 @@ import numpy as np
 from joda.hidden.laws import Array, Shape, bump
 
 GRID = np.linspace(0.0, 1.0, 2001)
-LEFT = 0.1
+NEGLIGIBLE = 0.1
 """Of the peak, where a shape counts as over."""
 
 
@@ -22,7 +22,7 @@ def peak(shape: Shape) -> float:
 
 def extent(shape: Shape) -> tuple[float, float]:
     """Where a shape is more than a tenth of its peak, from the first place to the last."""
-    inside = np.flatnonzero(np.abs(shape(GRID)) > LEFT * peak(shape))
+    inside = np.flatnonzero(np.abs(shape(GRID)) > NEGLIGIBLE * peak(shape))
     return float(GRID[inside[0]]), float(GRID[inside[-1]])
 
 

@@ -9,17 +9,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from joda.hidden import forms, rubbing, shapes, strange, truth
+from joda.hidden import forms, friction_laws, shapes, truth, uncatalogued_forms
 from joda.hidden.drag import Orifice
 from joda.hidden.family import Family
 from joda.hidden.gestures import Session, perform, press, shove, some, toss, trembling
 from joda.hidden.laws import Shape
 from joda.hidden.measuring import Encoder, Motions
 from joda.hidden.motions import Draw, drop, flick, hand, ramp
-from joda.hidden.outside import BEYOND
 from joda.hidden.plants import GRAVITY, furnish, pick
 from joda.hidden.sampler import Builder, Sampler
 from joda.hidden.truth import RESTITUTION_EFFECT, Joint, Truth
+from joda.hidden.uncatalogued import UNCATALOGUED as SHARED
 
 WEIGHTY = ("load_dependent_friction",)
 TIMED = "periodic_disturbance"
@@ -144,7 +144,7 @@ KNOWN: dict[str, Builder] = {
     "position_dependent_friction": forms.friction(_zone, 0.25, 0.8),
     "position_dependent_damping": forms.damping(_zone),
     "stribeck_friction": forms.stribeck(
-        lambda sampler, size, slow: rubbing.RationalStribeck(size, slow)
+        lambda sampler, size, slow: friction_laws.RationalStribeck(size, slow)
     ),
     "asymmetric_friction": forms.friction(_growing, 0.15, 0.5, one_way=True),
     "direction_dependent_damping": forms.damping(_growing, one_way=True),
@@ -162,7 +162,7 @@ KNOWN: dict[str, Builder] = {
         (0.01, 0.1),
     ),
     "load_dependent_friction": forms.loaded(
-        lambda sampler, size: rubbing.LoadedBearing(
+        lambda sampler, size: friction_laws.LoadedBearing(
             size, sampler.between(0.05, 0.3) * sampler.joint.force
         )
     ),
@@ -171,14 +171,14 @@ KNOWN: dict[str, Builder] = {
     "backlash": forms.handle((0.02, 0.06), (0.2, 0.6)),
     "end_stop_restitution": forms.rebound(soft=False, both=0.6),
 }
-STRANGE: dict[str, Builder] = {
-    "maxwell_relaxation": BEYOND["maxwell_relaxation"],
-    "friction_ageing": strange.ageing,
-    "running_in": strange.running_in,
-    "lost_motion_damper": strange.lost_motion,
-    "sloshing_load": strange.sloshing,
-    "square_root_damping": BEYOND["square_root_damping"],
-    "speed_governor": strange.governor,
+UNCATALOGUED: dict[str, Builder] = {
+    "maxwell_relaxation": SHARED["maxwell_relaxation"],
+    "friction_ageing": uncatalogued_forms.ageing,
+    "running_in": uncatalogued_forms.running_in,
+    "lost_motion_damper": uncatalogued_forms.lost_motion,
+    "sloshing_load": uncatalogued_forms.sloshing,
+    "square_root_damping": SHARED["square_root_damping"],
+    "speed_governor": uncatalogued_forms.governor,
 }
 
-SWITCHES = Family("switches", "button", KNOWN, STRANGE, ("backlash",), _truth, _encoder, _move)
+SWITCHES = Family("switches", "button", KNOWN, UNCATALOGUED, ("backlash",), _truth, _encoder, _move)

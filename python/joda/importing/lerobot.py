@@ -13,7 +13,7 @@ from joda.importing.log import Array, Clock, Log, Recording, Signal, Track, list
 from joda.importing.parquet import read_columns
 
 INDEX, FRAME, STAMP = "episode_index", "frame_index", "timestamp"
-MOST = 1e9
+MAX_NUMBER = 1e9
 """Numbers of episodes and frames are less."""
 
 
@@ -120,6 +120,6 @@ def _episode(
 
 def _check_counts(file: Path, name: str, values: Array) -> None:
     """Raises JodaError for what is no number of an episode or a frame."""
-    bad = np.flatnonzero(~((values >= 0) & (values < MOST)))
+    bad = np.flatnonzero(~((values >= 0) & (values < MAX_NUMBER)))
     if len(bad):
         raise JodaError(f"{file}, row {bad[0]}: {name} is {values[bad[0]]:g}, no number of one.")

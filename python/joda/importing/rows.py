@@ -10,7 +10,7 @@ from joda.importing.columns import Pick
 from joda.importing.log import Array, Clock, Log, Recording, Track
 from joda.importing.scaling import Scaled
 from joda.measured.run_files import run_text
-from joda.measured.runs import LEAST, Run
+from joda.measured.runs import MIN_SAMPLES, Run
 from joda.measured.table import LARGEST
 
 
@@ -78,10 +78,10 @@ def rows(log: Log, recording: Recording, columns: Sequence[Scaled], interpolate:
             raise JodaError(
                 f"{base.place}: {one.pick.signal.name} has numbers too large to be meant."
             )
-    if inside.sum() < LEAST:
+    if inside.sum() < MIN_SAMPLES:
         raise JodaError(
             f"{base.place}: {int(inside.sum())} samples in which all columns are known; a run "
-            f"needs at least {LEAST}."
+            f"needs at least {MIN_SAMPLES}."
         )
     notes = []
     if (cut := int(len(base.time) - inside.sum())) > 0:

@@ -15,7 +15,7 @@ from joda.importing.units import (
     MODEL,
     RAW,
     Linear,
-    Seen,
+    LoggedRange,
     decided,
     linear,
 )
@@ -102,7 +102,7 @@ def _find(
             groups.setdefault((group, hinge), []).append(pick)
     for (_, hinge), some in groups.items():
         seen = [
-            Seen(p.signal.name, *_span(log, p), hinge, limits[p.joint], zero[p.signal.name])
+            LoggedRange(p.signal.name, *_span(log, p), hinge, limits[p.joint], zero[p.signal.name])
             for p in some
         ]
         asked = some[0].signal.units or ("rad", "deg")

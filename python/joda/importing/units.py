@@ -16,7 +16,7 @@ MODEL, RAW = "model", "raw"
 ALIASES = {"percent": "0..100", "degrees": "deg", "radians": "rad", "degree": "deg", "%": "0..100"}
 SLACK = 0.1
 """How far beyond a joint's range, in parts of it, measured positions may lie in the right unit."""
-LEAST = 0.05
+MIN_RANGE_SHARE = 0.05
 """Least part of a range, or of a unit's whole scale, that the joint which moves most has moved: a
 log in radians read as degrees moves less, and so does one read as percents."""
 FULL = 0.95
@@ -87,7 +87,7 @@ def linear(
 
 
 @dataclass(frozen=True)
-class Seen:
+class LoggedRange:
     """Positions of a joint as they stand in a log.
 
     Attributes:
@@ -136,7 +136,7 @@ class Seen:
         return self.limits or ((-2 * math.pi, 2 * math.pi) if self.hinge else (-1.0, 1.0))
 
 
-def decided(seen: Sequence[Seen], units: Sequence[str]) -> tuple[str, str]:
+def decided(seen: Sequence[LoggedRange], units: Sequence[str]) -> tuple[str, str]:
     """The unit in which all of these positions are, and how that is known.
 
     Args:
@@ -162,11 +162,13 @@ def decided(seen: Sequence[Seen], units: Sequence[str]) -> tuple[str, str]:
     )
 
 
-def _fits(seen: Sequence[Seen], unit: str) -> bool:
-    return all(one.within(unit) for one in seen) and any(one.part(unit) >= LEAST for one in seen)
+def _fits(seen: Sequence[LoggedRange], unit: str) -> bool:
+    return all(one.within(unit) for one in seen) and any(
+        one.part(unit) >= MIN_RANGE_SHARE for one in seen
+    )
 
 
-def _sure(seen: Sequence[Seen], unit: str, units: Sequence[str]) -> bool:
+def _sure(seen: Sequence[LoggedRange], unit: str, units: Sequence[str]) -> bool:
     """Whether a unit that alone fits is told by more than another zero would change."""
     if unit not in RANGES:
         return True
@@ -174,19 +176,19 @@ def _sure(seen: Sequence[Seen], unit: str, units: Sequence[str]) -> bool:
     return largest >= FULL * RANGES[unit][1]
 
 
-def _reading(seen: Seen, unit: str) -> str:
+def _reading(seen: LoggedRange, unit: str) -> str:
     if unit in RANGES and seen.limits is None:
         return f"in {unit} nothing, as the joint has no range"
     a, b = (linear(unit, seen.hinge, seen.limits, seen.zero, "").of(x) for x in seen.span)
     return f"in {unit} {a:.4g} to {b:.4g} {'rad' if seen.hinge else 'm'}"
 
 
-def _model(seen: Seen) -> str:
+def _model(seen: LoggedRange) -> str:
     if seen.limits is None:
         return ", and the model's joint has no range"
     lo, hi = seen.limits
     return f", and the model's range is {lo:.4g} to {hi:.4g}"
 
 
-def _several(seen: Sequence[Seen]) -> str:
+def _several(seen: Sequence[LoggedRange]) -> str:
     return "; NAME may be a pattern, as '*.pos'" if len(seen) > 1 else ""

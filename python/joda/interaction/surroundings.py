@@ -11,16 +11,16 @@ from joda.profile import Profile
 from joda.scenes.actuators import acting_on
 from joda.scenes.assembly import at_others_limit, put, taut
 from joda.scenes.attaching import in_scene
-from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import Contact, contacts_along
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
 from joda.scenes.motion import at_home
+from joda.scenes.unmodelled import unmodelled_elements
 
 NEAR = 0.02
 """How near a contact (in normalised position) a joint that got stuck there may be."""
 OVERLAPS = 0.9
 """What presses over more than this share of the range is no obstacle but drawn into each other."""
-MANY = 3
+MAX_CONTACTS = 3
 """How many contacts are told, those with the largest force first."""
 
 
@@ -32,14 +32,14 @@ class Surroundings:
         path: of the model.
         joint: its name or address.
         contacts: over its whole range.
-        besides: tendons, equality constraints and media that act on it.
+        unmodelled: tendons, equality constraints and media that act on it.
         reference: its position at the keyframe `home`, else its reference, normalised.
     """
 
     path: Path
     joint: str
     contacts: tuple[Contact, ...]
-    besides: tuple[str, ...]
+    unmodelled: tuple[str, ...]
     reference: float
 
     @property
@@ -50,10 +50,10 @@ class Surroundings:
     @property
     def acting(self) -> str:
         """What acts on it besides contacts; empty if nothing does."""
-        if not self.besides:
+        if not self.unmodelled:
             return ""
-        does = "acts" if len(self.besides) == 1 else "act"
-        return f"{' and '.join(self.besides)} {does} on joint '{self.joint}'"
+        does = "acts" if len(self.unmodelled) == 1 else "act"
+        return f"{' and '.join(self.unmodelled)} {does} on joint '{self.joint}'"
 
     @property
     def remedy(self) -> str:
@@ -118,18 +118,18 @@ def surroundings(path: Path, joint: str) -> Surroundings | None:
     described = describe_joint(model, number)
     found = contacts_along(model, number, described, described.range, home=True)
     felt = tuple(one for one in found if not one.stop)
-    besides = acting_besides(model, number)
-    if not felt and not besides:
+    unmodelled = unmodelled_elements(model, number)
+    if not felt and not unmodelled:
         return None
     lo, hi = described.range
     begins = at_home(model).qpos[model.jnt_qposadr[number]]
     reference = float(np.clip((begins - lo) / (hi - lo), 0, 1))
-    return Surroundings(path, joint_name(model, number), felt, besides, reference)
+    return Surroundings(path, joint_name(model, number), felt, unmodelled, reference)
 
 
 def touching(contacts: Sequence[Contact]) -> str:
     """The contacts with the largest forces in words."""
-    hardest = sorted(contacts, key=lambda one: -one.force)[:MANY]
+    hardest = sorted(contacts, key=lambda one: -one.force)[:MAX_CONTACTS]
     out = [
         f"'{one.geom}' touches '{one.other}' from s = {one.interval[0]:.2f} to "
         f"{one.interval[1]:.2f}"

@@ -28,7 +28,7 @@ Array = jax.Array
 
 SLIPPING = 1e-6
 """Part of the bristles' stiffness that is left while they slip."""
-LEAST_SHARE = 0.05
+MIN_SHARE = 0.05
 """Part of it that is left in the row where it is far stiffer than the step resolves."""
 STILL = 1e-9
 """As kStill in cpp/effects.h."""
@@ -153,7 +153,7 @@ def stiffen_friction_row(
     # The row must also stop a part that turns back within the step. While it slips the bound gives
     # the law's force, so that all of the stiffness can be there; else what is too stiff for the
     # step keeps a share.
-    in_row = jnp.maximum(left, LEAST_SHARE - inertia / resolved)
+    in_row = jnp.maximum(left, MIN_SHARE - inertia / resolved)
     in_row = jnp.where(left <= SLIPPING, 1, in_row)
     D = jnp.clip(resolved * in_row, IDLE_ROW * inertia, stiff)
     return D, part * bristles.damping * left

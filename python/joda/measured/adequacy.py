@@ -2,7 +2,7 @@
 
 An all-clear is a claim on every run and every segment. It takes three things: each whole run and
 each segment is missed by less than a stated multiple of the noise; the residual force of successive
-windows has no pattern; and there is enough motion for a fault to show. A run where the scene does
+segments has no pattern; and there is enough motion for a fault to show. A run where the scene does
 not let the joint be is a fault whatever the replays say.
 """
 
@@ -15,7 +15,7 @@ from scipy.special import bdtr, ndtr
 
 from joda.measured.data_checks.timing import repeats
 from joda.measured.errors import MULTIPLE, Errors, Missed
-from joda.measured.failing import FORCE, LENGTHS
+from joda.measured.failing_intervals import FORCE, LENGTHS
 from joda.measured.measured_joint import Measured
 from joda.measured.runs import Run
 from joda.measured.whiteness import drifts, free_parts, strays
@@ -25,14 +25,14 @@ Adequate = Literal["within_noise", "beyond_noise", "not_enough_data"]
 
 CHANCE = 0.005
 """Probability, for a true model, of a pattern in the residual as clear as one that is told."""
-SEGMENT = LENGTHS[0]
-"""Length of the windows whose residual force may have a pattern, s."""
+SEGMENT_LENGTH = LENGTHS[0]
+"""Length of the segments whose residual force may have a pattern, s."""
 SAMPLES = 30
 """Fewest samples that tell anything."""
 LOUD = 0.3
 """Share of the noise in a run's motion from which on nothing is cleared."""
-WINDOWS, MOVES = 4, 8.0
-"""Fewest windows in which the joint moves by so many times the noise that tell anything."""
+MIN_SEGMENTS, MOVES = 4, 8.0
+"""Fewest segments in which the joint moves by so many times the noise that tell anything."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class Adequacy:
 
     Attributes:
         verdict: within it; beyond it; or too few data to tell.
-        run, segment: the whole run and the window that are missed by most, those first that the
+        run, segment: the whole run and the segment that are missed by most, those first that the
             measurement's own errors do not explain; None if there is none.
         pattern: probability that a true model leaves as clear a pattern of residual force (Wald and
             Wolfowitz's runs test and a sign test), or as large means of what is missed of a free
-            run (`joda.measured.whiteness`), Bonferroni-corrected; None with too few windows.
+            run (`joda.measured.whiteness`), Bonferroni-corrected; None with too few segments.
         whole: whether all that acts on the joint in its scene is replayed, and all of the runs.
         loudness: the largest share of the noise in a run's motion, both RMS: from 0.3 on the noise
             may be motion between two samples.
@@ -73,7 +73,7 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
     Args:
         measured: the joint and its runs.
         found: errors of their replays.
-        rows: of `joda.measured.failing.window_rows`.
+        rows: of `joda.measured.failing_intervals.window_rows`.
     """
     whole = [one for one in found.missed if one.time is None]
     pieces = [one for one in found.missed if one.time is not None]
@@ -101,7 +101,7 @@ def adequacy(measured: Measured, found: Errors, rows: Array) -> Adequacy:
         or loudness >= LOUD
         or repeating
         or pattern is None
-        or _moving(measured) < WINDOWS
+        or _moving(measured) < MIN_SEGMENTS
     ):
         verdict = "not_enough_data"
     adrift = verdict == "within_noise" and strays(measured) < CHANCE
@@ -124,11 +124,11 @@ def _loudness(run: Run, sigma: float) -> float:
 
 
 def _moving(measured: Measured) -> int:
-    """In how many windows of the runs the joint moves by clearly more than the noise."""
+    """In how many segments of the runs the joint moves by clearly more than the noise."""
     count = 0
     for run, sigma in zip(measured.runs, measured.sigma, strict=True):
-        window = ((run.time - run.time[0]) / SEGMENT).astype(int)
-        first = np.flatnonzero(np.diff(window, prepend=-1))
+        segment = ((run.time - run.time[0]) / SEGMENT_LENGTH).astype(int)
+        first = np.flatnonzero(np.diff(segment, prepend=-1))
         travel = np.maximum.reduceat(run.position, first) - np.minimum.reduceat(run.position, first)
         count += int(np.sum(travel > MOVES * sigma))
     return count
@@ -141,15 +141,15 @@ def residual_pattern(rows: Array) -> float | None:
     position and velocity.
 
     Args:
-        rows: of `joda.measured.failing.window_rows`, in the order of time.
+        rows: of `joda.measured.failing_intervals.window_rows`, in the order of time.
 
     Returns:
         Bonferroni-corrected p-value of the runs tests (Wald and Wolfowitz, Ann. Math. Stat. 11
-        (1940) 147) and sign tests; None for fewer than `WINDOWS` windows.
+        (1940) 147) and sign tests; None for fewer than `MIN_SEGMENTS` segments.
     """
     force, force_error = rows[:, FORCE], rows[:, FORCE + 1]
     rows = rows[np.isfinite(force) & np.isfinite(force_error) & (force_error > 0) & (force != 0)]
-    if len(rows) < WINDOWS:
+    if len(rows) < MIN_SEGMENTS:
         return None
     sign = rows[:, FORCE] > 0
     values = [sign_test(sign[way]) for way in (rows[:, 2] > 0, rows[:, 2] < 0)]

@@ -106,7 +106,7 @@ def _speed(one: Run | QuasiStatic) -> float:
     """Largest over a few samples, rad/s or m/s; that of a slow hand is 0."""
     if isinstance(one, QuasiStatic):
         return 0.0
-    n = min(smoothing.LEAST, len(one.time) - 1)
+    n = min(smoothing.MIN_SAMPLES, len(one.time) - 1)
     return float(
         np.max(np.abs(one.position[n:] - one.position[:-n]) / (one.time[n:] - one.time[:-n]))
     )

@@ -7,11 +7,11 @@ from json import dumps
 from joda.measured.adequacy import LOUD, Adequacy, Adequate
 from joda.measured.curves import CurveError, FailingForce, curves_described
 from joda.measured.errors import MULTIPLE, Missed, RunError
-from joda.measured.failing import Failing
+from joda.measured.failing_intervals import Failing
 from joda.plain import plain
 from joda.scenes.contacts import Contact
 
-SAID = 6
+MAX_INTERVALS = 6
 """Most places that are told."""
 
 
@@ -26,7 +26,7 @@ class Comparison:
         rmse, rmse_window, noise_floor: of all runs together, rad or m; None without a run.
         adequacy: whether the runs show a fault of the model; None without a run.
         failing: where it fails, the largest share first.
-        failing_window: length of the windows that show it, s; 0: pieces of whole runs.
+        failing_window: length of the segments that show it, s; 0: pieces of whole runs.
         curves: errors by quasi-static curve.
         curves_adequacy: whether the curves show one; None without a curve.
         failing_force: where its quasi-static force fails, the largest share first.
@@ -78,13 +78,15 @@ def sentences(comparison: Comparison) -> list[str]:
 
 def _of_runs(comparison: Comparison) -> list[str]:
     unit, floor = comparison.unit, comparison.noise_floor
-    missed = {"Whole runs": comparison.rmse, "windows of 0.4 s": comparison.rmse_window}
-    parts = [f"{what} by {error:.3g} {unit}" for what, error in missed.items() if error is not None]
+    errors = {
+        "free-run (open-loop) error": comparison.rmse,
+        "segment error (0.4 s horizon)": comparison.rmse_window,
+    }
+    parts = [f"{what} {error:.3g} {unit}" for what, error in errors.items() if error is not None]
     if parts:
-        first, *more = parts
-        by = ", ".join([first.replace(" by", " are missed by") + " RMS", *more])
+        told = ", ".join([f"{parts[0]} RMS", *parts[1:]])
         noise = f"the measurement's noise is {floor:.2g} {unit}."
-        out = [f"{by[0].upper()}{by[1:]}; {noise}"]
+        out = [f"{told[0].upper()}{told[1:]}; {noise}"]
     else:
         out = ["No run could be replayed."]
     out += [f"{run.file}: {run.reason}." for run in comparison.runs if run.reason]
@@ -97,7 +99,7 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
     assert found is not None
     if found.verdict == "within_noise":
         yield (
-            f"Nothing beyond the noise: every run and every window is missed by less than "
+            f"Nothing beyond the noise: the error of every run and every segment is less than "
             f"{MULTIPLE:g} times the noise, and the residual force has no pattern; these runs show "
             "no fault of the model."
         )
@@ -108,7 +110,7 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
         told = ", and ".join(map(_explained, worst))
         yield f"Not enough to tell whether the model is right: {told}."
         if found.segment and found.segment.multiple < MULTIPLE:
-            yield f"All windows of 0.4 s are missed by less than {MULTIPLE:g} times the noise."
+            yield f"The error of every segment of 0.4 s is less than {MULTIPLE:g} times the noise."
     elif found.verdict == "not_enough_data" and not found.whole:
         yield (
             "Not enough to tell whether the model is right: nothing in what is replayed is beyond "
@@ -116,15 +118,16 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
         )
     elif found.verdict == "not_enough_data" and found.adrift:
         yield (
-            "Not enough to tell whether the model is right: every run and every window is missed "
-            f"by less than {MULTIPLE:g} times the noise, but more is left of whole runs than noise "
-            "of position and force makes: a small fault of the model, or what the force did "
-            "between its samples."
+            "Not enough to tell whether the model is right: the error of every run and every "
+            f"segment is less than {MULTIPLE:g} times the noise, but more is left of whole runs "
+            "than noise of position and force makes: a small fault of the model, or what the force "
+            "did between its samples."
         )
     elif found.verdict == "not_enough_data" and comparison.failing:
         yield (
-            "Not enough to tell whether the model is right: every run and every window is missed "
-            f"by less than {MULTIPLE:g} times the noise, but some by clearly more than others."
+            "Not enough to tell whether the model is right: the error of every run and every "
+            f"segment is less than {MULTIPLE:g} times the noise, but some are clearly larger than "
+            "others."
         )
     elif found.verdict == "not_enough_data" and found.repeats:
         yield (
@@ -141,13 +144,13 @@ def _verdict(comparison: Comparison) -> Iterator[str]:
     elif found.verdict == "beyond_noise" and worst:
         yield f"Beyond the noise: {', and '.join(map(_worst, worst))}."
         if not found.whole:
-            yield "Not all that acts is replayed (see the notes): that may be what is missed."
+            yield "Not all that acts is replayed (see the notes): that may be the error."
     elif found.verdict == "beyond_noise" and not found.barred and found.pattern is not None:
-        every = "every run and window" if found.segment else "every run"
+        every = "every run and segment" if found.segment else "every run"
         small = "Beyond noise" if found.loudness >= LOUD else "Small, but not noise"
         yield (
-            f"{small}: {every} is missed by less than {MULTIPLE:g} times the noise, yet what is "
-            f"left has a pattern that noise makes in {_rarely(found.pattern)}."
+            f"{small}: the error of {every} is less than {MULTIPLE:g} times the noise, yet it has "
+            f"a pattern that noise makes in {_rarely(found.pattern)}."
         )
         if found.loudness >= LOUD:
             yield f"How far beyond these runs cannot tell: {_loud(found)}"
@@ -164,9 +167,9 @@ def _loud(found: Adequacy) -> str:
 
 def _worst(one: Missed) -> str:
     if one.time is None:
-        return f"{one.file} as a whole is missed by {_much(one)}"
+        return f"the free run of {one.file} is off by {_much(one)}"
     first, last = one.time
-    return f"the window of {one.file} at {first:.3g} to {last:.3g} s by {_much(one)}"
+    return f"the segment of {one.file} at {first:.3g} to {last:.3g} s is off by {_much(one)}"
 
 
 def _much(one: Missed) -> str:
@@ -179,7 +182,7 @@ def _times(multiple: float) -> str:
 
 def _explained(one: Missed) -> str:
     return (
-        f"{_worst(one)}, of which errors of the measured start and force alone can make "
+        f"{_worst(one)}, of which errors of the measured initial state and force alone can make "
         f"{_times(one.explained)} the noise"
     )
 
@@ -191,7 +194,7 @@ def _rarely(probability: float) -> str:
 def _places(comparison: Comparison) -> Iterator[str]:
     unit = comparison.unit
     force = "N·m" if unit == "rad" else "N"
-    for place in comparison.failing[:SAID]:
+    for place in comparison.failing[:MAX_INTERVALS]:
         a, b = place.interval
         where = {
             "position": f"at s = {a:.2f} to {b:.2f}",
@@ -205,8 +208,8 @@ def _places(comparison: Comparison) -> Iterator[str]:
         else:
             much = "much" if place.force > 0 else "little"
             how = (
-                f"where the model pushes {abs(place.force):.2g} {force} too {much} towards +q in "
-                "the mean"
+                f"where the mean residual force is {abs(place.force):.2g} {force}: the model "
+                f"pushes too {much} towards +q"
             )
         share = f"{100 * place.share:.0f}" if place.share >= 0.01 else "less than 1"
         yield f"By {place.by}: {share} % of the error is {where}, {how}."

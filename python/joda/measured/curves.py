@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.measured.adequacy import CHANCE, Adequate, runs_test, sign_test
-from joda.measured.failing_intervals import BINS, failing_intervals, significant
 from joda.measured.quasi_static import QuasiStaticComparison
+from joda.measured.significant_bins import BINS, significant, significant_intervals
 from joda.profile import Joint
 
-SAID = 0.1
+MIN_SHARE = 0.1
 """What is less than this share of the larger one is not said."""
-MOST = 6
+MAX_INTERVALS = 6
 """Most places that are told."""
-AGREE = 0.5
+MIN_MEAN_SHARE = 0.5
 """Least mean error of a direction, in units of its RMS, that is the direction's: what changes its
 sign is the place's."""
 LOUD, ALONE = 0.15, 0.05
@@ -24,9 +24,9 @@ LOUD, ALONE = 0.15, 0.05
 place was measured both ways, or one period stands out of it, so that it may be the joint's own."""
 LINE = 0.01
 """Chance that one period stands out of noise as it does, below which it is none."""
-WILD = 6.0
+OUTLIER_NOISES = 6.0
 """Error of a single sample, in units of the noise, that no noise makes."""
-FEW = 15
+MIN_SAMPLES = 15
 """Fewest samples of a curve that give one."""
 TOO_LOUD = (
     "what the force does from sample to sample is much of all that it does, whether that is noise "
@@ -61,7 +61,7 @@ class FailingForce:
         by: what is told apart.
         interval: normalised position; or -1 to 0, 0 to 1 (direction).
         error: RMS error there.
-        force: mean force towards +q that the model has too much there; of the means of both
+        force: mean residual force towards +q (model's less the true one); of the means of both
             directions, where both were measured.
         friction: that it has too much there; None where one direction was measured.
         share: of the sum of squared errors beyond the noise, 0 to 1.
@@ -103,10 +103,12 @@ def failing_force(curves: Sequence[QuasiStaticComparison], joint: Joint) -> list
         ("position", np.linspace(0, 1, BINS + 1), (place - lo) / (hi - lo)),
         ("direction", np.array([-1.0, 0.0, 1.0]), way / 2),
     ):
-        for interval, inside in failing_intervals(edges, values, found, apart=by == "direction"):
+        for interval, inside in significant_intervals(
+            edges, values, found, apart=by == "direction"
+        ):
             means = [excess[inside & (way == d)].mean() for d in (1, -1) if d in way[inside]]
             error = float(np.sqrt(np.mean(excess[inside] ** 2)))
-            if by == "direction" and max(map(abs, means)) < AGREE * error:
+            if by == "direction" and max(map(abs, means)) < MIN_MEAN_SHARE * error:
                 continue
             out.append(
                 FailingForce(
@@ -131,10 +133,10 @@ def curves_verdict(
     nothing is cleared.
     """
     rows = [np.stack([np.ones(len(z)), np.ones(len(z)), z**2], axis=1) for z in map(_z, curves)]
-    beyond = failing or any(significant(row) or row[:, 2].max() > WILD**2 for row in rows)
+    beyond = failing or any(significant(row) or row[:, 2].max() > OUTLIER_NOISES**2 for row in rows)
     if beyond or any(_pattern(curve) < CHANCE for curve in curves):
         return "beyond_noise"
-    few = any(len(curve.excess) < FEW for curve in curves)
+    few = any(len(curve.excess) < MIN_SAMPLES for curve in curves)
     return "not_enough_data" if few or any(map(too_loud, curves)) else "within_noise"
 
 
@@ -152,7 +154,7 @@ def _periodic(curve: QuasiStaticComparison) -> bool:
     for one in (1, -1):
         there = np.flatnonzero(way == one)
         error = curve.excess[there[np.argsort(position[there], kind="stable")]]
-        if len(error) < FEW or not np.ptp(error) > 0:
+        if len(error) < MIN_SAMPLES or not np.ptp(error) > 0:
             continue
         power = np.abs(np.fft.rfft(error - error.mean())[1:]) ** 2
         count = len(power)
@@ -196,14 +198,14 @@ def curves_described(
             "show no fault of the model that is larger."
         )
     elif verdict == "not_enough_data":
-        why = f"a curve has fewer than {FEW} samples, or {TOO_LOUD}"
+        why = f"a curve has fewer than {MIN_SAMPLES} samples, or {TOO_LOUD}"
         out.append(f"Not enough to tell whether the model is right: {why}")
     elif not failing:
         out.append(
             "Small, but not noise: the force's error is larger than noise makes it, or its signs "
             "have a pattern that noise makes in fewer than 1 of 200 cases."
         )
-    return out + [_failing_described(place, unit) for place in failing[:MOST]]
+    return out + [_failing_described(place, unit) for place in failing[:MAX_INTERVALS]]
 
 
 def _failing_described(place: FailingForce, unit: str) -> str:
@@ -211,15 +213,18 @@ def _failing_described(place: FailingForce, unit: str) -> str:
     where = f"at s = {a:.2f} to {b:.2f}"
     if place.by == "direction":
         where = "while moving towards " + ("+q" if b > 0 else "\N{MINUS SIGN}q")
-    least = SAID * max(abs(place.force), abs(friction))
+    least = MIN_SHARE * max(abs(place.force), abs(friction))
     share = f"By {place.by}: {100 * place.share:.0f} % of the force's error is {where}, where"
-    if max(abs(place.force), abs(friction)) < AGREE * place.error:
-        return f"{share} the model is off by {place.error:.2g} {unit} RMS, with either sign."
+    if max(abs(place.force), abs(friction)) < MIN_MEAN_SHARE * place.error:
+        return f"{share} the residual force is {place.error:.2g} {unit} RMS, with either sign."
     what = []
     if abs(place.force) >= least:
         much = "much" if place.force > 0 else "little"
-        what.append(f"pushes {abs(place.force):.2g} {unit} too {much} towards +q in the mean")
+        what.append(
+            f"the mean residual force is {abs(place.force):.2g} {unit} (the model pushes too "
+            f"{much} towards +q)"
+        )
     if place.friction is not None and abs(friction) >= least:
         much = "much" if friction > 0 else "little"
-        what.append(f"has {abs(friction):.2g} {unit} too {much} friction")
-    return f"{share} the model {' and '.join(what)}."
+        what.append(f"the model's friction is {abs(friction):.2g} {unit} too {much}")
+    return f"{share} {' and '.join(what)}."

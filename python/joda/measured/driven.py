@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.errors import JodaError
-from joda.measured.others import SHORTER, SMOOTHED, error_of_others, force_of_others
+from joda.measured.contact_samples import touching
+from joda.measured.coupling import SHORTER, SMOOTHED, coupling_force, coupling_force_std
 from joda.measured.run_files import read_measurement, read_together
-from joda.measured.runs import LEAST, QuasiStatic, Run, evened
+from joda.measured.runs import MIN_SAMPLES, QuasiStatic, Run, evened
 from joda.measured.sensing import RIGHT, Sensing
 from joda.measured.table import header
-from joda.measured.touching import touching
 from joda.scenes.actuators import Drive, Servo, actuators_on, drive_of
 from joda.scenes.model import joint_name, load_model
 
@@ -92,7 +92,7 @@ def read_logs(
         if not isinstance(one, Run):
             one = sensing.of_curve(one)
         elif positions:
-            one, more = _among_others(model, joint, one, positions)
+            one, more = _with_coupling(model, joint, one, positions)
             notes += more
         if first := next((other for other in read if _copies(one, other)), None):
             notes.append(
@@ -136,15 +136,15 @@ def _read(
     return run, by_id, notes
 
 
-def _among_others(
+def _with_coupling(
     model: mujoco.MjModel, joint: int, run: Run, positions: Mapping[int, Array]
 ) -> tuple[Run, list[str]]:
     """The run with what the other joints of its log do to the joint as a force on it, which is not
     known where something of the scene touches; and notes."""
     found, other = (
-        force_of_others(model, joint, run.time, positions, over) for over in (SMOOTHED, SHORTER)
+        coupling_force(model, joint, run.time, positions, over) for over in (SMOOTHED, SHORTER)
     )
-    force_std = error_of_others(run.time, found, other)
+    force_std = coupling_force_std(run.time, found, other)
     inside, pairs = touching(model, joint, positions)
     force = np.where(inside, np.nan, run.force + found)
     run = replace(run, force=force, forced=True, force_std=force_std, among=True)
@@ -158,7 +158,7 @@ def _among_others(
             f"'{pair[0]}' '{pair[1]}'{more}."
         )
     inner = np.abs(run.time - (run.time[0] + run.time[-1]) / 2) <= (np.ptp(run.time) - SMOOTHED) / 2
-    if inner.sum() < LEAST or len(positions) == 1:
+    if inner.sum() < MIN_SAMPLES or len(positions) == 1:
         return run, notes
     return run.part(np.flatnonzero(inner)), notes  # the ends are smoothed from one side only
 

@@ -1,4 +1,4 @@
-"""All measured runs replayed, whole and in windows: how far a model is off."""
+"""All measured runs replayed, whole and in segments: how far a model is off."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from joda.measured.measured_joint import Measured
 from joda.measured.misfit import joined, rms
-from joda.measured.replay import Window
+from joda.measured.replay import Segment
 from joda.measured.runs import CLEAR, Run, arrival
 
 Array = NDArray[np.float64]
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 ASTRAY = 1e9
 """Error, in units of the noise, of a simulation that is not finite."""
 MULTIPLE = 3.0
-"""Largest RMS error of a whole run or of a window that an all-clear allows, in units of the
+"""Largest RMS error of a whole run or of a segment that an all-clear allows, in units of the
 noise."""
 EXPLAINED = 3.0
 """So many times what errors of the measured start and force make may be these errors' still."""
@@ -30,7 +30,7 @@ class RunError:
         file: its name.
         rmse: of an open-loop replay of the whole run from its measured start; None if it could not
             be replayed.
-        rmse_window: of windows of 0.4 s from fresh measured starts; None likewise.
+        rmse_window: of segments of 0.4 s from fresh measured starts; None likewise.
         noise_floor: the measurement's noise: no model gets below it.
         reason: why something could not be replayed; None if all was.
         rmse_explained: how far errors of the measured start and force alone move the whole run's
@@ -47,13 +47,13 @@ class RunError:
 
 @dataclass(frozen=True)
 class Missed:
-    """How much a whole run, or a window of it, is missed by.
+    """How much a whole run, or a segment of it, is missed by.
 
     Attributes:
         file: of the run.
         multiple: RMS error in units of the run's noise; `ASTRAY` if the simulation went astray.
         explained: what errors of the measured start and force alone make of it, in the same units.
-        time: of the window, s from and to; None for the whole run.
+        time: of the segment, s from and to; None for the whole run.
     """
 
     file: str
@@ -79,7 +79,7 @@ class Errors:
     Attributes:
         paths: the model's positions at each run's times, rad or m.
         runs: by run.
-        missed: every whole run and every window that was replayed.
+        missed: every whole run and every segment that was replayed.
         whole, window, noise: of all runs together, as those of a `RunError`.
     """
 
@@ -103,7 +103,7 @@ def errors(
 
     Args:
         measured: the runs, and the model.
-        windows: whether the errors of windows, which take longer, are wanted.
+        windows: whether the errors of segments, which take longer, are wanted.
         explained: whether what errors of start and force make of whole runs is, which takes longer
             still; else it is 0.
         within: whether a position beyond an end of the range counts as at it: how deep a joint
@@ -123,7 +123,7 @@ def errors(
         paths.append(measured.replayer.whole(run, start))
         misfit = misfits(paths[-1], run.position)
         off.append(misfit[~np.isnan(paths[-1])])
-        pieces = measured.replayer.windows(run, sigma) if windows else []
+        pieces = measured.replayer.segments(run, sigma) if windows else []
         if within:
             there = [run.position[piece.samples] for piece in pieces]
             pieces = [
@@ -172,10 +172,10 @@ def _multiple(error: float, sigma: float) -> float:
     return min(error / sigma, ASTRAY) if np.isfinite(error) else ASTRAY
 
 
-def _missed(run: Run, sigma: float, window: Window) -> Missed:
-    first, last = run.time[window.samples[[0, -1]]]
-    multiple = _multiple(rms(window.misfit), sigma)
-    return Missed(run.name, multiple, window.explained / sigma, (float(first), float(last)))
+def _missed(run: Run, sigma: float, segment: Segment) -> Missed:
+    first, last = run.time[segment.samples[[0, -1]]]
+    multiple = _multiple(rms(segment.misfit), sigma)
+    return Missed(run.name, multiple, segment.explained / sigma, (float(first), float(last)))
 
 
 def known(error: float) -> float | None:
@@ -183,13 +183,13 @@ def known(error: float) -> float | None:
     return error if np.isfinite(error) else None
 
 
-def _reason(run: Run, whole: float, windows: Sequence[Window]) -> str | None:
+def _reason(run: Run, whole: float, segments: Sequence[Segment]) -> str | None:
     """Why a run could not be replayed, as a clause."""
     if np.isnan(run.force).all():
         return "its force is unknown throughout"
     if not np.isfinite(whole):
-        return "its force is unknown from near its beginning, so only windows of it are replayed"
-    if not windows:
+        return "its force is unknown from near its beginning, so only segments of it are replayed"
+    if not segments:
         known_force = " of known force" if run.forced else ""
-        return f"no window of 0.4 s has enough samples{known_force}"
+        return f"no segment of 0.4 s has enough samples{known_force}"
     return None

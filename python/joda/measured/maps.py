@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.measured.failing import FORCE, window_rows
+from joda.measured.failing_intervals import FORCE, window_rows
 from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import QuasiStaticComparison, static_force
 from joda.measured.runs import Run
@@ -90,7 +90,7 @@ def draw_maps(
     joint: Joint,
     unvisited: Sequence[Interval],
 ) -> None:
-    """The force that each model has too much, by position above and by velocity below.
+    """The residual force of each model, by position above and by velocity below.
 
     Args:
         part: of a figure.
@@ -108,7 +108,7 @@ def draw_maps(
         column[0].set_xlabel("normalised position s")
         column[1].set_xlabel(f"velocity ({joint.unit}/s)")
     for axes in panels[:, 0]:
-        axes.set_ylabel(f"force too much ({force})")
+        axes.set_ylabel(f"residual force ({force})")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     part.legend(handles, labels, loc="outside lower right", frameon=False, fontsize=8, ncols=2)
 
@@ -120,7 +120,7 @@ def shade(axes: "Axes", intervals: Sequence[Interval]) -> None:
 
 
 def _map(axes: "Axes", rows: Array, x: int) -> None:
-    """Forces of windows with two standard deviations over one of the columns of the rows."""
+    """Forces of segments with two standard deviations over one of the columns of the rows."""
     force_error = rows[:, FORCE + 1]
     clear = rows[force_error < UNCLEAR * np.median(force_error)] if len(rows) else rows
     for sign, name, way in WAYS:

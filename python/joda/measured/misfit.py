@@ -5,21 +5,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from joda.measured.replay import Replayer, Window
+from joda.measured.replay import Replayer, Segment
 from joda.measured.runs import Run
 
 Array = NDArray[np.float64]
 
 
-def joined(windows: Sequence[Window]) -> Array:
-    """The misfits of all windows."""
-    return np.concatenate([window.misfit for window in windows] or [np.zeros(0)])
+def joined(segments: Sequence[Segment]) -> Array:
+    """The misfits of all segments."""
+    return np.concatenate([segment.misfit for segment in segments] or [np.zeros(0)])
 
 
 def missed(replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float]) -> float:
-    """RMS error of runs in windows, rad or m; NaN if there are none."""
+    """RMS error of runs in segments, rad or m; NaN if there are none."""
     pairs = zip(runs, sigma, strict=True)
-    return rms(np.concatenate([joined(replayer.windows(run, noise)) for run, noise in pairs]))
+    return rms(np.concatenate([joined(replayer.segments(run, noise)) for run, noise in pairs]))
 
 
 def missed_whole(replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float]) -> float:

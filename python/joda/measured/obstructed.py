@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from joda.errors import JodaError
 from joda.measured import smoothing
 from joda.measured.barrier import Barrier
-from joda.measured.runs import LEAST, QuasiStatic, Run, known
+from joda.measured.runs import MIN_SAMPLES, QuasiStatic, Run, known
 from joda.profile import Joint, Profile
 from joda.scenes.contacts import Contact, contacts_along
 from joda.scenes.context import Context
@@ -23,7 +23,7 @@ Measurement = Run | QuasiStatic
 
 ROOM = 3.0
 """How near a contact, in noises of the position, counts as within it."""
-MANY = 3
+MAX_CONTACTS = 3
 """How many contacts are told, those with the largest force first."""
 
 
@@ -66,7 +66,7 @@ def clear_of_contacts(
         JodaError: nothing is left.
     """
     described = profile.joint
-    if any(isinstance(one, Run) and one.among for one in read):  # see joda.measured.touching
+    if any(isinstance(one, Run) and one.among for one in read):  # see joda.measured.contact_samples
         return Clear(list(read), (), [])
     places = np.clip(np.concatenate([one.position for one in read]), *described.range)
     path = float(places.min()), float(places.max())
@@ -119,7 +119,7 @@ def _barred(barrier: Barrier, read: Sequence[Measurement], contacts: Sequence[Co
         return ""
     where = "; ".join(
         f"{pair} from s = {one.interval[0]:.3f} to {one.interval[1]:.3f}"
-        for pair, one in list(pairs.items())[:MANY]
+        for pair, one in list(pairs.items())[:MAX_CONTACTS]
     )
     return (
         f"The scene blocks joint '{barrier.joint.name}' where it was measured to move: {where}, "
@@ -149,7 +149,7 @@ def _without(one: Measurement, inside: NDArray[np.bool_]) -> Measurement | None:
         return one
     if isinstance(one, QuasiStatic):
         kept = ~inside
-        if kept.sum() < LEAST:
+        if kept.sum() < MIN_SAMPLES:
             return None
         return QuasiStatic(one.name, one.position[kept], one.force[kept])
     masked = replace(one, force=np.where(inside, np.nan, one.force))
@@ -166,9 +166,13 @@ def _touching(contacts: Sequence[Contact], joint: Joint) -> str:
         f"{_pair(one)} from s = {one.interval[0]:.3f} to {one.interval[1]:.3f} "
         f"({one.path[0]:.4g} to {one.path[1]:.4g} {joint.unit}), with up to {one.force:.3g} "
         f"{joint.force_unit}"
-        for one in hardest[:MANY]
+        for one in hardest[:MAX_CONTACTS]
     )
-    more = f"; and {len(contacts) - MANY} contacts more" if len(contacts) > MANY else ""
+    more = (
+        f"; and {len(contacts) - MAX_CONTACTS} contacts more"
+        if len(contacts) > MAX_CONTACTS
+        else ""
+    )
     return f"In the scene joint '{joint.name}' is not free: {told}{more}"
 
 
@@ -186,4 +190,6 @@ def _pair(one: Contact) -> str:
 
 def _files(read: Sequence[Measurement]) -> str:
     names = [one.name for one in read]
-    return ", ".join(names[:MANY]) + (f" and {len(names) - MANY} more" * (len(names) > MANY))
+    return ", ".join(names[:MAX_CONTACTS]) + (
+        f" and {len(names) - MAX_CONTACTS} more" * (len(names) > MAX_CONTACTS)
+    )

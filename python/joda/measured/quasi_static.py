@@ -23,15 +23,15 @@ Array = NDArray[np.float64]
 
 BACK = 8.0
 """So many noises a joint must come back to have turned: slow travel is full of small returns."""
-BACK_MOST = 0.25
+MAX_BACK_SHARE = 0.25
 """And at most this share of what was visited."""
 TURN = 4.0
 """Within so many noises of a turn the direction is not known."""
-SLOW = 0.8
+BLURRING_NOISE = 0.8
 """Noise of at least so many usual steps between samples blurs a turn."""
-LEAST = 5
+MIN_SAMPLES = 5
 """Fewest samples in one direction that tell the noise."""
-SAME = 0.1
+SAME_PLACE = 0.1
 """Distance of two samples that are at the same place, in usual distances of one way's samples."""
 SCALED, ALIKE = 4.0, 0.2
 """By which factor a measured force may be the model's, and what part of it may be left over then,
@@ -89,7 +89,8 @@ class QuasiStaticComparison:
 
     @property
     def excess(self) -> Array:
-        """Force towards +q that the model has too much where the direction is known, N·m or N."""
+        """Residual force (model's less the true one) towards +q where the direction is known, N·m
+        or N."""
         known = self.direction != 0
         return np.asarray(self.curve.force[known] - self.force[known])
 
@@ -222,7 +223,7 @@ def force_noise(position: Array, force: Array, direction: Array) -> float:
     for way in (1, -1):
         there = np.flatnonzero(direction == way)
         there = there[np.argsort(position[there], kind="stable")]
-        if len(there) >= LEAST:
+        if len(there) >= MIN_SAMPLES:
             x, y = position[there] + apart * np.arange(len(there)), force[there]
             noises = np.array([_second_differences(x, y), smoothing.noise(x, y)])
             squares, samples = squares + len(there) * noises**2, samples + len(there)
@@ -241,14 +242,14 @@ def _between_ways(position: Array, force: Array, direction: Array) -> float:
         there[np.argsort(position[there], kind="stable")]
         for there in (np.flatnonzero(direction == way) for way in (1, -1))
     )
-    if min(len(up), len(down)) < LEAST:
+    if min(len(up), len(down)) < MIN_SAMPLES:
         return np.inf
     usual = float(np.median(np.diff(position[up])))
     at = np.clip(np.searchsorted(position[down], position[up]), 1, len(down) - 1)
     at -= position[up] - position[down[at - 1]] < position[down[at]] - position[up]
-    same = np.abs(position[down[at]] - position[up]) <= SAME * usual
+    same = np.abs(position[down[at]] - position[up]) <= SAME_PLACE * usual
     x = position[up[same]] + 1e-9 * usual * np.arange(same.sum())
-    if 2 * len(x) < len(up) or len(x) < LEAST or not usual > 0:
+    if 2 * len(x) < len(up) or len(x) < MIN_SAMPLES or not usual > 0:
         return np.inf
     there, back = force[up[same]], force[down[at[same]]]
     return min(_second_differences(x, y) for y in (there - back, there + back)) / 2**0.5
@@ -274,10 +275,10 @@ def directions(position: Array, noise: float) -> Array:
         1 or -1, shape (n,); 0 where it is not known: at a turn, within the noise of it, and where
         the joint never moved.
     """
-    heading, turns = _turns(position, min(BACK * noise, BACK_MOST * float(np.ptp(position))))
+    heading, turns = _turns(position, min(BACK * noise, MAX_BACK_SHARE * float(np.ptp(position))))
     begins, ends = [0, *(last for _, last in turns)], [*(first for first, _ in turns), -1]
     usual = float(np.median(np.abs(np.diff(position))))
-    blurred = TURN * noise if noise > SLOW * usual else 0.0
+    blurred = TURN * noise if noise > BLURRING_NOISE * usual else 0.0
     out = np.zeros(len(position))
     for k, (begin, end) in enumerate(zip(begins, ends, strict=True)):
         stroke = slice(begin, end + 1 or None)
@@ -328,10 +329,10 @@ def beside_model(
     position, blur = curve.position, position_noise(curve.position)
     direction = directions(position, blur)
     up, down = int((direction > 0).sum()), int((direction < 0).sum())
-    if max(up, down) < LEAST:
+    if max(up, down) < MIN_SAMPLES:
         raise JodaError(
             f"{curve.name}: {up} samples towards +q and {down} towards \N{MINUS SIGN}q are too few "
-            f"to tell anything; record at least {LEAST} in one direction, better 20 in both."
+            f"to tell anything; record at least {MIN_SAMPLES} in one direction, better 20 in both."
         )
     notes = []
     if not up or not down:

@@ -18,36 +18,36 @@ from joda.measured.measured_joint import Measured
 from joda.measured.misfit import missed
 from joda.measured.obstructed import Clear, clear_of_contacts
 from joda.measured.quasi_static import beside_model
-from joda.measured.replay import WINDOW, Replayer
+from joda.measured.replay import SEGMENT_LENGTH, Replayer
 from joda.measured.runs import QuasiStatic, Run
 from joda.measured.slow_runs import as_curve
 from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.angles import implausible_range
-from joda.scenes.besides import acting_besides
 from joda.scenes.context import Context, context
 from joda.scenes.model import describe_joint, find_joint, joint_name, load_model
 from joda.scenes.native import own_friction_row, whole_profile
 from joda.scenes.scene import profiles_of
+from joda.scenes.unmodelled import unmodelled_elements
 
 Array = NDArray[np.float64]
 
 CLEARLY = 0.9
-"""Part of the error in windows to which another friction row must bring it."""
-ENOUGH, BRIEFLY = 4, 15.0
+"""Part of the segment error to which another friction row must bring it."""
+ROW_RUNS, ROW_DURATION = 4, 15.0
 """Runs that tell which row that is, and how much of each, s."""
 SURELY = 20.0
 """Squared misfits, in noises, by which MuJoCo's own row must be better to be the one replayed."""
 YIELDS = (
-    "MuJoCo's own friction row yields near rest (solreffriction, solimpfriction): by it windows of "
-    "{0:g} s are missed by {2:.2g} {3}, by the same friction in a profile, which is what is "
-    "replayed here, by {1:.2g} {3}."
+    "MuJoCo's own friction row yields near rest (solreffriction, solimpfriction): with it the "
+    "segment error ({0:g} s horizon) is {2:.2g} {3}, with the same friction in a profile, which is "
+    "what is replayed here, {1:.2g} {3}."
 )
 FINEST = 1e-6
 """Least noise, in units of the range."""
 STEPS = 5_000_000
 """Most timesteps of a run that are simulated."""
-LEAST = 0.7
+MIN_NOISE = 0.7
 """The same of a run, in units of the noise of all runs together: one encoder measured them all."""
 
 
@@ -106,13 +106,13 @@ def read_measured(
     notes = [*checked(logs.read, found, float(compiled.opt.timestep)), *logs.notes]
     clear = clear_of_contacts(compiled, number, found, profile, logs.read)
     notes += clear.notes
-    if besides := acting_besides(compiled, number):
+    if unmodelled := unmodelled_elements(compiled, number):
         notes.append(
             f"In the scene more acts on joint '{name}' than itself, gravity and contacts: "
-            f"{', '.join(besides)}; a replay of the joint by itself leaves that out."
+            f"{', '.join(unmodelled)}; a replay of the joint by itself leaves that out."
         )
     return taken(
-        compiled, number, found, profile, clear, notes, whole=not besides, servo=logs.servo
+        compiled, number, found, profile, clear, notes, whole=not unmodelled, servo=logs.servo
     )
 
 
@@ -141,7 +141,7 @@ def taken(
     notes, step = list(notes), float(model.opt.timestep)
     timed = tuple(run for run in clear.measured if isinstance(run, Run))
     usual = smoothing.pooled_noise([(run.time, run.position) for run in timed])
-    least = max(FINEST * float(np.ptp(profile.joint.range)), LEAST * usual)
+    least = max(FINEST * float(np.ptp(profile.joint.range)), MIN_NOISE * usual)
     sigma = tuple(max(smoothing.noise(run.time, run.position), least) for run in timed)
     row = own_friction_row(model, joint)
     own = replace(joint_model(found, profile, model, joint), servo=servo)
@@ -150,15 +150,16 @@ def taken(
         yielding = replace(own, friction_row=row)
         other = Replayer(found, profile, yielding, step)
         some = [
-            run.part(np.flatnonzero(run.time < run.time[0] + BRIEFLY)) for run in timed[:ENOUGH]
+            run.part(np.flatnonzero(run.time < run.time[0] + ROW_DURATION))
+            for run in timed[:ROW_RUNS]
         ]
-        errors = [missed(one, some, sigma[:ENOUGH]) for one in (replayer, other)]
+        errors = [missed(one, some, sigma[:ROW_RUNS]) for one in (replayer, other)]
         samples = sum(len(run.time) for run in some)
         gain = samples * (errors[0] ** 2 - errors[1] ** 2) / float(np.mean(np.square(sigma)))
         if errors[1] < CLEARLY * errors[0] or gain > SURELY:
             own, replayer = yielding, other
         elif errors[0] < CLEARLY * errors[1]:
-            notes.append(YIELDS.format(WINDOW, *errors, found.joint.unit))
+            notes.append(YIELDS.format(SEGMENT_LENGTH, *errors, found.joint.unit))
     static = [curve for curve in clear.measured if isinstance(curve, QuasiStatic)]
 
     def replay(run: Run, sigma: float) -> Array:

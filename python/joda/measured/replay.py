@@ -1,4 +1,4 @@
-"""Measured runs replayed in MuJoCo with the plugin: whole, and in windows.
+"""Measured runs replayed in MuJoCo with the plugin: whole, and in segments.
 
 The joint is simulated by itself (`joda.joints.rig`) under the measured force, from measured starts.
 """
@@ -22,10 +22,10 @@ from joda.scenes.motion import unheard
 
 Array = NDArray[np.float64]
 
-WINDOW = 0.4
-"""Length of a window, s."""
-MOST = 1000
-"""Most windows of a run that are replayed."""
+SEGMENT_LENGTH = 0.4
+"""Length of a segment, s."""
+MAX_SEGMENTS = 1000
+"""Most segments of a run that are replayed."""
 AT_ONCE = 100_000
 """Steps of a whole run that are held in memory together."""
 FIRST_HORIZON, LONGER, HORIZON = 30, 4, 5.0
@@ -63,25 +63,25 @@ COMMANDED = int(mujoco.mjtState.mjSTATE_CTRL)
 
 
 def left_out(runs: Sequence[Run], shortest: float) -> list[str]:
-    """A sentence for each run of which not every window of this length (s) is replayed."""
+    """A sentence for each run of which not every segment of this length (s) is replayed."""
     lasting = [(run.name, float(np.ptp(run.time))) for run in runs]
     return [
-        f"{name}: {duration:.4g} s are replayed as a whole, and in at most {MOST} windows of each "
-        "length, evenly spread."
+        f"{name}: {duration:.4g} s are replayed as a whole, and in at most {MAX_SEGMENTS} segments "
+        "of each length, evenly spread."
         for name, duration in lasting
-        if duration > MOST * shortest
+        if duration > MAX_SEGMENTS * shortest
     ]
 
 
 @dataclass(frozen=True)
-class Window:
-    """A stretch of a run, replayed from its measured start.
+class Segment:
+    """A part of a run, replayed from its measured start.
 
     Attributes:
         samples: indices of the run's samples, shape (n,).
         misfit: predicted minus measured positions, rad or m, shape (n,), from the start that suits
             best within its measurement's error.
-        force: how much force the model has too much on the whole, N·m or N; 0 where it is unknown.
+        force: mean residual force (model's less the true one), N·m or N; 0 where it is unknown.
         force_error: its standard deviation from the noise of position and force; infinite where
             a force makes no motion, as the joint sticks.
         scatter: RMS by which errors of the start alone move the replay, rad or m.
@@ -141,7 +141,7 @@ class _Beginning:
     @property
     def count(self) -> int:
         """Of the samples within `HORIZON`, at least as many as can be smoothed."""
-        return max(int(np.searchsorted(self.time, HORIZON, side="right")), smoothing.LEAST)
+        return max(int(np.searchsorted(self.time, HORIZON, side="right")), smoothing.MIN_SAMPLES)
 
 
 @dataclass(frozen=True)
@@ -385,10 +385,10 @@ class Replayer:
         spread = begins.deviation[:, None] * np.linalg.cholesky(covariance)
         return _Followed(least, Start(begins.mean + begins.deviation * z, spread))
 
-    def windows(self, run: Run, sigma: float, length: float = WINDOW) -> list[Window]:
-        """The run in windows one after another; where the force is unknown there are none.
+    def segments(self, run: Run, sigma: float, length: float = SEGMENT_LENGTH) -> list[Segment]:
+        """The run in segments one after another; where the force is unknown there are none.
 
-        Of more than `MOST` windows so many are replayed, evenly spread over the run.
+        Of more than `MAX_SEGMENTS` segments so many are replayed, evenly spread over the run.
         """
         steps = max(round(length / self.h), 2)
         length = steps * self.h
@@ -399,7 +399,7 @@ class Replayer:
         last = np.searchsorted(run.time, begins + length + 1e-9, side="right")
         for begin, a, b in zip(begins, first, last, strict=True):
             samples = np.arange(a, b)
-            if len(samples) >= smoothing.LEAST and not np.isnan(run.force[samples]).any():
+            if len(samples) >= smoothing.MIN_SAMPLES and not np.isnan(run.force[samples]).any():
                 pieces.append(samples)
                 kept.append(begin)
         if not kept:
@@ -417,7 +417,7 @@ class Replayer:
         push = 6 * self.inertia * sigma / length**2  # moves the joint by three times the noise
         near, step = np.zeros_like(starts), np.zeros_like(starts)
         at_rest = np.stack([np.zeros(len(kept)), -starts[:, 1] / errors[:, 1]], axis=1)
-        least, best = np.full(len(kept), np.inf), dict[int, Window]()
+        least, best = np.full(len(kept), np.inf), dict[int, Segment]()
         for number in range(TRIES + 1):
             tried = np.clip(at_rest if number == 1 else near + step, -START, START)
             nearby = self._nearby(starts + errors * tried, near_by, forces, own, push)
@@ -447,10 +447,10 @@ class Replayer:
     ) -> Iterator[Array]:
         """Paths from the starts, from starts nearby, and under another constant force.
 
-        What has a memory (friction, play) keeps it from one window to the next.
+        What has a memory (friction, play) keeps it from one segment to the next.
 
         Yields:
-            of each window, shape (4, steps + 1).
+            of each segment, shape (4, steps + 1).
         """
         off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
         pushed = np.array([0.0, 0.0, 0.0, push])
@@ -489,7 +489,7 @@ def _known(run: Run) -> tuple[Array, Array]:
     """Times from 0 on (s) and forces, to where the force is unknown; none if that is too short."""
     unknown = np.flatnonzero(np.isnan(run.force))
     end = int(unknown[0]) if len(unknown) else len(run.time)
-    known = slice(0, end if end >= smoothing.LEAST else 0)
+    known = slice(0, end if end >= smoothing.MIN_SAMPLES else 0)
     return run.time[known] - run.time[0], run.force[known]
 
 
@@ -501,8 +501,8 @@ def _command(run: Run, count: int, every: slice = slice(None)) -> tuple[Array, A
 
 
 def _spread(count: int) -> Array:
-    """At most `MOST` of the numbers below `count`, evenly."""
-    return np.round(np.linspace(0, count - 1, min(count, MOST)))
+    """At most `MAX_SEGMENTS` of the numbers below `count`, evenly."""
+    return np.round(np.linspace(0, count - 1, min(count, MAX_SEGMENTS)))
 
 
 def _fitted(
@@ -512,8 +512,8 @@ def _fitted(
     moved: Array,
     sigma: float,
     push: float,
-) -> tuple[Array, Window]:
-    """The step to a better start of a window, in prior standard deviations, and the window.
+) -> tuple[Array, Segment]:
+    """The step to a better start of a segment, in prior standard deviations, and the segment.
 
     Args:
         samples: indices of the run's samples, shape (n,).
@@ -532,7 +532,7 @@ def _fitted(
     all_three = -inverse @ rows.T @ wanted
     moves = float(np.mean(slopes[:, 2] ** 2)) > STUCK
     two, three = (rows[: len(misfit), : len(x)] @ x + misfit / sigma for x in (start, all_three))
-    return start, Window(
+    return start, Segment(
         samples=samples,
         misfit=misfit,
         force=float(-push * all_three[2]) if moves else 0.0,
@@ -542,18 +542,18 @@ def _fitted(
     )
 
 
-def _with_force(window: Window, run: Run, inertia: float) -> Window:
-    """The window, with what errors of the recorded force add to its error, and how they move it.
+def _with_force(segment: Segment, run: Run, inertia: float) -> Segment:
+    """The segment, with what errors of the recorded force add to its error, and how they move it.
 
     White noise of acceleration moves a free joint by a random walk of its velocity: a variance of
     noise² gap t³ / 3 after a time t.
     """
-    time, error = run.time[window.samples], run.part(window.samples).force_error()
+    time, error = run.time[segment.samples], run.part(segment.samples).force_error()
     off = float(np.sqrt(np.mean(error**2)))
     length, count = float(np.ptp(time)), len(time)
     moved = off / inertia * float(np.sqrt(length**4 / (12 * max(count - 1, 1))))
     return replace(
-        window,
-        force_error=float(np.hypot(window.force_error, off / np.sqrt(count))),
+        segment,
+        force_error=float(np.hypot(segment.force_error, off / np.sqrt(count))),
         pushed=moved,
     )

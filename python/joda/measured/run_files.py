@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.files import write_text
-from joda.measured.runs import LEAST, QuasiStatic, Run
+from joda.measured.runs import MIN_SAMPLES, QuasiStatic, Run
 from joda.measured.table import Table, check_filled, check_increasing, read_table
 from joda.scenes.actuators import Drive
 
@@ -129,9 +129,11 @@ def _complete(table: Table, names: tuple[str, ...], needs: str) -> None:
     for name in names:
         if name not in table.columns:
             raise JodaError(f"{table.path}: no column '{name}'; it has {table.has}, and {needs}.")
-    if len(table.lines) < LEAST:
+    if len(table.lines) < MIN_SAMPLES:
         count = len(table.lines)
-        raise JodaError(f"{table.path}: {count} samples; a measurement needs at least {LEAST}.")
+        raise JodaError(
+            f"{table.path}: {count} samples; a measurement needs at least {MIN_SAMPLES}."
+        )
 
 
 def write_run(path: Path, run: Run) -> None:

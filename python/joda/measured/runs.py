@@ -19,7 +19,7 @@ left it."""
 STOP = 0.004
 """How near an end of the range, in normalised position, counts as touching it, beside noise."""
 
-LEAST = 4
+MIN_SAMPLES = 4
 """Fewest samples that make a run or a curve."""
 WIDER = 2.5
 """Gaps, in units of the usual one, over which a force is not taken as linear."""
@@ -102,7 +102,7 @@ def known(run: Run) -> list[NDArray[np.intp]]:
     """Parts of a run in which the force is known, as indices; those too short to smooth are not."""
     numbers = np.flatnonzero(~np.isnan(run.force))
     groups = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
-    return [group for group in groups if len(group) >= smoothing.LEAST]
+    return [group for group in groups if len(group) >= smoothing.MIN_SAMPLES]
 
 
 def check_known(runs: Sequence[Run]) -> None:
@@ -110,8 +110,8 @@ def check_known(runs: Sequence[Run]) -> None:
     if runs and not any(known(run) for run in runs):
         raise JodaError(
             f"{', '.join(run.name for run in runs)}: nowhere is 'force' filled in for "
-            f"{smoothing.LEAST} samples in a row; give the force of each sample, or leave the "
-            "column out where nothing moved the joint."
+            f"{smoothing.MIN_SAMPLES} samples in a row; give the force of each sample, or leave "
+            "the column out where nothing moved the joint."
         )
 
 
@@ -123,7 +123,7 @@ def evened(run: Run) -> tuple[Run, str | None]:
     """
     there = np.flatnonzero(~np.isnan(run.force))
     gaps = np.diff(there)
-    if len(there) < LEAST or np.median(gaps) < 2:
+    if len(there) < MIN_SAMPLES or np.median(gaps) < 2:
         return run, None
     force = np.interp(run.time, run.time[there], run.force[there])
     usual = float(np.median(gaps))

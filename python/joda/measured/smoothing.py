@@ -25,7 +25,7 @@ FASTEST = 0.9
 CLEAR_MOTION, BURST = 10.0, 3
 """Displacement, in noises, that tells a speed; so many of them one after the other and to the same
 side tell a pace: two outliers make fewer."""
-LEAST = 7
+MIN_SAMPLES = 7
 """Fewest samples in a window."""
 EXACT = 1e-3
 """How exactly, in steps, values lie on a lattice that are not rounded."""
@@ -223,8 +223,8 @@ def smooth(time: Array, position: Array, at: Array, sigma: float) -> Smooth:
         arrays of shape (m,).
     """
     halves = _half_widths(time, position, sigma)
-    low = np.maximum(np.searchsorted(time, at - 1.01 * halves[-1]) - LEAST, 0)
-    high = np.searchsorted(time, at + 1.01 * halves[-1]) + LEAST
+    low = np.maximum(np.searchsorted(time, at - 1.01 * halves[-1]) - MIN_SAMPLES, 0)
+    high = np.searchsorted(time, at + 1.01 * halves[-1]) + MIN_SAMPLES
     near = [slice(a, b) for a, b in zip(low, high, strict=True)]  # what no window reaches is left
     pairs = zip(near, at, strict=True)
     local = [_local(time[k], position[k], t0, sigma, halves) for k, t0 in pairs]
@@ -263,7 +263,7 @@ def begins_at_rest(time: Array, position: Array, sigma: float) -> bool:
         sigma: noise of the position.
     """
     half = _half_widths(time, position, sigma)[0]
-    soon = time[min(max(LEAST, int(np.searchsorted(time, time[0] + half))), len(time) - 1)]
+    soon = time[min(max(MIN_SAMPLES, int(np.searchsorted(time, time[0] + half))), len(time) - 1)]
     found = smooth(time, position, np.array([time[0], soon]), sigma)
     first, later = np.abs(found.velocity)
     zero = REST * found.velocity_error
@@ -318,7 +318,7 @@ def _window(
 ) -> NDArray[np.intp]:
     """The widest window, as indices, whose velocity agrees with those of all narrower ones."""
     away = np.abs(time - t0)
-    widest = np.sort(np.argsort(away, kind="stable")[: min(LEAST, len(time))])
+    widest = np.sort(np.argsort(away, kind="stable")[: min(MIN_SAMPLES, len(time))])
     least = len(widest)
     low, high = -np.inf, np.inf
     for half in halves:

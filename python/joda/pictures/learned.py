@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 SPEEDS = 1.6
 """Height of the panel, inches."""
-MOST = 5
+MAX_CURVES = 5
 """Positions of which a curve is drawn."""
-BEYOND = 1.15
+DRAWN_SPEEDS = 1.15
 """Part of the outermost velocities up to which it is drawn: it is level there."""
 
 
@@ -30,9 +30,11 @@ def table_panel(axes: "Axes", effect: LearnedForce, joint: Joint) -> None:
     """
     lo, hi = joint.range
     slowest, fastest = effect.velocities[0], effect.velocities[-1]
-    v = np.sort([*np.linspace(BEYOND * slowest, BEYOND * fastest, 400), *effect.velocities])
+    v = np.sort(
+        [*np.linspace(DRAWN_SPEEDS * slowest, DRAWN_SPEEDS * fastest, 400), *effect.velocities]
+    )
     count = len(effect.positions)
-    chosen = np.unique(np.linspace(0, count - 1, min(MOST, count)).round().astype(int))
+    chosen = np.unique(np.linspace(0, count - 1, min(MAX_CURVES, count)).round().astype(int))
     whole = effect.model_copy(update={"interval": (0.0, 1.0)})
     for order, k in enumerate(chosen):
         s = effect.positions[k]

@@ -24,8 +24,8 @@ from joda.pictures.scene_renderer import SceneRenderer, View
 from joda.pictures.style import COMPRESSED, clean
 from joda.profile import Joint
 from joda.scenes.model import describe_joint, find_joint, load_model
+from joda.scenes.model_cache import cache_name
 from joda.scenes.part import Array, moving
-from joda.scenes.shelf import shelf_name
 
 ARROW = (0.95, 0.36, 0.05)
 AXIS = (0.12, 0.12, 0.14)
@@ -69,14 +69,14 @@ def render(
     """
     if count < 2:
         raise JodaError(f"count is {count}; give at least 2 pictures, one for each end.")
-    request = [str(model), joint, str(output), count, size, force, shelf_name()]
+    request = [str(model), joint, str(output), count, size, force, cache_name()]
     return [Path(target) for target in ask("joda.pictures.positions", request)]
 
 
 def _make(request: Any) -> list[str]:
     """In the child: renders and writes the pictures that `render` is asked for."""
-    path, address, folder, count, size, force, shelf = request
-    model, canvas = _opened(path, shelf)
+    path, address, folder, count, size, force, cache = request
+    model, canvas = _opened(path, cache)
     index = find_joint(model, address)
     joint = describe_joint(model, index)
     if not moving(model, index):
@@ -98,13 +98,13 @@ def _make(request: Any) -> list[str]:
     return [str(target) for target in targets]
 
 
-def _opened(path: str, shelf: str | None) -> tuple[mujoco.MjModel, Canvas]:
-    """A file's model and a canvas for it: the last ones, where they are of the same shelf."""
-    if shelf is None or (path, shelf) not in _last:
+def _opened(path: str, cache: str | None) -> tuple[mujoco.MjModel, Canvas]:
+    """A file's model and a canvas for it: the last ones, where they are of the same cache."""
+    if cache is None or (path, cache) not in _last:
         _last.clear()
         model = load_model(Path(path))
-        _last[path, shelf] = model, Canvas(model)
-    return _last[path, shelf]
+        _last[path, cache] = model, Canvas(model)
+    return _last[path, cache]
 
 
 _last: dict[tuple[str, str | None], tuple[mujoco.MjModel, Canvas]] = {}

@@ -29,7 +29,7 @@ SURE = 1.25
 """How many times the friction a drive should be to move the joint."""
 HELD = 0.8
 """Up to which share of the friction a drive should be to be held by it."""
-LEAST = 0.02
+MIN_EXCESS = 0.02
 """Least excess of a drive, in units of the reference force."""
 NEARLY = 0.8 * ABOUT
 """How far from an angle given by eye the joint may be undecided, as a share of it."""
@@ -170,10 +170,10 @@ def _demands(requirement: Requirement, proposal: Proposal, context: Context) -> 
     """What a requirement demands of drive and friction."""
 
     def shut(low: float, high: float) -> list[Demand]:
-        return [_at(requirement, way, -1, -SURE, LEAST) for way in _over(low, high)]
+        return [_at(requirement, way, -1, -SURE, MIN_EXCESS) for way in _over(low, high)]
 
     def open_(low: float, high: float) -> list[Demand]:
-        return [_at(requirement, way, 1, -SURE, LEAST) for way in _over(low, high)]
+        return [_at(requirement, way, 1, -SURE, MIN_EXCESS) for way in _over(low, high)]
 
     def stay(low: float, high: float) -> list[Demand]:
         ways = np.linspace(low, high, 15)
@@ -223,7 +223,7 @@ def _demands(requirement: Requirement, proposal: Proposal, context: Context) -> 
         case "stays_half":
             return stay(0.38, 0.62)
         case "stays_open":
-            return [_at(requirement, way, 1, HELD, LEAST) for way in (0.99, 1.0)]
+            return [_at(requirement, way, 1, HELD, MIN_EXCESS) for way in (0.99, 1.0)]
         case "two_sides":
             return shut(0.06, 0.42) + open_(0.58, 0.94)
         case "returns_to_middle":
@@ -303,12 +303,12 @@ def _clicks(requirement: Requirement, proposal: Proposal, context: Context) -> l
     out = []
     for a, b in _places(proposal, context, "detent_internal"):
         for u in (0.12, 0.25, 0.35, 0.43):
-            out.append(_at(requirement, a + u * (b - a), 1, -SURE, LEAST))
-            out.append(_at(requirement, b - u * (b - a), -1, -SURE, LEAST))
+            out.append(_at(requirement, a + u * (b - a), 1, -SURE, MIN_EXCESS))
+            out.append(_at(requirement, b - u * (b - a), -1, -SURE, MIN_EXCESS))
     for a, b in _places(proposal, context, "spring_return"):
         inward = -1 if a < 1e-6 else 1
         ways = [a + u * (b - a) for u in (0.03, 0.2, 0.5, 0.9)]
-        out += [_at(requirement, way, inward, -SURE, LEAST) for way in ways]
+        out += [_at(requirement, way, inward, -SURE, MIN_EXCESS) for way in ways]
     return out
 
 

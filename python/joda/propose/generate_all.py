@@ -14,7 +14,7 @@ from joda.propose.review import Decide
 from joda.propose.review import review as walk
 from joda.propose.session import PICTURES, Pictures, Session
 from joda.propose.sheet import Entry, sheet
-from joda.scenes.shelf import loading_once
+from joda.scenes.model_cache import loading_once
 
 Advance = Callable[[int, int, str], None]
 

@@ -16,7 +16,7 @@ from joda.errors import JodaError
 from joda.interaction.pulling import SLOW
 from joda.proposal import EffectProposal, JointSummary, Proposal, Strength
 from joda.propose import Answer, Task, Turn
-from joda.propose.added import RISING, WISHED
+from joda.propose.added_effects import RISING, WISHED
 from joda.propose.adjustment import adjusted_strengths, rescale
 from joda.propose.archetype import Archetype
 from joda.propose.archetype_effects import ArchetypeEffect
@@ -27,7 +27,7 @@ from joda.propose.recognise import Recognition, recognise, scale_warning
 from joda.propose.requirements import REQUIREMENTS, Requirement, read_requirements, state, unmet
 from joda.scenes.context import Context
 
-APART = 0.785
+KNOB_ANGLE = 0.785
 """Angle (rad) between the positions of a knob, where nobody says how many it has."""
 
 FORBIDS = re.compile(r"\b(?:should|must|may)(?: not|n't)\b|\bnever\b")
@@ -187,7 +187,9 @@ def _conflicting(names: AbstractSet[str]) -> set[str]:
 def _positions(context: Context) -> int:
     """How many positions a knob has."""
     lo, hi = context.joint.range
-    return min(max(round((hi - lo) / APART) + 1, 2), 12) if context.joint.type == "hinge" else 3
+    if context.joint.type != "hinge":
+        return 3
+    return min(max(round((hi - lo) / KNOB_ANGLE) + 1, 2), 12)
 
 
 def _number(wanted: Sequence[Requirement], name: str) -> float:

@@ -24,7 +24,7 @@ STAYING = {"stays_put", "stays_half"}
 """Requirements of a joint that holds on its way."""
 
 
-class Said(Frozen):
+class Sourced(Frozen):
     """Something that is known of real joints.
 
     Attributes:
@@ -42,19 +42,19 @@ class Said(Frozen):
         return self
 
 
-class Shuts(Said):
+class Shuts(Sourced):
     """How fast a joint that closes by itself may arrive, at the handle, m/s."""
 
     most: float
 
 
-class Holds(Said):
+class Holds(Sourced):
     """Between which angles from the closed end (degrees) a hinge stays where it is left."""
 
     between: tuple[float, float]
 
 
-class Force(Said):
+class Force(Sourced):
     """What opening real joints of a kind takes, and what they do when they are let go.
 
     Attributes:

@@ -18,7 +18,7 @@ Check = Callable[[Seen], str]
 
 
 @dataclass(frozen=True)
-class Wish:
+class RequiredBehaviour:
     """A behaviour that can be wished for.
 
     Attributes:
@@ -47,22 +47,22 @@ _REAL, _NEWTON = r"\d+(?:\.\d+)?", r"(?:n\b|newtons?\b)"
 _ROUND = 0.25
 """How far off a force may be that somebody gives as "about", as a share of it."""
 _COUNT = rf"\d+|{'|'.join(_COUNTS[2:])}"
-REQUIREMENTS: dict[str, Wish] = {
-    "moves": Wish("can be opened and closed by hand", r"(?!)", checks.moves),
-    "closes_near": Wish(
+REQUIREMENTS: dict[str, RequiredBehaviour] = {
+    "moves": RequiredBehaviour("can be opened and closed by hand", r"(?!)", checks.moves),
+    "closes_near": RequiredBehaviour(
         "closes by itself when nearly closed",
         rf"(?:{_CLOSE}|pull\w* (?:itself |it |the \w+ )?(?:in|shut|closed)|self-?clos\w*|"
         r"snaps? (?:in|shut))[^.;]*\b(?:when|once|from|if|for|over|in|within)"
         r"[^.;]*\b(?:near|almost|last|few|final|slightly|little)",
         checks.closes_near,
     ),
-    "closes_from": Wish(
+    "closes_from": RequiredBehaviour(
         "closes by itself from {number} degrees on",
         rf"(?:{_CLOSE}|pull\w* (?:itself |it |the \w+ )?(?:in|shut|closed)|self-?clos\w*)[^.;]*?"
         rf"\b(?:from|within|over|below|under)\b[^.;]*?\b(?P<number>\d+) ?(?:degrees|deg\b|°)",
         checks.closes_from,
     ),
-    "closes_anywhere": Wish(
+    "closes_anywhere": RequiredBehaviour(
         "goes back by itself from anywhere",
         rf"^(?!.*\b{_MIDDLE}).*(?:"
         r"(?:go(?:es)?|spring\w*|return\w*|com(?:es?|ing)|swing\w*|clos\w*|shuts?|fall\w*|pull\w*)"
@@ -71,76 +71,76 @@ REQUIREMENTS: dict[str, Wish] = {
         rf"automatically clos\w*(?![^.;]*{_NEAR}))",
         checks.closes_anywhere,
     ),
-    "left_open": Wish(
+    "left_open": RequiredBehaviour(
         "does not close by itself",
         rf"(?:clos|shut|swing|fall)(?![^.;]*\bfrom\b)[^.;]*{_SELF}|self[- ]?clos\w*",
         checks.left_open,
         denies=True,
     ),
-    "opens_past": Wish(
+    "opens_past": RequiredBehaviour(
         "opens by itself from half-way on",
         r"(?:falls?|opens?|swings?|drops?)\b[^.;]*\b(?:itself|own|open)\b[^.;]*"
         r"\b(?:half|past|beyond|middle)|falls open",
         checks.opens_past,
     ),
-    "held_shut": Wish(
+    "held_shut": RequiredBehaviour(
         "stays shut until it is pulled",
         r"(?:stays?|held|holds?|kept|keeps?|remains?)\b[^.;]*\b(?:shut|closed)\b",
         checks.held_shut,
     ),
-    "caught": Wish(
+    "caught": RequiredBehaviour(
         "is caught shut and gives way to a pull",
         r"\bcaught (?:shut|closed)|"
         r"^(?!.*magnet)(?=.*\b(?:shut|closed|gives? way)\b).*\bcatch(?:es)?\b",
         checks.caught,
     ),
-    "latched": Wish(
+    "latched": RequiredBehaviour(
         "latches shut and needs a push to latch",
         r"\blatch(?:es|ing)\b|\b(?:not|n't|to|must|should|never) latch\b|"
         r"needs? (?:a|an extra) push to",
         checks.latched,
     ),
-    "falls_shut": Wish(
+    "falls_shut": RequiredBehaviour(
         "falls shut from half-way open", r"falls? (?:back |down )?shut", checks.falls_shut
     ),
-    "takes": Wish(
+    "takes": RequiredBehaviour(
         "takes {number} to {most} newtons at the handle to open",
         rf"(?P<number>{_REAL}) ?(?:to|-|–) ?(?P<most>{_REAL}) ?{_NEWTON}|"
         rf"(?:at most|no more than|less than|under|below|up to) (?P<limit>{_REAL}) ?{_NEWTON}|"
         rf"(?P<about>{_REAL}) ?{_NEWTON}",
         checks.takes,
     ),
-    "arrives": Wish(
+    "arrives": RequiredBehaviour(
         "shuts with at most {most} m/s at the handle",
         rf"(?:{_CLOSE}|arriv\w*)[^.;]*?(?:at most|no more than|less than|under|below|up to) "
         rf"(?P<limit>{_REAL}) ?m/s",
         checks.arrives,
     ),
-    "holds_between": Wish(
+    "holds_between": RequiredBehaviour(
         "holds between {number} and {most} degrees",
         rf"(?:stays?|holds?|held|rests?|remains?)\b[^.;]*?\b(?:between|from) (?P<number>{_REAL}) "
         rf"(?:and|to) (?P<most>{_REAL}) ?(?:degrees|deg\b|°)",
         checks.holds_between,
     ),
-    "stays_put": Wish(
+    "stays_put": RequiredBehaviour(
         "stays wherever it is left",
         r"^(?!.*\b(?:beyond|past|farther|further)\b).*"
         r"(?:stays?|holds?|remains?|rests?)\b[^.;]*\b(?:wherever|anywhere|any (?:angle|position|"
         r"place)|where (?:it is|it was|you|left))|free-?stop",
         checks.stays_put,
     ),
-    "stays_half": Wish(
+    "stays_half": RequiredBehaviour(
         "holds half-way open",
         r"(?:stays?|holds?|held|rests?|remains?)\b[^.;]*\b(?:half|middle|mid-|intermediate)",
         checks.stays_half,
     ),
-    "stays_open": Wish(
+    "stays_open": RequiredBehaviour(
         "stays fully open",
         r"(?:stays?|holds?|held|rests?|remains?)\b[^.;]*\b(?:fully|wide|completely) open|"
         r"stays? open(?![^.;]*\b(?:half|middle|mid-|intermediate))",
         checks.stays_open,
     ),
-    "clicks": Wish(
+    "clicks": RequiredBehaviour(
         "clicks into {number} positions",
         rf"(?:clicks?|detents?|snaps?|settles?|indexes)\b[^.;]*?\b(?P<number>{_COUNT})\s+"
         rf"(?:\w+\s+)?(?:positions?|places|detents|stops|steps)|"
@@ -149,29 +149,29 @@ REQUIREMENTS: dict[str, Wish] = {
         r"(?:not|n't|never) click\b",
         checks.clicks,
     ),
-    "two_sides": Wish(
+    "two_sides": RequiredBehaviour(
         "has two stable sides and flips over between them",
         r"(?<!from )either side|bi-?stable|flips? over|two stable",
         checks.two_sides,
     ),
-    "returns_to_middle": Wish(
+    "returns_to_middle": RequiredBehaviour(
         "returns to the middle when let go",
         rf"(?:returns?|springs?|comes?|goes)\b[^.;]*\b{_MIDDLE}",
         checks.returns_to_middle,
     ),
-    "snaps": Wish(
+    "snaps": RequiredBehaviour(
         "snaps through on the way in",
         r"snaps? through|snap-?through|pops? (?:in|back)|over-?cent\w+",
         checks.snaps,
     ),
-    "free": Wish(
+    "free": RequiredBehaviour(
         "moves on with hardly any resistance",
         r"\b(?:moves?|turns?|slides?|swings?|opens?|goes)\b[^.;]*\b"
         r"(?:(?:hardly|barely|scarcely) any|(?:very )?little) (?:resistance|friction)|"
         r"\b(?:moves?|turns?|slides?|swings?) (?:on )?(?:freely|lightly|easily)\b",
         checks.free,
     ),
-    "soft": Wish(
+    "soft": RequiredBehaviour(
         "closes softly",
         r"(?:clos|shut)\w*\b[^.;]*\b(?:soft|gentl|quiet|slow)\w*|soft[- ]?clos\w*|"
         r"(?:soft|gentl|quiet|slow)ly\b[^.;]*\b(?:clos|shut)",

@@ -6,11 +6,11 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from joda.errors import JodaError
-from joda.propose.secrets import without
+from joda.propose.redaction import without
 
 SHORTEST_SECRET = 6
 """Letters; less is no secret but a word."""
-MOST_TOKENS = 10**9
+MAX_TOKENS = 10**9
 """Of an answer."""
 
 
@@ -57,7 +57,7 @@ def host(client: Any) -> str:
 
 def counted(*counts: Any) -> bool:
     """Whether all are sensible counts of tokens."""
-    return all(type(count) is int and 0 <= count <= MOST_TOKENS for count in counts)
+    return all(type(count) is int and 0 <= count <= MAX_TOKENS for count in counts)
 
 
 def _check_address(url: str, service: str) -> None:

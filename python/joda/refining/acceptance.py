@@ -8,27 +8,27 @@ from joda.field import evaluate
 from joda.measured.errors import MULTIPLE
 from joda.profile import CHANNELS, Profile
 
-WORSE = 1.05
+MAX_INCREASE = 1.05
 """How much more what is held out may be missed by after a fit, as a factor."""
-LESS = 0.999
+MAX_REMAINING = 0.999
 """What is left of an error, as a factor, that has fallen."""
 FAR = 3.0
 """By which factor a channel must have changed to be another joint's."""
 SOME, PART = 0.3, 0.25
 """Where a channel was at least so large, in units of its largest, and over what part of that it has
 become so much smaller."""
-HOPELESS, HARDLY = 10.0, 0.2
+MAX_NOISES, MAX_CURVE_SHARE = 10.0, 0.2
 """Error in units of the noise, and of curves of that before, from which such a change explains too
 little."""
-MOST_LEFT = 0.3
-"""Part of windows' error before that a fit may leave beyond that."""
+MAX_ERROR_RATIO = 0.3
+"""Part of segments' error before that a fit may leave beyond that."""
 CAUSES = (
     "the unit, clock, sign or joint of the measurement may be another, a mass or an effect of the "
     "model be wrong or missing (joda diagnose), or the fit have stuck on its way from a start that "
     "is far off"
 )
 GRID = np.linspace(0, 1, 201)
-PARTS = {"whole": "whole runs", "window": "windows of 0.4 s"}
+PARTS = {"whole": "free-run error", "window": "segment error (0.4 s)"}
 
 
 def refused(
@@ -58,10 +58,10 @@ def refused(
 
 def _held_out(before: Error, after: Error, noise: float) -> str | None:
     for part, was, now in _parts(before, after):
-        if now > WORSE * max(was, noise):
+        if now > MAX_INCREASE * max(was, noise):
             return (
-                f"what was held out (--check) is missed by {now:.3g} with it instead of {was:.3g}"
-                f"{_in(after, part)}"
+                f"the {_of(after, part)} of what was held out (--check) is {now:.3g} with it "
+                f"instead of {was:.3g}"
             )
     return None
 
@@ -71,40 +71,40 @@ def _no_better(before: Error, after: Error, noise: float) -> str | None:
     more than noise must fall."""
     parts = _parts(before, after)
     ratio = np.prod([max(now, noise) / max(was, noise) for _, was, now in parts])
-    if ratio < LESS or (ratio <= 1.0 and after.window <= MULTIPLE * noise):
+    if ratio < MAX_REMAINING or (ratio <= 1.0 and after.window <= MULTIPLE * noise):
         return None
     what = " and ".join(
-        f"{now:.3g} instead of {was:.3g}{_in(after, part)}" for part, was, now in parts
+        f"the {_of(after, part)} is {now:.3g} instead of {was:.3g}" for part, was, now in parts
     )
-    return f"what was fitted is missed by {what}"
+    return f"of what was fitted {what}"
 
 
 def _hardly_better(before: Error, after: Error, noise: float) -> str | None:
     """Runs that are still missed by far: only another model than this one follows them."""
-    if after.whole is None or after.window <= HOPELESS * noise:
+    if after.whole is None or after.window <= MAX_NOISES * noise:
         return None
     for part, was, now in _parts(before, after):
-        if now > (WORSE if part == "whole" else MOST_LEFT) * was:
+        if now > (MAX_INCREASE if part == "whole" else MAX_ERROR_RATIO) * was:
             return (
-                f"what was fitted would still be missed by {now:.3g} instead of {was:.3g}"
-                f"{_in(after, part)}, {now / noise:.0f} times the noise: {CAUSES}"
+                f"the {_of(after, part)} of what was fitted would still be {now:.3g} instead of "
+                f"{was:.3g}, {now / noise:.0f} times the noise: {CAUSES}"
             )
     return None
 
 
 def _hopeless(before: Error, after: Error, noise: float, old: Profile, new: Profile) -> str | None:
-    left, enough = after.window, HOPELESS * noise
+    left, enough = after.window, MAX_NOISES * noise
     if after.whole is None:  # what a hand does to a curve is more than its gauge's noise
-        enough = max(enough, HARDLY * before.window)
+        enough = max(enough, MAX_CURVE_SHARE * before.window)
     if left <= enough:
         return None
     for name in CHANNELS:
         changed, where = (_grown, "") if after.whole is None else (_changed, " at some places")
         if (times := changed(old, new, name)) and not 1 / FAR < times < FAR:
             return (
-                f"its {name} would be {times:.2g} times what it was{where}, and what was "
-                f"fitted would still be missed by {left / noise:.0f} times the noise"
-                f"{_in(after, 'window')}: {CAUSES}"
+                f"its {name} would be {times:.2g} times what it was{where}, and the "
+                f"{_of(after, 'window')} of what was fitted would still be {left / noise:.0f} "
+                f"times the noise: {CAUSES}"
             )
     return None
 
@@ -114,8 +114,9 @@ def _parts(before: Error, after: Error) -> list[tuple[str, float, float]]:
     return [(part, was, now) for part, was, now in pairs if was is not None and now is not None]
 
 
-def _in(error: Error, part: str) -> str:
-    return "" if error.whole is None else f" in {PARTS[part]}"
+def _of(error: Error, part: str) -> str:
+    """What the error is called; of curves that of the force."""
+    return "force error" if error.whole is None else PARTS[part]
 
 
 def _grown(old: Profile, new: Profile, name: str) -> float:

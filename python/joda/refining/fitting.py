@@ -2,9 +2,10 @@
 
 First over short segments, each from its own measured start, so that errors do not pile up and the
 misfit stays smooth in the numbers: the components' sizes, then all; then over longer ones; then
-between the jumps of the force (`joda.refining.between`); then over segments that must join into
-whole runs (multiple shooting: Bock 1983). The starts are fitted too, within their measurement's
-error. What the motion does not show is held by a prior at its first value, of the size found.
+between the jumps of the force (`joda.refining.discontinuities`); then over segments that must join
+into whole runs (multiple shooting: Bock 1983). The starts are fitted too, within their
+measurement's error. What the motion does not show is held by a prior at its first value, of the
+size found.
 """
 
 from collections.abc import Callable
@@ -20,10 +21,10 @@ from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.least_squares import Fit
 from joda.estimation.profile_parameters import Parameters
 from joda.measured.runs import known
-from joda.refining.between import Between, by_chance
+from joda.refining.coarse_fit import NOISE, sized
+from joda.refining.discontinuities import Between, by_chance
 from joda.refining.engine import Engine
 from joda.refining.shooting import Shooting
-from joda.refining.sizes import NOISE, sized
 
 Array = NDArray[np.float64]
 Sizes = Literal["near", "none", "far"]
@@ -34,7 +35,7 @@ Tried = tuple[Fit, Parameters, Shooting]
 
 SHORT, LONG = 0.1, 0.4
 """Lengths of segments, s."""
-MOST = 150
+MAX_SEGMENTS = 150
 """Most segments; long measurements get longer ones."""
 HELD = 0.01
 """How much less than later the ends of intervals may move at first."""
@@ -43,7 +44,7 @@ FIRST = 6
 TURNS, SETTLED = 2, 0.98
 """How often at most short and long segments take turns, and the share of their misfit that must be
 left for the last turn."""
-MANY = 20
+MIN_ITERATIONS = 20
 """Fewest iterations that are to be had for sizes to be fitted first."""
 ENDING = "interrupted; ending with the best so far"
 """What is reported then as a stage."""
@@ -93,7 +94,7 @@ class Problem:
         self.axes = "time (s)", f"position ({parameters.profile.joint.unit})"
         self.shooting = Shooting(engine, parameters)
         durations = [float(np.ptp(time)) for time, _ in self.runs]
-        least = sum(durations) / MOST
+        least = sum(durations) / MAX_SEGMENTS
         lengths = [max(SHORT, least), max(LONG, least), max(durations) + engine.h]
         self.short, self.long, self.whole = map(self.shooting.estimator, lengths)
         self._lengths = lengths[1:]
@@ -148,7 +149,7 @@ class Problem:
             report: after each, the stage, its number and the stage's RMS misfit.
         """
         begun = self.parameters, self.shooting
-        sizes = iterations >= MANY and "values" in self.parameters.kinds
+        sizes = iterations >= MIN_ITERATIONS and "values" in self.parameters.kinds
         ways: tuple[Sizes, ...] = ("near", "none") if sizes else ("none",)
         if sizes and any(slot.kind == "intervals" for slot in self.parameters.slots):
             ways = (*ways, "far")

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[Array, float], None]
 """After each iteration, the numbers and the RMS misfit (rad or m)."""
 
-LEAST = 4
+MIN_SAMPLES = 4
 """Fewest samples of a segment that counts."""
 STRAY = 1.5
 """Segments that leave so many times the squares that noise makes begin elsewhere, perhaps: where a
@@ -47,7 +47,7 @@ class Shooting:
     def estimator(self, length: float) -> SegmentEstimator:
         """Of segments of some length, s."""
         segments = self.engine.segments(length)
-        return self.engine.estimator(segments, segments.count >= LEAST)
+        return self.engine.estimator(segments, segments.count >= MIN_SAMPLES)
 
     def started(self, estimator: SegmentEstimator, theta: Array) -> Found:
         """Starts of segments that suit the joint with its numbers best: those that still stray are

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 PLACES = 5
 """At how many places of the range moment arms are looked at: a crank has none at its dead point."""
-LEAST = 1e-9
+MIN_MOMENT = 1e-9
 """Moment arms below this are rounding."""
 
 
@@ -115,7 +115,7 @@ def acting_on(model: mujoco.MjModel, joint: int) -> list[int]:
         for k in range(model.nu):
             own = slice(data.moment_rowadr[k], data.moment_rowadr[k] + data.moment_rownnz[k])
             arms = data.actuator_moment[own][data.moment_colind[own] == dof]
-            acts[k] |= bool(np.any(np.abs(arms) > LEAST))
+            acts[k] |= bool(np.any(np.abs(arms) > MIN_MOMENT))
     acts &= model.actuator_trntype != mujoco.mjtTrn.mjTRN_BODY
     group = np.clip(model.actuator_group, 0, 31)
     acts &= (model.opt.disableactuator >> group) & 1 == 0

@@ -22,8 +22,8 @@ from joda.profile import Profile
 from joda.scenes.actuators import Servo
 from joda.scenes.editing import EditedScene
 from joda.scenes.limits import Stops
+from joda.scenes.mass_attributes import Heavier
 from joda.scenes.model import find_joint, joint_name, load, sentence
-from joda.scenes.weights import Heavier
 
 SAME = (
     *("nq", "nu", "nbody", "ngeom", "nsensor", "jnt_type", "jnt_axis", "jnt_pos", "jnt_range"),

@@ -110,7 +110,9 @@ class Context(BaseModel):
             "closed end": f"{self.closed_end.replace('_', ' ')}; opening: {opens}",
             "own elements": self.native.describe(joint),
             **({"driven by": ", ".join(self.actuators)} if self.driven else {}),
-            **({"also acting": ", ".join(self.native.besides)} if self.native.besides else {}),
+            **(
+                {"also acting": ", ".join(self.native.unmodelled)} if self.native.unmodelled else {}
+            ),
             **({"contacts": self.native.touches()} if self.native.contacts else {}),
             "names": ", ".join(self.names[:12]),
             "part of": ", ".join(self.around),

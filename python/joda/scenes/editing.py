@@ -18,6 +18,7 @@ from joda.profile import ATTRIBUTES, Profile
 from joda.scenes.actuators import Servo, redriven
 from joda.scenes.engine import is_discrete, polynomial
 from joda.scenes.limits import Stops, firm_limit, limit_parameters, second_stop
+from joda.scenes.mass_attributes import MIN_SHARE, Heavier, gravcomp, inertial, moved_bodies
 from joda.scenes.mjcf import Element, MjcfError, Source, quoted
 from joda.scenes.model import joint_name, joint_type, write_out
 from joda.scenes.scene import (
@@ -29,7 +30,6 @@ from joda.scenes.scene import (
     prefix,
     profiles_of,
 )
-from joda.scenes.weights import LEAST, Heavier, gravcomp, inertial, moved_bodies
 
 STOP = "joda_stop_"
 """Begins the name of the tendon that is a second stop at one end of a joint's range."""
@@ -186,9 +186,9 @@ class EditedScene:
                 element.set(gravcomp=carried)
         self.heavier = True
         told = f"moves masses and inertias {heavier.inertia:.3g} times as large as before"
-        if heavier.lifted > LEAST:
+        if heavier.lifted > MIN_SHARE:
             told += f", of whose weight gravcomp takes {heavier.lifted:.3g}"
-        elif heavier.lifted < -LEAST:
+        elif heavier.lifted < -MIN_SHARE:
             told += (
                 f"; that gravity pulls {heavier.gravity:.3g} times as much MJCF cannot say, and is "
                 "left out"

@@ -4,10 +4,10 @@ import mujoco
 from pydantic import BaseModel, ConfigDict
 
 from joda.profile import Joint
-from joda.scenes.besides import acting_besides
 from joda.scenes.contacts import contacts_along
 from joda.scenes.engine import polynomial
-from joda.scenes.native import LEAST
+from joda.scenes.native import MIN_FRICTION
+from joda.scenes.unmodelled import unmodelled_elements
 
 
 class Touch(BaseModel):
@@ -39,7 +39,7 @@ class Elements(BaseModel):
         stiffness: of the joint's spring near its rest, N·m/rad or N/m.
         springref: where that spring rests, rad or m.
         armature: inertia added to the joint, kg·m² or kg; it is part of the context's inertia.
-        besides: tendons, equality constraints and media that act on it, by kind and name.
+        unmodelled: tendons, equality constraints and media that act on it, by kind and name.
         contacts: over its range, all other joints at their reference.
     """
 
@@ -50,7 +50,7 @@ class Elements(BaseModel):
     stiffness: float = 0.0
     springref: float = 0.0
     armature: float = 0.0
-    besides: tuple[str, ...] = ()
+    unmodelled: tuple[str, ...] = ()
     contacts: tuple[Touch, ...] = ()
 
     def describe(self, joint: Joint) -> str:
@@ -92,11 +92,11 @@ def elements(model: mujoco.MjModel, joint: int, described: Joint) -> Elements:
     friction = float(model.dof_frictionloss[dof])
     return Elements(
         damping=polynomial(model, "dof_damping", dof)[0],
-        frictionloss=friction if friction > LEAST else 0.0,
+        frictionloss=friction if friction > MIN_FRICTION else 0.0,
         stiffness=polynomial(model, "jnt_stiffness", joint)[0],
         springref=float(model.qpos_spring[model.jnt_qposadr[joint]]),
         armature=float(model.dof_armature[dof]),
-        besides=acting_besides(model, joint),
+        unmodelled=unmodelled_elements(model, joint),
         contacts=tuple(
             Touch(
                 geom=one.geom,

@@ -26,7 +26,7 @@ IMPEDANCE = 0.99
 """As kStopImpedance there."""
 YIELDING, FIRM = 1e-2, 1e-3
 """A stop that yields by more than the first share of the range is made to yield by the second."""
-LEAST_TIME = 1e-7
+MIN_TIME = 1e-7
 """Of a stop's time constant times its damping ratio, s, that makes a stiffness."""
 IMPEDANCES = 1e-4, 0.9999
 """Smallest and largest impedance that MuJoCo takes."""
@@ -142,7 +142,7 @@ def stiffness_of(solref: Sequence[float], timestep: float) -> float:
     """
     if solref[0] <= 0:
         return -solref[0]
-    return 1 / max(max(solref[0], 2 * timestep) * solref[1], LEAST_TIME) ** 2
+    return 1 / max(max(solref[0], 2 * timestep) * solref[1], MIN_TIME) ** 2
 
 
 def firm_limit(

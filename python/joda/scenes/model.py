@@ -10,9 +10,9 @@ from pydantic import ValidationError
 
 from joda.errors import JodaError
 from joda.profile import Joint, describe
-from joda.scenes.copies import refuse_copied_plugins
 from joda.scenes.engine import FORGETS_INSTANCES
-from joda.scenes.shelf import Loaded, kept
+from joda.scenes.model_cache import Loaded, cached
+from joda.scenes.plugin_copies import refuse_copied_plugins
 
 _TYPES = {
     int(getattr(mujoco.mjtJoint, f"mjJNT_{name.upper()}")): name
@@ -31,7 +31,7 @@ MASSLESS = (
 
 def load(path: Path) -> Loaded:
     """An MJCF or URDF file, parsed and compiled; raises JodaError."""
-    return kept(path, _load)
+    return cached(path, _load)
 
 
 def _load(path: Path) -> Loaded:

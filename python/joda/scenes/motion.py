@@ -24,7 +24,7 @@ HOME = "home"
 
 FAST = 3.0
 """A joint is fast, or runs ahead of a hand, at more than so many times the usual speed."""
-APART = 0.05
+MIN_GAP = 0.05
 """Fast intervals nearer to each other (s) are one."""
 
 LEAN = 0.3
@@ -192,7 +192,7 @@ def fast(motion: Motion, usual: float) -> tuple[tuple[float, float], ...]:
     out: list[tuple[float, float]] = []
     for first, after in edges.reshape(-1, 2):
         a, b = float(motion.time[first]), float(motion.time[after - 1])
-        if out and a - out[-1][1] < APART:
+        if out and a - out[-1][1] < MIN_GAP:
             a = out.pop()[0]
         out.append((a, b))
     return tuple(out)

@@ -31,7 +31,7 @@ FRICTION_EFFECTS = (
 )
 KNOTS = 65
 """Of the curve that stands for a stiffness that is a polynomial."""
-LEAST = 1e3 * float(TRACE)
+MIN_FRICTION = 1e3 * float(TRACE)
 """Native friction below this (N·m or N) is the trace that makes a row."""
 
 
@@ -46,7 +46,7 @@ def whole_profile(model: mujoco.MjModel, joint: int, profile: Profile) -> Profil
     Returns:
         a profile that alone makes the joint move as it does in the scene: what the scene's flags
         disable is not in it. The cubic part of a damping polynomial is left out
-        (`joda.scenes.besides`).
+        (`joda.scenes.unmodelled`).
     """
     dof = model.jnt_dofadr[joint]
     springs, damps, rubs = (is_on(model, flag) for flag in ("spring", "damper", "frictionloss"))
@@ -55,7 +55,7 @@ def whole_profile(model: mujoco.MjModel, joint: int, profile: Profile) -> Profil
     out = _left(profile, springs, damps, rubs)
     if springs and any(polynomial(model, "jnt_stiffness", joint)):
         out = out.with_component("conservative", _spring(model, joint, profile.joint))
-    if friction > LEAST:
+    if friction > MIN_FRICTION:
         out = out.with_component("friction", _line(FRICTION, friction, friction))
     if damping:
         out = out.with_component("damping", _line(DAMPING, damping, damping))
@@ -117,7 +117,7 @@ def own_friction_row(model: mujoco.MjModel, joint: int) -> Row | None:
     """solref and solimp of the friction row that MuJoCo makes of a joint's native friction; None if
     it has no native friction nor damping, or carries a profile, which makes that row its own."""
     dof = model.jnt_dofadr[joint]
-    rubs = is_on(model, "frictionloss") and model.dof_frictionloss[dof] > LEAST
+    rubs = is_on(model, "frictionloss") and model.dof_frictionloss[dof] > MIN_FRICTION
     damps = is_on(model, "damper") and model.dof_damping[dof] > 0
     if not (rubs or damps) or joint_name(model, joint) in profiles_of(model):
         return None

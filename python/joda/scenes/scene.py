@@ -16,7 +16,7 @@ TRACE = "1e-12"
 DAMPING_ROW = "joda_damping_"
 """Begins the name of the equality constraint whose row carries a joint's damping."""
 
-MOST_JOINTS = 6
+MAX_JOINTS = 6
 """Hinges and slides that one body of MuJoCo can have."""
 
 INERT = 'active="true" solref="-1e-12 -1e-12" solimp="1e-4 1e-4"'
@@ -48,7 +48,7 @@ def find_instance(model: mujoco.MjModel, body: int) -> tuple[str, dict[str, str]
 
 def _attributes(model: mujoco.MjModel, instance: int) -> dict[str, str]:
     """All attributes of an instance of the plugin, in the order in which it declares them."""
-    fronts = ["", *(f"{place}." for place in range(MOST_JOINTS))]
+    fronts = ["", *(f"{place}." for place in range(MAX_JOINTS))]
     texts = bytes(model.plugin_attr[model.plugin_attradr[instance] :]).split(b"\0")
     names = [front + name for front in fronts for name in ATTRIBUTES]
     return {name: text.decode() for name, text in zip(names, texts, strict=False)}

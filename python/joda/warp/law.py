@@ -406,7 +406,7 @@ def act(
                 drag += passage.resistance * rate * left
             # near slip a soft row that holds so much would cost so much that float32 loses the
             # others: what it held acts beside it, and the row adds what the bristles still can
-            if psi * ahead < 0.0 and bound * bound > stiffness * laws.MOST_COST:
+            if psi * ahead < 0.0 and bound * bound > stiffness * laws.MAX_COST:
                 beside = psi
                 bound -= wp.abs(psi)
                 psi = 0.0

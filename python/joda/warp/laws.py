@@ -9,11 +9,11 @@ from joda.scenes.limits import IMPEDANCE, STIFFNESS
 
 STILL = wp.constant(1e-6)
 """Speed below which a joint counts as still: float32's rounding, larger than in cpp/effects.h."""
-MOST_COST = wp.constant(1e3)
+MAX_COST = wp.constant(1e3)
 """Largest bound² / D of a row of bristles: beside it float32 still resolves the others' cost."""
-LEAST_BRISTLE = wp.constant(1e-6)
+MIN_BRISTLE = wp.constant(1e-6)
 """As kMinBristleStiffness in cpp/effects.h, and so on."""
-LEAST_IN_ROW = wp.constant(0.05)
+MIN_IN_ROW = wp.constant(0.05)
 HEAVIEST_LOAD = wp.constant(0.95)
 EXPLICIT_STIFFNESS = wp.constant(1.0)
 """As kExplicitStiffness in cpp/stiffness.h, and so on."""
@@ -81,7 +81,7 @@ def bristle_stiffness_scale(breakaway: float, held: float, bound: float, v: floa
         alpha = 1.0
     elif r <= breakaway:
         alpha = 0.0
-    return wp.max(LEAST_BRISTLE, 1.0 - alpha * r)
+    return wp.max(MIN_BRISTLE, 1.0 - alpha * r)
 
 
 @wp.func
@@ -89,8 +89,8 @@ def bristle_stiffness_scale_in_row(
     left: float, h: float, stiffness: float, inertia: float
 ) -> float:
     """D of the friction row where `left` of the bristles' stiffness is left, kg·m²."""
-    in_row = wp.max(left, LEAST_IN_ROW - inertia / (h * h * stiffness))
-    if left <= LEAST_BRISTLE:
+    in_row = wp.max(left, MIN_IN_ROW - inertia / (h * h * stiffness))
+    if left <= MIN_BRISTLE:
         in_row = 1.0
     return wp.clamp(h * h * stiffness * in_row, IDLE_ROW * inertia, STIFF_ROW * inertia)
 

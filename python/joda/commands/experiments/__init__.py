@@ -14,7 +14,7 @@ from joda.commands.experiments.base import Case, bundled, unit_shown
 from joda.commands.experiments.gallery import Shown, command_line, gallery
 from joda.commands.experiments.picture import draw_case
 from joda.commands.experiments.table import CASES
-from joda.commands.experiments.tried import Tried, try_case, write_baselines
+from joda.commands.experiments.trial import Tried, try_case, write_baselines
 from joda.commands.simulate import Simulated, simulate
 from joda.errors import JodaError
 from joda.files import fresh, make_folder, write_bytes, write_text

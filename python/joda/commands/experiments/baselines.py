@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 GRID = 201
 """At how many positions forces are fitted."""
-MOST = {"friction": 3.0, "damping": 5.0, "stiffness": 20.0}
+MAX_VALUES = {"friction": 3.0, "damping": 5.0, "stiffness": 20.0}
 """Largest value that is tried, in reference forces, dampings, and reference forces per range."""
 STIFFEST = 0.9999
 PATHS = 0.1
@@ -141,7 +141,7 @@ def fit_motions(
     bare = load_model(model)
     own = joint_model(found, Profile(joint=found.joint), bare, find_joint(bare, found.joint.name))
     references = reference_scales(found)
-    most = np.array([MOST[name] for name in ("friction", "damping", "stiffness")])
+    most = np.array([MAX_VALUES[name] for name in ("friction", "damping", "stiffness")])
     most *= references["friction"], references["damping"], references["friction"] / (hi - lo)
 
     lengths = [round(motion.time[-1] / STEP) for motion in motions]

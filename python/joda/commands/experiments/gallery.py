@@ -6,9 +6,9 @@ from typing import Any
 
 from joda.commands.experiments.base import Case
 from joda.commands.experiments.baselines import Baseline
-from joda.commands.experiments.improved import Predicted
 from joda.commands.experiments.picture import TITLES
-from joda.commands.experiments.tried import WAYS
+from joda.commands.experiments.refinement_case import Predicted
+from joda.commands.experiments.trial import WAYS
 
 INTRO = """# Gallery
 
@@ -23,10 +23,10 @@ The baselines are the paper's, in MuJoCo's own elements on the same bare joint: 
 `frictionloss` and `damping`; *spring* has besides them a linear spring whose force is zero
 somewhere within the range. For each key both are fitted anew to the profile that they are compared
 with: where a joint is let go, by differential evolution on the case's own number (and on the
-motions); else by non-negative least squares on the force that moves the joint slowly to and fro,
-with the profile's mean damping. Their friction has the stiffest solver parameters that MuJoCo takes
-(`solreffriction`, `solimpfriction`). The last column is *constant* with the usual ones, with which
-friction creeps under load: so much of a difference is the solver's.
+motions); else by non-negative least squares on the force that moves the joint slowly in both
+directions, with the profile's mean damping. Their friction has the stiffest solver parameters that
+MuJoCo takes (`solreffriction`, `solimpfriction`). The last column is *constant* with the usual
+ones, with which friction creeps under load: so much of a difference is the solver's.
 """
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from joda.commands.experiments.base import Case, Press, unit_shown
-from joda.commands.experiments.tried import WAYS, Tried
+from joda.commands.experiments.trial import WAYS, Tried
 from joda.field import evaluate
 from joda.interaction.traces import draw_force, draw_position, shade, shown
 from joda.joints.resistance import friction_bounds

@@ -5,7 +5,7 @@ door shuts by itself from a few degrees, and otherwise stays where it was left.
 """
 
 from joda.commands.experiments.base import Case, Latch, LetGo, Press
-from joda.commands.experiments.improved import Predicted, gravity_cabinet
+from joda.commands.experiments.refinement_case import Predicted, gravity_cabinet
 
 NEARLY = (0.018, 0.034)
 """Nearly closed, of the way: there a door that shuts itself is to shut."""
@@ -113,9 +113,9 @@ CASES = (
         name="cabinet_improved",
         model="cabinet.xml",
         joint="door",
-        claim="Three measured releases, and a run in which a hand takes the flap to and fro, show "
-        "that the proposed profile lacks something; with what `joda improve` finds and adds, it "
-        "predicts other releases.",
+        claim="Three measured releases, and a run in which a hand moves the flap in both "
+        "directions, show that the proposed profile lacks something; with what `joda improve` "
+        "finds and adds, it predicts other releases.",
         meaning="let go where it was not measured: root mean square of the distance to what the "
         "object does, over 2 s",
         unit="angle",

@@ -22,7 +22,7 @@ Interval = tuple[float, float]
 
 KNOTS = 9
 """Control points of a free curve."""
-BENDS = 2.0
+CURVATURE_STD = 2.0
 """How much a free curve bends at a control point (one standard deviation), in usual forces: where
 no segment has been, what is beside tells it."""
 FACTOR, UNEVEN = (-1.5, 1.5, 0.05), 0.3
@@ -72,7 +72,10 @@ def _curve(units: Units, effect: str, channel: str) -> Hypothesis:
     return Hypothesis(
         effect,
         "both",
-        replace(unknowns_of(*[STRENGTH] * KNOTS), rough=np.diff(np.eye(KNOTS), 2, axis=0) / BENDS),
+        replace(
+            unknowns_of(*[STRENGTH] * KNOTS),
+            rough=np.diff(np.eye(KNOTS), 2, axis=0) / CURVATURE_STD,
+        ),
         np.full((1, KNOTS), 0.5 * TRIAL),
         write,
         raised,

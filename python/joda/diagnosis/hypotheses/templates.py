@@ -58,7 +58,7 @@ SEEN = 0.05
 """What is left of its force where it is no longer felt."""
 SPRUNG = np.linspace(0, 1, 5)
 """Control points of a spring."""
-BEND, USUAL_BEND = (-2.0, 2.0, 0.05), 0.7
+CURVATURE, CURVATURE_STD = (-2.0, 2.0, 0.05), 0.7
 """How much a spring at a lever, or of two rates, is off a straight line, in units of its force at
 the far end: four times that in the middle; and its prior standard deviation."""
 PULLING = (-1.0, 2.0, 0.05)
@@ -192,11 +192,11 @@ def _spring(units: Units, template: Template) -> Iterator[Hypothesis]:
             return profile.with_component("conservative", part)
 
         bounds, tries = places(reach)
-        bend = BEND if reach == "whole" else PULLING
+        bend = CURVATURE if reach == "whole" else PULLING
         return Hypothesis(
             name,
             "both",
-            known(unknowns_of(STRENGTH, (0.0, 0.7, 0.02), bend, *bounds), 2, 0.0, USUAL_BEND),
+            known(unknowns_of(STRENGTH, (0.0, 0.7, 0.02), bend, *bounds), 2, 0.0, CURVATURE_STD),
             np.array([(TRIAL, 0.25, 0.0, *t) for t in tries]),
             write,
             lambda x: ends(reach, x),

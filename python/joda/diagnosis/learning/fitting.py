@@ -31,7 +31,7 @@ ROUNDS = 4
 """Iterations in segments of each length, while segments that are far off count, and after."""
 AT_END = 0.02
 """Of the range: what was measured as near to its end goes to the end."""
-BEYOND = 0.995
+KNOWN_SPEED_SHARE = 0.995
 """Part of the measured speeds that are within those that a law knows."""
 
 
@@ -83,7 +83,7 @@ class Learner:
         a, b = float(np.clip(s.min(), 0, 1)), float(np.clip(s.max(), 0, 1))
         interval = a if a > AT_END else 0.0, b if b < 1 - AT_END else 1.0
         speeds = np.abs(segments.start[:, 1])
-        fastest = float(np.quantile(speeds, BEYOND)) if len(speeds) else 0.0
+        fastest = float(np.quantile(speeds, KNOWN_SPEED_SHARE)) if len(speeds) else 0.0
         return Law(terms, interval, hi - lo, fastest or units.speed, units.force)
 
     def unknowns(self, law: Law) -> Unknowns:

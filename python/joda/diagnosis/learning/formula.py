@@ -26,7 +26,7 @@ Terms = tuple[Term, ...]
 
 WAVES = 600
 """Periods that are tried, up to that of a wave in two lengths of the law's."""
-MOST = 2
+MAX_TERMS = 2
 """Terms of the position, and of the speed; a sine and its cosine count as one."""
 BEST = 2
 """So many sets of as many terms are fitted by simulation."""
@@ -203,7 +203,7 @@ def _candidates(
 def _sets(groups: Sequence[Terms], at: Array, y: Array, errors: Array) -> list[list[Terms]]:
     """The best sets of one group of terms, of two, ...; shortest first."""
     out = []
-    for count in range(1, MOST + 1):
+    for count in range(1, MAX_TERMS + 1):
         every = [tuple(t for g in some for t in g) for some in combinations(groups, count)]
         left = [_left(terms, at, y, errors) for terms in every]
         out.append([every[k] for k in np.argsort(left)[:BEST]])

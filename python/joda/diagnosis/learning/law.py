@@ -1,8 +1,8 @@
 """A law of no catalogue: what it is made of, its numbers, and the profile that it makes.
 
 Force over position, friction, and a resistance over position and velocity that may remember, each
-as smooth as a Gaussian process (`joda.diagnosis.learning.smooth`). Where no run has been there is
-none of it, and faster than any run it grows no more.
+as smooth as a Gaussian process (`joda.diagnosis.learning.gaussian_process`). Where no run has been
+there is none of it, and faster than any run it grows no more.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from joda.component import Component
-from joda.diagnosis.learning.smooth import modes_of, nearness
+from joda.diagnosis.learning.gaussian_process import modes_of, nearness
 from joda.diagnosis.settings import SETTINGS
 from joda.effects import LearnedForce
 from joda.estimation.least_squares import Inequalities

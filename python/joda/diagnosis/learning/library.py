@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 DRY = "sign(v)"
 """Dry friction."""
-BENDS = (0.05, 0.15, 0.4)
+SPEED_SCALES = (0.05, 0.15, 0.4)
 """Speeds v0, in units of the fastest."""
 
 
@@ -48,7 +48,7 @@ def of_speed(fastest: float) -> tuple[Term, ...]:
         Term("speed", "v", "·s/{x}", lambda v: v),
         Term("speed", "|v| v", "·s²/{x}²", np.square),
     ]
-    for part in BENDS:
+    for part in SPEED_SCALES:
         v0 = float(f"{part * fastest:.2g}")
         terms.append(Term("speed", f"sign(v) (1 − exp(−|v|/{v0:g}))", "", _saturating(v0)))
     return tuple(terms)

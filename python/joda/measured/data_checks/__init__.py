@@ -16,7 +16,7 @@ from joda.measured.runs import QuasiStatic, Run
 from joda.measured.smoothing import resolution
 from joda.scenes.context import Context
 
-LEAST_RUN, LEAST_CURVE = 20, 5
+MIN_RUN, MIN_CURVE = 20, 5
 """Fewest samples of which anything can be told."""
 
 
@@ -31,7 +31,7 @@ def data_checks(run: Run | QuasiStatic, context: Context) -> list[DataCheck]:
         what looks wrong; none where nothing looks wrong.
     """
     timed, unit = isinstance(run, Run), context.joint.unit
-    n, least = len(run.position), LEAST_RUN if timed else LEAST_CURVE
+    n, least = len(run.position), MIN_RUN if timed else MIN_CURVE
     if n < least:
         told = f"{n} samples are not enough to tell anything; record at least {least}"
         return [suspect(run, "short", told)]

@@ -18,12 +18,12 @@ seconds at its highest speed, for a soft stop; as a share of the range, at most.
 OFF = 0.06
 """Part of the range up to which a zero may be off and the runs be used: three times what it usually
 is, see `joda.estimation.nuisance`."""
-FEW = 0.02
+MAX_OUTLIER_SHARE = 0.02
 """Share of samples, beyond the range, that may be single wrong values."""
-STRAY, APART, FAR = 5.0, 20.0, 0.02
+OUTLIER_MOVES, OUTLIER_NOISES, OUTLIER_TRAVEL = 5.0, 20.0, 0.02
 """How much farther than usual moves a stray sample lies from both its neighbours; from them, in
 noises, and as a share of what was visited, at least."""
-MOSTLY = 0.3
+MIN_BEYOND_SHARE = 0.3
 """Share of samples beyond the range from which on they are no single wrong values."""
 TURNS = {"rad": 2 * np.pi, "degrees": 360.0}
 """A full turn, by the unit of the positions."""
@@ -43,7 +43,7 @@ def placed(run: Run | QuasiStatic, context: Context) -> tuple[list[DataCheck], A
     if told := _wrapped(run, context):
         return [suspect(run, "wrapped", told)], run.position
     glitches, position = _outside(run, run.position, context)
-    if 0 < np.sum(position != run.position) <= max(FEW * len(position), 3):
+    if 0 < np.sum(position != run.position) <= max(MAX_OUTLIER_SHARE * len(position), 3):
         return glitches, position
     found, position = _unit(run, context)
     if any(one.kind == "ticks" for one in found):
@@ -91,9 +91,9 @@ def strays(run: Run, position: Array, sigma: float, unit: str) -> tuple[str, Arr
     out, back = move[1:-2], -move[2:-1]  # of the samples 2 to n - 3: from before, and to behind
     jump = np.where(out * back > 0, np.minimum(np.abs(out), np.abs(back)), 0.0)
     usual = np.max(np.abs([move[:-3], move[3:], out - back]), axis=0)
-    least = max(APART * sigma, FAR * float(np.ptp(position)))
-    stray = 2 + np.flatnonzero(jump > np.maximum(least, STRAY * usual))
-    if not 0 < len(stray) <= max(FEW * len(position), 3):
+    least = max(OUTLIER_NOISES * sigma, OUTLIER_TRAVEL * float(np.ptp(position)))
+    stray = 2 + np.flatnonzero(jump > np.maximum(least, OUTLIER_MOVES * usual))
+    if not 0 < len(stray) <= max(MAX_OUTLIER_SHARE * len(position), 3):
         return "", position
     worst = stray[np.argmax(jump[stray - 2])]
     cleaned = position.copy()
@@ -165,7 +165,11 @@ def _outside(
         return [], position
     unit = context.joint.unit
     first = f", the first at {run.time[wrong][0]:.6g} s," if isinstance(run, Run) else ","
-    few = "remove wrong samples" if wrong.mean() < MOSTLY else f"check their unit ({unit}) and zero"
+    few = (
+        "remove wrong samples"
+        if wrong.mean() < MIN_BEYOND_SHARE
+        else f"check their unit ({unit}) and zero"
+    )
     told = (
         f"{run.name}: {wrong.sum()} of {len(position)} samples lie outside {_range(context)}"
         f"{first} by up to {beyond.max():.3g} {unit}; {few}, or correct the model's range."

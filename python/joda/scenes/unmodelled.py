@@ -1,4 +1,4 @@
-"""What acts on a joint in its scene besides its own elements, contacts and actuators."""
+"""Elements of a scene that act on a joint and that a replay of the joint by itself leaves out."""
 
 import mujoco
 import numpy as np
@@ -14,7 +14,7 @@ TINY = 1e-6
 """Friction losses below this only make a row in the solver, as joda's own tendons do."""
 
 
-def acting_besides(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
+def unmodelled_elements(model: mujoco.MjModel, joint: int) -> tuple[str, ...]:
     """The tendons, equality constraints and media that act on a joint, by kind and name, and what
     of its own is not replayed.
 

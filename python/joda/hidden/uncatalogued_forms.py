@@ -1,6 +1,6 @@
-"""Forms of effects that no catalogue has, beside those of `outside`."""
+"""Forms of effects that no catalogue has, beside those of `uncatalogued`."""
 
-from joda.hidden import laws, masses, memory, rubbing, truth
+from joda.hidden import friction_laws, laws, masses, memory, truth
 from joda.hidden.sampler import Hidden, Sampler, everywhere
 
 
@@ -23,7 +23,7 @@ def switching(sampler: Sampler) -> Hidden:
 def governor(sampler: Sampler) -> Hidden:
     """A centrifugal brake."""
     force = sampler.force(0.3, 0.8)
-    law = rubbing.Governor(
+    law = friction_laws.Governor(
         force, sampler.between(0.4, 0.8) * sampler.joint.span / sampler.joint.time
     )
     return everywhere(law, force, sampler.unit())

@@ -12,7 +12,7 @@ from joda.propose.offline import Offline
 from joda.propose.session import NONE, Session
 from joda.scenes import model as loading
 from joda.scenes.model import load, load_model
-from joda.scenes.shelf import KEPT, loading_once, shelf_name
+from joda.scenes.model_cache import MAX_MODELS, cache_name, loading_once
 
 PAIR = """<mujoco><compiler angle="radian"/>
   <asset><texture name="wood" type="2d" builtin="checker" width="64" height="64" rgb1="1 .8 .5"/>
@@ -60,7 +60,7 @@ def test_what_lies_elsewhere_is_loaded_each_time(tmp_path):
 
 
 def test_only_the_last_models_are_kept(tmp_path):
-    paths = [pair(tmp_path, name=f"{k}.xml") for k in range(KEPT + 1)]
+    paths = [pair(tmp_path, name=f"{k}.xml") for k in range(MAX_MODELS + 1)]
     with loading_once(tmp_path):
         models = [load(path) for path in paths]
         assert all(load(path) is one for path, one in zip(paths[1:], models[1:], strict=True))
@@ -98,9 +98,9 @@ def test_pictures_of_one_opened_model_are_those_of_a_fresh_one(tmp_path):
         pytest.skip("nothing can render here")
     path = tmp_path / "pair.xml"
     with loading_once(tmp_path):
-        assert shelf_name()
+        assert cache_name()
         kept = [*render(path, "right", tmp_path / "a"), *render(path, "left", tmp_path / "a")]
-    assert shelf_name() is None
+    assert cache_name() is None
     fresh = [*render(path, "right", tmp_path / "b"), *render(path, "left", tmp_path / "b")]
     for one, other in zip(kept, fresh, strict=True):
         assert one.read_bytes() == other.read_bytes()

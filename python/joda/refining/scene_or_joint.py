@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from joda.errors import JodaError
 from joda.measured import smoothing
+from joda.measured.contact_samples import touching
+from joda.measured.coupling import coupling_force
 from joda.measured.driven import Logs, joints_in
 from joda.measured.misfit import rms
-from joda.measured.others import force_of_others
 from joda.measured.scene_log import SceneRun, read_scene_run
-from joda.measured.touching import touching
 from joda.refining.engine import JointEngine
 from joda.scenes.model import joint_name, joint_type
 from joda.scenes.scene import profiles_of
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-WINDOW = 0.4
+SEGMENT_LENGTH = 0.4
 """Time over which it counts how far others move the joint, s."""
 CLEARLY = 3.0
 """By how much they must, in noises of its position."""
@@ -123,8 +123,8 @@ def _dependence(model: mujoco.MjModel, joint: int, runs: Sequence[SceneRun]) -> 
         if inside.any():
             first, second = max(pairs, key=lambda pair: pairs[pair])
             return f"as '{first}' touches '{second}' in {run.name}, or may"
-        force = force_of_others(model, joint, run.time, positions)
-        moved = rms(force) / inertia * WINDOW**2 / 2
+        force = coupling_force(model, joint, run.time, positions)
+        moved = rms(force) / inertia * SEGMENT_LENGTH**2 / 2
         if moved > CLEARLY * smoothing.noise(run.time, run.position):
             unit = "N·m" if joint_type(model, joint) == "hinge" else "N"
             return (
@@ -138,5 +138,5 @@ def _alone(model: mujoco.MjModel, run: SceneRun) -> SceneRun:
     if len(run.joints) == 1:
         return replace(run, among=True)
     positions = dict(zip(run.joints, run.positions.T, strict=True))
-    force = force_of_others(model, run.joints[0], run.time, positions)
+    force = coupling_force(model, run.joints[0], run.time, positions)
     return replace(run, force=run.force + force, forced=True, among=True)

@@ -9,7 +9,7 @@ from test_scene_contacts import pushed
 
 from joda import attach, compare, context
 from joda.measured.comparison import _places
-from joda.measured.failing import COLUMNS, IMPACT, Failing, failing
+from joda.measured.failing_intervals import COLUMNS, IMPACT, Failing, failing_intervals
 from joda.measured.reading import read_measured
 from joda.measured.run_files import read_run
 from joda.profile import Profile
@@ -29,7 +29,7 @@ def sentence(share):
 
 
 def rows(force, force_error, ways=(1.0, -1.0), count=60):
-    """Windows missed by ten times a noise of 1 that may blame such a force."""
+    """Segments missed by ten times a noise of 1 that may blame such a force."""
     out = np.zeros((count, COLUMNS))
     out[:, 0] = np.linspace(0.05, 0.95, count)
     out[:, 1] = np.resize(ways, count)
@@ -52,7 +52,7 @@ def rows(force, force_error, ways=(1.0, -1.0), count=60):
     ],
 )
 def test_a_force_that_may_be_none_is_not_blamed(force, force_error, blamed):
-    found = failing(rows(force, force_error))
+    found = failing_intervals(rows(force, force_error))
     assert found and all(place.force == pytest.approx(blamed) for place in found)
     ways = [place for place in found if place.by == "direction"]
     assert len(ways) == 2 * (blamed is not None)  # each for itself, with its share
@@ -60,12 +60,14 @@ def test_a_force_that_may_be_none_is_not_blamed(force, force_error, blamed):
 
 
 def test_a_force_that_explains_no_misfit_is_not_blamed():
-    """Within each window the force changes its sign: a constant one explains a tenth."""
+    """Within each segment the force changes its sign: a constant one explains a tenth."""
     whole, uneven = rows(0.7, 0.02), rows(0.7, 0.02)
     whole[:, 10:12] = 4000.0, 40.0
     uneven[:, 10:12] = 4000.0, 3600.0
-    assert all(place.force == pytest.approx(0.7) for place in failing(whole))
-    assert failing(uneven) and all(place.force is None for place in failing(uneven))
+    assert all(place.force == pytest.approx(0.7) for place in failing_intervals(whole))
+    assert failing_intervals(uneven) and all(
+        place.force is None for place in failing_intervals(uneven)
+    )
 
 
 @pytest.mark.slow
@@ -86,7 +88,7 @@ def test_noise_free_runs_that_stick_blame_no_tiny_force(friction, spring, rest, 
     blamed = [abs(place.force) for place in found.failing if place.force is not None]
     assert not blamed or min(blamed) > 1e-3 * friction
     measured = read_measured(path, "lid", [runs[0]])
-    (window, *_) = measured.replayer.windows(read_run(runs[0]), measured.sigma[0])
+    (window, *_) = measured.replayer.segments(read_run(runs[0]), measured.sigma[0])
     assert window.force == 0.0 and np.isinf(window.force_error)  # friction holds it at rest
 
 
@@ -98,7 +100,7 @@ SWINGS = """<mujoco><compiler angle="radian"/><option timestep=".001"/><worldbod
 
 @pytest.mark.slow
 def test_a_whole_run_that_no_constant_force_explains_blames_none(tmp_path):
-    """A swing whose model is a little too heavy parts from it ever more: no window shows it."""
+    """A swing whose model is a little too heavy parts from it ever more: no segment shows it."""
     path = write(tmp_path, SWINGS.format(mass=4.016), "model.xml")
     text = SWINGS.format(mass=4.0)
     run = pushed(text, "lid", lambda t: 0.0, tmp_path, "a.csv", 8.0, 0.5, noise=1e-3)
@@ -119,7 +121,7 @@ def test_what_is_missed_in_knocks_is_told_by_place_alone():
     knocks[:, 0], knocks[:, 3], knocks[:, IMPACT] = 0.99, 5.0, 1.0
     rest = rows(0.7, 0.02, ways=(-1.0,))
     rest[:, 5:8] = 1.5, 40, 90.0
-    found = failing(np.concatenate([knocks, rest]))
+    found = failing_intervals(np.concatenate([knocks, rest]))
     assert found[0].by == "position"
     others = [place for place in found if place.by == "direction"]
     assert [place.interval for place in others] == [(-1.0, 0.0)]

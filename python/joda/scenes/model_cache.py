@@ -12,17 +12,17 @@ import mujoco
 
 Loaded = tuple[mujoco.MjSpec, mujoco.MjModel]
 
-KEPT = 2
+MAX_MODELS = 2
 """So many models are kept, those asked for last: large ones take a hundred megabytes."""
 
 
 @dataclass(frozen=True)
-class Shelf:
+class ModelCache:
     """Where models are kept that are asked for again.
 
     Attributes:
         below: the file, or the folder of the files, that are kept.
-        name: no other shelf's, in any process.
+        name: no other cache's, in any process.
         models: by path, those asked for last at the end.
     """
 
@@ -31,7 +31,7 @@ class Shelf:
     models: dict[Path, Loaded] = field(default_factory=dict)
 
 
-_shelf: ContextVar[Shelf | None] = ContextVar("shelf", default=None)
+_cache: ContextVar[ModelCache | None] = ContextVar("cache", default=None)
 
 
 @contextmanager
@@ -41,26 +41,26 @@ def loading_once(below: Path) -> Iterator[None]:
     Args:
         below: the file, or the folder of the files, that this is for.
     """
-    token = _shelf.set(Shelf(below.resolve()))
+    token = _cache.set(ModelCache(below.resolve()))
     try:
         yield
     finally:
-        _shelf.reset(token)
+        _cache.reset(token)
 
 
-def shelf_name() -> str | None:
+def cache_name() -> str | None:
     """What tells another process that models are still the same; None where they may change."""
-    shelf = _shelf.get()
-    return shelf.name if shelf else None
+    cache = _cache.get()
+    return cache.name if cache else None
 
 
-def kept(path: Path, load: Callable[[Path], Loaded]) -> Loaded:
-    """A file's model: of the shelf if it is there, else loaded, and kept if that is wanted."""
-    shelf, place = _shelf.get(), path.resolve()
-    if shelf is None or not place.is_relative_to(shelf.below):
+def cached(path: Path, load: Callable[[Path], Loaded]) -> Loaded:
+    """A file's model: of the cache if it is there, else loaded, and kept if that is wanted."""
+    cache, place = _cache.get(), path.resolve()
+    if cache is None or not place.is_relative_to(cache.below):
         return load(path)
-    found = shelf.models.pop(place, None) or load(path)
-    shelf.models[place] = found
-    for oldest in list(shelf.models)[:-KEPT]:
-        del shelf.models[oldest]
+    found = cache.models.pop(place, None) or load(path)
+    cache.models[place] = found
+    for oldest in list(cache.models)[:-MAX_MODELS]:
+        del cache.models[oldest]
     return found

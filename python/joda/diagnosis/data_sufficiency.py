@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from joda.diagnosis.settings import SETTINGS
 from joda.estimation.problem import segments_for
 from joda.estimation.segments import Integers, Segments
-from joda.measured.curves import FEW, TOO_LOUD, too_loud
+from joda.measured.curves import MIN_SAMPLES, TOO_LOUD, too_loud
 from joda.measured.data_checks.timing import repeats
 from joda.measured.measured_joint import Measured
 from joda.measured.quasi_static import QuasiStaticComparison
@@ -56,9 +56,9 @@ def _moving(measured: Measured, segments: Segments) -> int:
         return int(np.ptp(segments.position[own]) / far) if len(own) else 0
 
     usable = segments.usable
-    windows = sum(motions(row) > 0 for row in segments.rows[usable])
+    many = sum(motions(row) > 0 for row in segments.rows[usable])
     runs = (usable & (segments.run == number) for number in np.unique(segments.run))
-    return max(windows, sum(motions(segments.rows[own]) for own in runs))
+    return max(many, sum(motions(segments.rows[own]) for own in runs))
 
 
 def too_little(measured: Measured) -> str:
@@ -68,7 +68,7 @@ def too_little(measured: Measured) -> str:
     segments = segments_for(measured)
     if not measured.runs:
         told = len(segments.position)
-        return f"{told} samples are too few; record {FEW}." if told < FEW else ""
+        return f"{told} samples are too few; record {MIN_SAMPLES}." if told < MIN_SAMPLES else ""
     if repeats(measured.runs):
         return "Positions repeat while the joint moves, so that what was taken for noise is motion."
     needed = SETTINGS.naming.motions

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-LEAST = 1e-9
+MIN_SHARE = 1e-9
 """Part of a weight that is worth carrying."""
 
 
@@ -64,7 +64,7 @@ def inertial(model: mujoco.MjModel, joint: int, body: int, heavier: Heavier) -> 
 
 def gravcomp(model: mujoco.MjModel, body: int, heavier: Heavier) -> str | None:
     """A body's new `gravcomp`; None where it stays as it is."""
-    if heavier.lifted < LEAST:
+    if heavier.lifted < MIN_SHARE:
         return None
     carried = 1 - (1 - heavier.lifted) * (1 - float(model.body_gravcomp[body]))
     return f"{carried:.9g}"

@@ -11,7 +11,7 @@ from joda import context
 from joda.effects import EndStopRestitution
 from joda.estimation.profile_parameters import KINDS, Parameters
 from joda.joints import joint_model
-from joda.refining.between import Between
+from joda.refining.discontinuities import Between
 from joda.refining.engine import JointEngine
 from joda.refining.shooting import Shooting
 
@@ -78,7 +78,7 @@ def test_jumps_are_moved_to_where_they_are():
     assert joint.fit(begin, 12, quiet)[jumps] == pytest.approx(true[jumps], abs=0.003)
 
 
-def test_windows_between_the_jumps_cross_none():
+def test_segments_between_the_jumps_cross_none():
     case = planted("constant_positive_conservative_hinge", 1)
     joint = between(case)
     estimator = joint._clear(truth(case, joint.parameters))
@@ -105,7 +105,7 @@ def test_a_wrong_inertia_is_found():
     assert np.exp(found) == pytest.approx(1 / 0.8, rel=0.01)
 
 
-def test_what_misses_the_windows_is_worse():
+def test_what_misses_the_segments_is_worse():
     case = planted("constant_positive_conservative_hinge", 1)
     joint = between(case)
     true = truth(case, joint.parameters)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from joda.hidden import fleeting, laws, rubbing, truth
+from joda.hidden import friction_laws, laws, truth, uncatalogued_laws
 from joda.hidden.sampler import Builder, Hidden, Sampler, everywhere
 
 
@@ -24,9 +24,9 @@ def _warming(sampler: Sampler) -> Hidden:
     time = sampler.between(0.8, 2.0) * sampler.joint.time
     if sampler.chance():
         force = sampler.force(0.2, 0.6)
-        return everywhere(rubbing.Cold(force, 0.0, time), force, sampler.unit())
+        return everywhere(friction_laws.WarmingFriction(force, 0.0, time), force, sampler.unit())
     size = sampler.damping(0.3, 0.8)
-    return everywhere(rubbing.Cold(0.0, size, time), size, sampler.unit("s"))
+    return everywhere(friction_laws.WarmingFriction(0.0, size, time), size, sampler.unit("s"))
 
 
 def _cogging(sampler: Sampler) -> Hidden:
@@ -37,7 +37,7 @@ def _cogging(sampler: Sampler) -> Hidden:
 
 def _root(sampler: Sampler) -> Hidden:
     size = sampler.force(0.2, 0.6) * (sampler.joint.time / sampler.joint.span) ** 0.5
-    return everywhere(rubbing.RootDamping(size), size, f"{sampler.unit()}·(s/x)^½")
+    return everywhere(friction_laws.RootDamping(size), size, f"{sampler.unit()}·(s/x)^½")
 
 
 def _delay(sampler: Sampler) -> Hidden:
@@ -64,12 +64,16 @@ def _fading(sampler: Sampler) -> Hidden:
     force, joint = sampler.force(0.3, 0.8), sampler.joint
     periods, phase = sampler.between(3, 6), sampler.between(0, 2 * np.pi)
     velocity = sampler.between(0.3, 0.8) * joint.span / joint.time
-    return everywhere(fleeting.FadingWave(force, periods, phase, velocity), force, sampler.unit())
+    return everywhere(
+        uncatalogued_laws.FadingWave(force, periods, phase, velocity), force, sampler.unit()
+    )
 
 
 def _drift(sampler: Sampler) -> Hidden:
     force = sampler.force(0.2, 0.5)
-    law = fleeting.Drift(sampler.way() * force, sampler.between(0.8, 2.5) * sampler.joint.time)
+    law = uncatalogued_laws.Drift(
+        sampler.way() * force, sampler.between(0.8, 2.5) * sampler.joint.time
+    )
     return everywhere(law, force, sampler.unit())
 
 
@@ -77,16 +81,16 @@ def _tremor(sampler: Sampler) -> Hidden:
     force, count = sampler.force(0.15, 0.4), 7
     frequencies = tuple(sampler.between(0.3, 3.0) / sampler.joint.time for _ in range(count))
     phases = tuple(sampler.between(0, 2 * np.pi) for _ in range(count))
-    return everywhere(fleeting.Tremor(force, frequencies, phases), force, sampler.unit())
+    return everywhere(uncatalogued_laws.Tremor(force, frequencies, phases), force, sampler.unit())
 
 
 def _ratchet(sampler: Sampler) -> Hidden:
     force, way = sampler.force(0.3, 0.7), sampler.way()
-    law = fleeting.Ratchet(force, sampler.between(6, 14), way)
+    law = uncatalogued_laws.Ratchet(force, sampler.between(6, 14), way)
     return everywhere(law, force, sampler.unit(), way)
 
 
-BEYOND: dict[str, Builder] = {
+UNCATALOGUED: dict[str, Builder] = {
     "maxwell_relaxation": _relaxation,
     "friction_ageing": _ageing,
     "warming_up": _warming,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from joda.commands.experiments.base import Case, bundled
 from joda.commands.experiments.baselines import Baseline, fit_forces, fit_motions
-from joda.commands.experiments.improved import SCENE, Predicted, improved, measure
+from joda.commands.experiments.refinement_case import SCENE, Predicted, improved, measure
 from joda.commands.experiments.subject import Subject
 from joda.files import write_text
 from joda.profile import Profile

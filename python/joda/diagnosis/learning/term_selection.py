@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from joda.diagnosis.adding import NO_LESS, NOTHING_LEFT, AddedEffect, fallen, replayed
-from joda.diagnosis.coverage import at_rest
+from joda.diagnosis.data_sufficiency import at_rest
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.law import LABEL, Terms
 from joda.diagnosis.overlap import divided

@@ -1,4 +1,4 @@
-"""What other joints of a log do to a joint: a force, by MuJoCo along the measured motion."""
+"""Coupling: the force of other joints of a log on a joint, by MuJoCo along the measured motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ SHORTER = 0.2
 """Another time, with which its error is told, s."""
 GRID = 401
 """Positions at which what a joint needs by itself is asked for."""
-FEWEST = 9
+MIN_SAMPLES = 9
 """Samples over which it is smoothed at least."""
 
 
@@ -35,7 +35,7 @@ def motion(time: Array, position: Array, over: float = SMOOTHED) -> Motion:
     count = len(time)
     grid = np.linspace(time[0], time[-1], count)
     gap = float(grid[1] - grid[0])
-    wide = min(max(round(over / gap), FEWEST) | 1, count - 1 + count % 2)
+    wide = min(max(round(over / gap), MIN_SAMPLES) | 1, count - 1 + count % 2)
     even = np.interp(grid, time, position)
     found = [
         np.interp(time, grid, savgol_filter(even, wide, min(ORDER, wide - 1), deriv=k, delta=gap))
@@ -44,7 +44,7 @@ def motion(time: Array, position: Array, over: float = SMOOTHED) -> Motion:
     return Motion(*found)
 
 
-def force_of_others(
+def coupling_force(
     model: mujoco.MjModel,
     joint: int,
     time: Array,
@@ -99,7 +99,7 @@ def _needed(model: mujoco.MjModel, motions: Mapping[int, Motion]) -> Array:
     return out
 
 
-def error_of_others(time: Array, force: Array, shorter: Array) -> Array:
+def coupling_force_std(time: Array, force: Array, shorter: Array) -> Array:
     """Standard deviation of that force, as white noise from sample to sample, shape (n,).
 
     What another smoothing makes of it tells its error; that is the same over the time smoothed, so

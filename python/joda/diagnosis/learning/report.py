@@ -13,7 +13,7 @@ from joda.diagnosis.learning.ensemble import (
     over_position,
     over_speed,
 )
-from joda.diagnosis.learning.experiment import narrowing
+from joda.diagnosis.learning.experiment_design import narrowing
 from joda.diagnosis.learning.fitting import Learned, Learner
 from joda.diagnosis.learning.formula import Formula, formula
 from joda.diagnosis.learning.law import Memory
@@ -123,15 +123,15 @@ def sentences(told: Account) -> list[str]:
     if found := told.formula:
         beside = " beside this memory" if told.gain else ""
         out.append(
-            f"In a formula{beside}: {found.text}; what was held out is missed by "
-            f"{found.unseen:.2f} times what the learned curves miss it by."
+            f"In a formula{beside}: {found.text}; its held-out error is "
+            f"{found.unseen:.2f} times that of the learned curves."
         )
     elif told.position or told.speed:
         out.append("No formula of few terms is as good and stable.")
     if told.nearest:
         out.append(
-            f"Nearest of what has a name: {told.nearest.name}; with it what was held out "
-            f"is missed by {told.nearest.times:.2g} times what it is missed by with the law."
+            f"Nearest of what has a name: {told.nearest.name}; with it the held-out error "
+            f"is {told.nearest.times:.2g} times that of the law."
         )
     if told.next_experiment:
         out.append(f"Next experiment: {told.next_experiment}")

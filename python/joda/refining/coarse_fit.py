@@ -26,9 +26,9 @@ SHIFTS = ((0, 0), (BY, BY), (-BY, -BY), (-BY, BY), (BY, -BY))
 position."""
 FAR = tuple(float(by) for by in np.linspace(-0.1, 0.1, 9))
 """How far either end is moved where it is sought from many places."""
-FEW = 3
+ITERATIONS = 3
 """Iterations of sizes at each of these."""
-MOST = 6
+MAX_STARTS = 6
 """From how many starts, those with the least loss, numbers are fitted."""
 EDGE = 0.001
 """How near the ends of the range an end of an interval comes: one that is there stays there."""
@@ -89,9 +89,9 @@ def _starts(
 ) -> list[tuple[Shooting, Array]]:
     """Where to begin: of what `_trials` has of each, the ones with the least loss."""
     trials = [(shooting.about(one), x) for one in bases for x in _trials(one)]
-    if len(trials) > MOST:
+    if len(trials) > MAX_STARTS:
         trials.sort(key=lambda trial: _loss(estimator, *trial))
-    return trials[:MOST]
+    return trials[:MAX_STARTS]
 
 
 def _farther(shooting: Shooting, estimator: SegmentEstimator, weak: Profile) -> list[Profile]:
@@ -105,10 +105,10 @@ def _farther(shooting: Shooting, estimator: SegmentEstimator, weak: Profile) -> 
         if _feasible(placed, place):
             own = placed.about(placed.written(place, exact=True), SIZES)
             sizes = shooting.about(own)
-            x = sizes.fit_segments(estimator, own.start, own.prior_std, FEW)
+            x = sizes.fit_segments(estimator, own.start, own.prior_std, ITERATIONS)
             found.append((_loss(estimator, sizes, x), own.written(x, exact=True)))
     found.sort(key=lambda one: one[0])
-    return [profile for _, profile in found[:MOST]]
+    return [profile for _, profile in found[:MAX_STARTS]]
 
 
 def _loss(estimator: SegmentEstimator, shooting: Shooting, x: Array) -> float:

@@ -1,4 +1,4 @@
-"""Laws that fade, drift, tremble or catch: of speed and position at once, of time, of direction."""
+"""Laws that no catalogue has: of speed and position at once, of time, of direction."""
 
 from dataclasses import dataclass
 

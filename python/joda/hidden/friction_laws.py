@@ -8,7 +8,7 @@ from joda.hidden.laws import Array, Friction, Shape, window
 
 
 @dataclass(frozen=True)
-class FrictionAlong(Friction):
+class PositionFriction(Friction):
     """Dry friction that depends on position; direction as in Viscous."""
 
     size: float
@@ -17,12 +17,12 @@ class FrictionAlong(Friction):
 
     def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
         """See Friction."""
-        rub = self.size * self.course(s)
-        return rub * (sign == self.direction) if self.direction else rub
+        limit = self.size * self.course(s)
+        return limit * (sign == self.direction) if self.direction else limit
 
 
 @dataclass(frozen=True)
-class Rub(Friction):
+class IntervalFriction(Friction):
     """Dry friction of a constant size on [a, b]; direction as in Viscous."""
 
     size: float
@@ -33,8 +33,8 @@ class Rub(Friction):
 
     def limit(self, s: Array, v: Array, sign: Array, load: Array, t: Array) -> Array:
         """See Friction."""
-        rub = self.size * window(s, self.a, self.b, self.edge)
-        return rub * (sign == self.direction) if self.direction else rub
+        limit = self.size * window(s, self.a, self.b, self.edge)
+        return limit * (sign == self.direction) if self.direction else limit
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class RationalStribeck(Friction):
 
 
 @dataclass(frozen=True)
-class Loaded(Friction):
+class LoadFriction(Friction):
     """coefficient |load|."""
 
     coefficient: float
@@ -135,7 +135,7 @@ class RootDamping(Friction):
 
 
 @dataclass(frozen=True)
-class Cold(Friction):
+class WarmingFriction(Friction):
     """(size + damping |v|) exp(-t / time): what goes as the joint warms up."""
 
     size: float

@@ -13,14 +13,13 @@ from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.segments import Segments
 from joda.field import evaluate
 from joda.profile import CHANNELS
-from joda.refining.shooting import LEAST as FEWEST
-from joda.refining.shooting import Progress, Shooting
+from joda.refining.shooting import MIN_SAMPLES, Progress, Shooting
 
 Array = NDArray[np.float64]
 
 LENGTHS = (0.4, 0.2, 0.1)
 """Lengths of segments, s: the longest is taken that leaves enough of them clear of jumps."""
-ENOUGH = 0.2
+MIN_SHARE = 0.2
 """Share of the samples that is."""
 CLEAR = 0.01
 """How far from a jump a segment is clear of it, in normalised position."""
@@ -105,7 +104,7 @@ class Between:
         G, h = self.parameters.constraints.G, self.parameters.constraints.h
         segments, ends = self.shooting.engine.segments(length), self._ends(theta)
         over = self._meet(segments, theta[ends], CLEAR + STEPS * move)
-        over &= segments.count >= FEWEST
+        over &= segments.count >= MIN_SAMPLES
         if not over.any():
             return theta
         if segments.separable:
@@ -156,8 +155,10 @@ class Between:
         for length in LENGTHS:
             segments = self.shooting.engine.segments(length)
             clear = ~self._meet(segments, jumps, CLEAR)
-            estimator = self.shooting.engine.estimator(segments, clear & (segments.count >= FEWEST))
-            if segments.count[estimator.counts].sum() > ENOUGH * segments.count.sum():
+            estimator = self.shooting.engine.estimator(
+                segments, clear & (segments.count >= MIN_SAMPLES)
+            )
+            if segments.count[estimator.counts].sum() > MIN_SHARE * segments.count.sum():
                 break
         return estimator
 
