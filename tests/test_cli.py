@@ -322,7 +322,7 @@ def test_refine_tells_errors_in_the_joints_unit(kind, unit, tmp_path, monkeypatc
         "Nothing changed.",
         f"Position error: 0.02 → 0.001 {unit} RMS after 4 iterations; "
         f"the measurement's noise is 0.0005 {unit}.",
-        f"The same over windows of 0.4 s: 0.01 → 0.0008 {unit}.",
+        f"Segment error (0.4 s horizon): 0.01 → 0.0008 {unit}.",
         f"On the runs held out: 0.03 → 0.002 {unit} RMS.",
         "The data tell little of friction at s = 0.10 to 0.25: it is hardly measured there.",
         "A note.",

@@ -330,7 +330,7 @@ def test_runs_are_loaded_and_bad_ones_are_told(page, project):
     page.until(lambda: page.drawn("replay"))
     true = compare(project.model, "lid", project.runs)
     wanted = [f"{x:.3g}" for x in (true.rmse, true.rmse_window)] + [f"{true.noise_floor:.2g}"]
-    number = r"runs (\S+) rad · windows of 0.4 s (\S+) rad · noise (\S+) rad"
+    number = r"free run (\S+) rad · segments of 0.4 s (\S+) rad · noise (\S+) rad"
     page.until(lambda: re.findall(number, page.text(".numbers")) == [tuple(wanted)])
 
 

@@ -156,7 +156,7 @@ def add(
         )
     train, held = parted(measured)
     law: Learned | None = None
-    if reason := _no_help(told, name) or (None if effect else _in_doubt(told)):
+    if reason := _no_help(told, name) or (None if effect else _confounded(told)):
         before = error(held)
         added_effect = AddedEffect(train.profile, None, before, before, reason)
     elif name == LABEL:
@@ -258,13 +258,13 @@ def _no_help(told: dict[str, Any], effect: str) -> str | None:
         known = isinstance(before, float) and isinstance(after, float)
         if one["effect"] == effect and known and after >= before:
             return (
-                "the diagnosis found held-out segments of its fit missed by no less with it "
+                "the diagnosis found the held-out segment error of its fit no smaller with it "
                 f"({before:.2g} → {after:.2g})"
             )
     return None
 
 
-def _in_doubt(told: dict[str, Any]) -> str | None:
+def _confounded(told: dict[str, Any]) -> str | None:
     """Why nothing is added before somebody asks for it by name, a clause; None if nothing is in
     doubt."""
     doubt = told.get("confounder")

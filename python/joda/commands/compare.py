@@ -213,12 +213,14 @@ def _page(comparison: Comparison, drawn: bytes) -> str:
         for one in comparison.curves
     ]
     shown = {
-        "measured and replayed runs, and the force the model has too much": runs,
+        "measured and replayed runs, and the residual force": runs,
         "measured and modelled quasi-static force": curves,
     }
     tables = []
     if runs:
-        tables.append(table(("run", "whole run, RMS", "windows of 0.4 s, RMS", "noise"), runs))
+        tables.append(
+            table(("run", "free-run error, RMS", "segment error (0.4 s), RMS", "noise"), runs)
+        )
     if curves:
         tables.append(table(("curve", "force, RMS", "noise"), curves))
     return page(
@@ -252,7 +254,7 @@ def _picture(measured: Measured, paths: Sequence[Array], rows: Array) -> "Figure
             draw_runs(left, measured.runs, {"model": paths}, joint.unit)
             draw_maps(
                 right,
-                [Replayed("windows of 0.1 s, \u00b1 2 standard deviations", paths, rows)],
+                [Replayed("segments of 0.1 s, \u00b1 2 standard deviations", paths, rows)],
                 joint,
                 unvisited(measured),
             )
@@ -318,7 +320,7 @@ def command(
 def _say_joints(found: Compared) -> None:
     """Errors of all joints of logs of several, a row each, and what is said of each."""
     rows: list[tuple[str, ...]] = []
-    rows.append(("joint", "whole runs", "windows of 0.4 s", "noise", "all joints at once"))
+    rows.append(("joint", "free-run error", "segment error (0.4 s)", "noise", "all joints at once"))
     for name, one in found.joints.items():
         errors = one.rmse, one.rmse_window, one.noise_floor, found.rmse(name)
         rows.append((name, *("" if x is None else f"{x:.3g} {one.unit}" for x in errors)))

@@ -181,7 +181,7 @@ def _after(diagnosis: Diagnosis) -> list[str]:
 def _page(diagnosis: Diagnosis, drawn: bytes) -> str:
     head = ("effect", "where", "how large", "probability", "error held out, before → after")
     parts = [paragraph(diagnosis.summary)]
-    what = "measured and replayed runs, and the force the model has too much"
+    what = "measured and replayed runs, and the residual force"
     parts.append(embedded(drawn, what))
     if diagnosis.effects:
         parts.append(table(head, [_row(one, diagnosis.unit) for one in diagnosis.effects]))
@@ -202,7 +202,7 @@ def _row(found: Finding, unit: str) -> tuple[str, ...]:
 
 
 def _picture(measured: Measured, profile: Profile | None, diagnosis: Diagnosis) -> "Figure":
-    """Runs and their replays, and the force too much, without and with the likeliest effect."""
+    """Runs and their replays, and the residual force, without and with the likeliest effect."""
     from matplotlib.figure import Figure
 
     with house_style():
@@ -219,7 +219,7 @@ def _picture(measured: Measured, profile: Profile | None, diagnosis: Diagnosis) 
         draw_runs(left, measured.runs, {one.label: one.paths for one in models}, joint.unit)
         draw_maps(right, models, joint, diagnosis.unvisited)
         left.suptitle("measured runs and replays", x=0.02, ha="left", fontsize=10)
-        what = "force too much: windows of 0.1 s, \u00b1 2 standard deviations"
+        what = "residual force: segments of 0.1 s, \u00b1 2 standard deviations"
         right.suptitle(what, x=0.02, ha="left", fontsize=10)
         figure.suptitle(diagnosis.summary, x=0.01, ha="left", fontsize=11, wrap=True)
     return figure

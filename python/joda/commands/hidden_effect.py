@@ -181,14 +181,14 @@ def _unseen(before: Comparison, after: Comparison) -> str:
     """The errors on runs that no step has seen."""
     unit = after.unit
     errors = [
-        f"{what} by {old:.3g} → {new:.3g} {unit}"
+        f"{what} {old:.3g} → {new:.3g} {unit}"
         for what, old, new in (
-            ("whole runs", before.rmse, after.rmse),
-            ("windows of 0.4 s", before.rmse_window, after.rmse_window),
+            ("free-run error", before.rmse, after.rmse),
+            ("segment error (0.4 s)", before.rmse_window, after.rmse_window),
         )
         if old is not None and new is not None
     ]
-    return f"Missed are {', '.join(errors)}; the noise is {after.noise_floor:.2g} {unit}."
+    return f"On unseen runs: {', '.join(errors)}; the noise is {after.noise_floor:.2g} {unit}."
 
 
 def _judged(
@@ -238,7 +238,7 @@ def _off(
     if one.direction != seal["direction"]:
         out.append(f"the direction is {seal['direction']}, not {one.direction}")
     if (shared := overlap(one.interval, seal["interval"])) < PLACED:
-        out.append(f"the places overlap by {100 * shared:.0f} % only")
+        out.append(f"the intervals overlap by {100 * shared:.0f} % only")
     off = abs(one.magnitude - seal["magnitude"])
     if off > one.magnitude_error:
         out.append(
@@ -247,7 +247,7 @@ def _off(
     if after is None:
         out.append("nothing was added")
     elif not (_less(after.rmse_window, before.rmse_window) and _less(after.rmse, before.rmse)):
-        out.append("unseen runs are not missed by less with it")
+        out.append("the error on unseen runs is not smaller with it")
     return out
 
 

@@ -321,15 +321,15 @@ def _page(result: Improved, drawn: bytes) -> str:
     done = ["The model's own numbers corrected"] if len(rows) - 1 > count else []
     done += [f"{count} effect{'s' * (count > 1)} added: {added}"] if count else []
     story = (
-        f"{'. '.join(done)}. On what was held out of all fits ({result.held_out}) the error, "
-        f"{what}, is {last:.3g} instead of {first:.3g} {result.unit}; {noise}"
+        f"{'. '.join(done)}. On what was held out of all fits ({result.held_out}) the "
+        f"{what} is {last:.3g} instead of {first:.3g} {result.unit}; {noise}"
         if done
-        else f"The error, {what}, is {first:.3g} {result.unit}; {noise}"
+        else f"The {what} is {first:.3g} {result.unit}; {noise}"
     )
     return page(
         f"{result.joint}: what the model lacked",
         paragraph(story),
-        embedded(drawn, "the falling error, the force too much, the profile, the runs held out"),
+        embedded(drawn, "the falling error, the residual force, the profile, the runs held out"),
         table(head, rows),
         *map(paragraph, _ending(result)),
     )
@@ -349,7 +349,7 @@ def _picture(result: Improved, measured: Measured, held: Measured) -> "Figure":
         if measured.runs:
             maps = [replayed(label, measured.changed(own)) for label, own in models.items()]
             draw_maps(right, maps, last.joint, unvisited(measured))
-            what = "force too much: windows of 0.1 s, \u00b1 2 standard deviations"
+            what = "residual force: segments of 0.1 s, \u00b1 2 standard deviations"
             right.suptitle(what, x=0.02, ha="left", fontsize=10)
         else:
             draw_models(right, measured, models)

@@ -453,7 +453,7 @@ def _say_errors(result: Refined, unit: str) -> None:
     )
     if result.windows:
         first, last = result.windows
-        say(f"The same over windows of 0.4 s: {first:.3g} → {last:.3g} {unit}.")
+        say(f"Segment error (0.4 s horizon): {first:.3g} → {last:.3g} {unit}.")
     if result.checked:
         say(f"On the runs held out: {result.checked[0]:.3g} → {result.checked[1]:.3g} {unit} RMS.")
     for channel, places in result.unseen.items():

@@ -178,7 +178,7 @@ def from_effects(
     listed: Collection[effects.Effect],
     present: Collection[str] | None = None,
     knots: int = 0,
-    table: tuple[int, int] = jaxtable.LEAST,
+    table: tuple[int, int] = jaxtable.MIN_SHAPE,
     dtype: Any = None,
 ) -> Effects:
     """A profile's effects as arrays.

@@ -17,7 +17,7 @@ from joda.field.jaxcubics import Array, cubic, pchip_cubics
 
 register = jax.tree_util.register_dataclass
 
-LEAST = (2, 3)
+MIN_SHAPE = (2, 3)
 """Fewest positions and velocities of a table in JAX."""
 FILLING = 2 * MAX_VALUE
 """Velocity from which on there is filling."""
@@ -72,7 +72,7 @@ def from_effect(effect: LearnedForce | None, size: tuple[int, int], dtype: Any =
     none = LearnedForce(velocities=(-1.0, 0.0, 1.0), y=((0.0, 0.0, 0.0),))
     own = effect or none
     n, m = len(own.positions), len(own.velocities)
-    rows, columns = max(size[0], n, LEAST[0]), max(size[1], m, LEAST[1])
+    rows, columns = max(size[0], n, MIN_SHAPE[0]), max(size[1], m, MIN_SHAPE[1])
     beyond = FILLING * np.arange(1, columns - m + 1)
     y = np.pad(np.array(own.y), ((0, rows - n), (0, columns - m)), mode="edge")
     parts = (own.interval, (*own.positions, *range(2, 2 + rows - n)), (*own.velocities, *beyond), y)

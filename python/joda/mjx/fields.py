@@ -113,7 +113,7 @@ def put_fields(
     *,
     components: int = 0,
     knots: int = 0,
-    table: tuple[int, int] = jaxtable.LEAST,
+    table: tuple[int, int] = jaxtable.MIN_SHAPE,
     effects: Collection[str] = (),
     dtype: Any = None,
 ) -> Fields:

@@ -76,7 +76,10 @@ def draw_growth(
         times = _fastest(models)
         by_joints.append(times[1:] / times[0])
     progress(f"profiles of up to {COMPONENTS[-1]} components")
-    models = [hinges(FEW, "native"), *(hinges(FEW, "joda", profile(n)) for n in COMPONENTS)]
+    models = [
+        hinges(FEW, "native"),
+        *(hinges(FEW, "joda", profile(n)) for n in COMPONENTS),
+    ]
     times = _fastest(models)
     rows, ours = (tuple(map(float, ratios)) for ratios in zip(*by_joints, strict=True))
     growth = Growth(JOINTS, ours, rows, COMPONENTS, tuple((times[1:] / times[0]).tolist()))

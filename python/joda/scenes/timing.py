@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 SWING = 100  # steps of one joint's swing; it moves all the while
-LEAST_SWING = 20  # steps of many joints', so short that a busy machine seldom breaks in
+MIN_SWING = 20  # steps of many joints', so short that a busy machine seldom breaks in
 FINE = time.get_clock_info("thread_time").resolution < 1e-6
 CLOCK = time.thread_time if FINE else time.perf_counter
 """Where the system counts it finely, the time of this thread alone."""
@@ -21,7 +21,7 @@ def swings_in(length: float, model: mujoco.MjModel, callback: Any = None) -> int
 
 def _steps(model: mujoco.MjModel) -> int:
     """Of a swing."""
-    return max(LEAST_SWING, SWING // int(model.nv))
+    return max(MIN_SWING, SWING // int(model.nv))
 
 
 def seconds_per_step(model: mujoco.MjModel, callback: Any = None, repeats: int = 1) -> float:

@@ -127,7 +127,7 @@ def _numbers(now: Replayed | None, before: Replayed | None, unit: str) -> str:
         return shown if f"{first:.3g}" == shown or math.isnan(first) else f"{first:.3g} → {shown}"
 
     return (
-        f"RMS of whole runs {change('rmse')} {unit} · windows of 0.4 s {change('rmse_window')} "
+        f"RMS: free run {change('rmse')} {unit} · segments of 0.4 s {change('rmse_window')} "
         f"{unit} · noise {now.noise_floor:.2g} {unit}"
     )
 
