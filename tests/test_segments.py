@@ -18,6 +18,7 @@ from joda.measured import smoothing
 from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run
+from joda.measured.sensing import Sensing
 
 SIGMA = 2e-4
 """Noise of the encoder, m; the range is 1 m."""
@@ -111,6 +112,19 @@ def test_what_is_let_go_begins_at_rest_and_what_is_flicked_does_not(step):
     assert rests["held"] > 0.9
     assert rests["let go"] > 0.6  # of the others the start is fitted, as of any segment
     assert rests["flicked"] < 0.05
+
+
+def test_what_a_late_force_has_moved_before_the_first_sample_need_not_rest_there():
+    """The force acts later than it was logged: before that it is unknown, and not sampled."""
+    off = []
+    for seed in range(40):
+        late, t = np.random.default_rng(seed).uniform(0.021, 0.039), 0.02 * np.arange(30)
+        run = run_of(0.2 + np.clip(t - late, 0, None) ** 2, seed, 0.02)
+        logged = replace(run, force=np.full(len(t), 2.0), forced=True)
+        right = Sensing(time_delay=late).of(logged)
+        begun = segments_of([right], [SIGMA], 1.0, 0.0, 1.0, STEP, 0.2)
+        off.append((begun.start[0, 1] - 2 * (right.time[0] - late)) / begun.prior_std[0, 1])
+    assert np.max(np.abs(off)) < 4
 
 
 # --- ends of the range

@@ -124,7 +124,9 @@ def segments_of(
             many = len(begins)
             segment = np.searchsorted(begins, index, side="right") - 1
             enough = np.bincount(segment, minlength=many) >= smoothing.MIN_SAMPLES
-            start, prior_std = starts(time, position, time[0] + h * begins, sigma)
+            start, prior_std = starts(
+                time, position, time[0] + h * begins, sigma, may_rest=not run.cut
+            )
             seen = np.minimum(np.searchsorted(index, begins), len(index) - 1)
             # not beyond the end that threw it back
             clear = _inside(*place_noise)[seen] > OUTSIDE_NOISES
@@ -175,13 +177,17 @@ def segments_of(
     )
 
 
-def starts(time: Array, position: Array, at: Array, sigma: float) -> tuple[Array, Array]:
+def starts(
+    time: Array, position: Array, at: Array, sigma: float, may_rest: bool = True
+) -> tuple[Array, Array]:
     """States from which segments begin, and how far the true ones may be from them.
 
     Args:
         time, position: of a run's samples, s and rad or m; shape (n,).
         at: when the segments begin, s, the first with the run; shape (m,).
         sigma: noise of the position, rad or m.
+        may_rest: whether the joint is at rest at first where that is how it looks; one that has
+            just begun to move, before its first sample here, looks so too.
 
     Returns:
         positions and velocities, and their standard deviations; shape (m, 2) each.
@@ -189,7 +195,7 @@ def starts(time: Array, position: Array, at: Array, sigma: float) -> tuple[Array
     begun = smoothing.smooth(time, position, at, sigma)
     start = np.stack([begun.position, begun.velocity], axis=1)
     prior_std = LOOSE * np.stack([begun.position_error, begun.velocity_error], axis=1)
-    if smoothing.begins_at_rest(time, position, sigma):
+    if may_rest and smoothing.begins_at_rest(time, position, sigma):
         start[0, 1], prior_std[0, 1] = 0.0, SURE * begun.velocity_error[0]
     return start, prior_std
 

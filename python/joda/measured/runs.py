@@ -44,6 +44,7 @@ class Run:
         among: whether other joints moved meanwhile, and contacts were looked for along that.
         origin: what was subtracted from the file's times, s.
         unread: names of the file's other columns.
+        cut: whether samples before the first were left out: it may move there already.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Run:
     among: bool = False
     origin: float = 0.0
     unread: tuple[str, ...] = ()
+    cut: bool = False
 
     def part(self, samples: slice | NDArray[np.intp]) -> Self:
         """The run with some of its samples only."""
@@ -90,12 +92,14 @@ class QuasiStatic:
         position: rad or m, in the order measured: the direction of travel follows from it.
         force: that slowly moves the joint there, N·m or N.
         unread: names of the file's other columns.
+        cut: whether samples before the first were left out: it may move there already.
     """
 
     name: str
     position: Array
     force: Array
     unread: tuple[str, ...] = ()
+    cut: bool = False
 
 
 def known(run: Run) -> list[NDArray[np.intp]]:

@@ -55,7 +55,7 @@ class Sensing:
         if whole or not late:
             return right
         inside = (at >= run.time[0]) & (at <= run.time[-1])
-        return right.part(np.flatnonzero(inside))
+        return replace(right.part(np.flatnonzero(inside)), cut=not inside[0])
 
 
 RIGHT = Sensing()
