@@ -201,7 +201,7 @@ def test_where_other_ends_explain_whole_runs_nothing_else_is_asked(
     monkeypatch.setattr(verdict, "_by_whole_runs", lambda measured, ranking, stops, plain: plain)
     found = diagnose(model, "slide", runs)
     assert found.verdict == said
-    assert ("and by 4.0 times with other ends: solreflimit" in found.summary) == (times == 4.0)
+    assert ("and 4.0 times with other ends: solreflimit" in found.summary) == (times == 4.0)
 
 
 @pytest.mark.flaky(reruns=3)  # of eight draws a pair of stops explains one by chance

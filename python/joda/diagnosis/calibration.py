@@ -18,6 +18,7 @@ from joda.diagnosis.findings import Correction
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.diagnosis.settings import SETTINGS
+from joda.estimation.base_model import BASE_STD, BaseModel
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
 from joda.estimation.nuisance import (
     NuisanceName,
@@ -34,6 +35,8 @@ Array = NDArray[np.float64]
 
 ALSO_AN_EFFECT: NuisanceName = "force_offset"
 """A number in whose place an effect always explains as much: a constant force."""
+ONE_RATIO: tuple[NuisanceName, ...] = ("mass", "force_scale")
+"""Numbers of which one is told, unless the model's own resistances are said to be right."""
 MIN_FACTOR = 1e-3
 """Below which a factor of the model's own strengths counts as that."""
 LONGEST = 1.5
@@ -185,6 +188,13 @@ class Calibrator:
         return _longer(measured, found) if found and found.alone else found
 
 
+def known_as_ratio(names: Collection[NuisanceName], base: BaseModel) -> tuple[NuisanceName, ...]:
+    """Mass and force, if both may be off and only their ratio is known: both by one factor are the
+    same motion, but for the model's own resistances, of which little is known."""
+    known = np.any(base.unknowns.prior_std < BASE_STD)
+    return ONE_RATIO if set(ONE_RATIO) <= set(names) and not known else ()
+
+
 def _longer(measured: Measured, found: Calibration) -> Calibration:
     """The same fitted on in long segments, in which a small error shows; as it was where its
     numbers are others there."""
@@ -224,11 +234,12 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
         return None
     names, best = every.names, whole
     while names:
-        tried = [tuple(one for one in names if one != name) for name in _spared(names, best)]
-        fits = [found.near(fewer, (names, best)) for fewer in tried]
-        fit, fewer = min(zip(fits, tried, strict=True), key=lambda pair: pair[0].loss)
+        fit, fewer = found.without_one(names, best, _spared(names, best))
         if fit.loss - best.loss > SETTINGS.corrections.number_loss:
-            break
+            ratio = known_as_ratio(names, baseline.base)
+            if not ratio or not found.calm(best.loss):
+                break
+            fit, fewer = found.without_one(names, best, ratio)
         best, names = fit, fewer
     if first - best.loss < SETTINGS.corrections.body_gain + found.price * len(names):
         return None
@@ -278,6 +289,21 @@ class _Search:
     def price(self) -> float:
         """Of a number, in loss."""
         return float(np.log(max(self.baseline.estimator.samples, 2.0)))
+
+    def calm(self, loss: float) -> bool:
+        """Whether what a fit leaves is noise, or hardly anything of what the model leaves."""
+        samples = max(self.baseline.estimator.samples, 1.0)
+        left, before = excess(loss, samples), excess(self.baseline.fit.loss, samples)
+        corrections = SETTINGS.corrections
+        return left < max(corrections.calm_excess, corrections.calm_share * before)
+
+    def without_one(
+        self, names: tuple[NuisanceName, ...], fit: Fit, any_of: Sequence[NuisanceName]
+    ) -> tuple[Fit, tuple[NuisanceName, ...]]:
+        """The likeliest fit from another with one of its numbers less, and which are left."""
+        fewer = [tuple(one for one in names if one != name) for name in any_of]
+        fits = [self.near(left, (names, fit)) for left in fewer]
+        return min(zip(fits, fewer, strict=True), key=lambda pair: pair[0].loss)
 
     def at_most(self, names: tuple[NuisanceName, ...]) -> Fit:
         """Some of the numbers, from the model as it was fitted, at once: no better than `fitted`,
@@ -371,17 +397,14 @@ def _concluded(
         fewer = replace(fit, x=own.taken(fit.x, kept))
         return _concluded(found, kept, fewer, whole) if kept else None
     loss = fit.loss + found.price * len(names)
-    samples = max(estimator.samples, 1.0)
-    left, before = excess(fit.loss, samples), excess(baseline.fit.loss, samples)
     base = own.base
     off = np.log(np.maximum(fit.x[: base.count], MIN_FACTOR)) / base.unknowns.prior_std
     if "force_scale" in names and len(off):  # masses and strengths may all be off by one factor
         off = off - off.mean()
     usual = float(off @ off) < SETTINGS.corrections.surprising**2  # else something resists
-    calm = left < max(SETTINGS.corrections.calm_excess, SETTINGS.corrections.calm_share * before)
     alone = (
         usual
-        and calm
+        and found.calm(fit.loss)
         and not any(
             one.fit.loss + one.cost
             < loss - SETTINGS.corrections.equal_numbers * (one.hypothesis.effect != HEAVIER)

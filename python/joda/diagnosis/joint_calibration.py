@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from joda.diagnosis.baseline import Baseline, fit_baseline
-from joda.diagnosis.calibration import Calibration, as_recorded, covariance
+from joda.diagnosis.calibration import Calibration, as_recorded, covariance, known_as_ratio
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.diagnosis.settings import SETTINGS
 from joda.estimation.nuisance import nuisances_of, with_numbers
@@ -36,7 +36,8 @@ def needed(
     hypothesis = replace(hypothesis, trials=np.vstack([hypothesis.trials, effect.x]))
     while kept.names:
         tried = []
-        for name in kept.names:
+        ratio = known_as_ratio(kept.names, baseline.base)
+        for name in ratio or kept.names:
             fewer = kept.only(tuple(one for one in kept.names if one != name))
             without = fit_baseline(fewer.of(measured), length)
             if again := without.fit_hypothesis(hypothesis):
@@ -44,7 +45,7 @@ def needed(
         if not tried:
             break
         least, fewer = min(tried, key=lambda pair: pair[0])
-        if least > best + SETTINGS.corrections.number_loss:
+        if least > best + SETTINGS.corrections.number_loss and not ratio:
             break
         best, kept = min(best, least), fewer
     return kept if kept.names else None
