@@ -36,7 +36,7 @@ def needed(
     hypothesis = replace(hypothesis, trials=np.vstack([hypothesis.trials, effect.x]))
     while kept.names:
         tried = []
-        ratio = known_as_ratio(kept.names, baseline.base)
+        ratio = known_as_ratio(kept.names, found.numbers.base)
         for name in ratio or kept.names:
             fewer = kept.only(tuple(one for one in kept.names if one != name))
             without = fit_baseline(fewer.of(measured), length)

@@ -262,7 +262,7 @@ class Replayer:
             begins = replace(begins, exactly=True)
         found = self._fitted_start(begins, np.zeros(2), FIRST_HORIZON)
         poor = POOR * min(len(time), begins.count)
-        rests = smoothing.begins_at_rest(time, position, sigma)
+        rests = not run.cut and smoothing.begins_at_rest(time, position, sigma)
         if found.square > poor and not rests and self._at_an_end(position[:FIRST_HORIZON], sigma):
             wide = replace(begins, deviation=WIDER * error)
             sought = self._fitted_start(wide, self._sought_start(wide), len(time))
