@@ -50,6 +50,26 @@ def test_a_number_that_stood_in_for_an_effect_is_given_back(found):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("trust", [{}, {"frictionloss": 0.05, "damping": 0.05}])
+def test_of_masses_and_forces_the_ratio_is_known_unless_the_resistances_are(tmp_path, trust):
+    """Friction and damping are 1.6 times the model's, or all else is 1.6 times less."""
+    rng, lighter, more = np.random.default_rng(), 0.6, 1.6
+    _, mass = found_of(tmp_path, rng, mass=lighter)
+    slow = lambda q, v: PULL - (more - 1) * (0.15 * np.tanh(v / 0.001) + 0.1 * v)  # noqa: E731
+    measured, _ = found_of(tmp_path, rng, trust, mass=lighter, extra=slow)
+    every = nuisances_of(measured, fit_baseline(measured).base)
+    both = replace(
+        mass,
+        numbers=every.only(("mass", "force_scale")),
+        fit=replace(mass.fit, x=np.array([1.0, 1.0, np.log(lighter / more), np.log(1 / more)])),
+        covariance=1e-4 * np.eye(2),
+        others=((), ()),
+    )
+    left = needed(*fitted(measured, both))
+    assert ({"mass", "force_scale"} <= set(left.names)) == bool(trust)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("mass",), ("mass", "position_offset")])
 def test_what_is_left_is_fitted_beside_the_effect(found, names):
     measured, numbers = found

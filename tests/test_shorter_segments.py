@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from joda.diagnosis.baseline import fit_baseline, fit_segments
-from joda.diagnosis.shorter_segments import TELLING, telling
+from joda.diagnosis.settings import SETTINGS
+from joda.diagnosis.shorter_segments import telling
 from joda.diagnosis.verdict import diagnosed
 from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run
+
+TELLING = SETTINGS.search.most_missed
 
 INERTIA, FRICTION, DAMPING, HIGH = 3e-5, 0.004, 3e-4, 4.7
 SIGMA, FORCE_SIGMA, EVERY = 5e-4, 2e-4, 2e-3

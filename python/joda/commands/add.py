@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from joda.commands.diagnose import check_effect
 from joda.diagnosis.adding import AddedEffect, Error, add_effect, by_all, error, with_stop
 from joda.diagnosis.applied_corrections import from_report
 from joda.diagnosis.end_stops import stops_described
@@ -29,7 +28,7 @@ from joda.diagnosis.outcome import (
     scene_files,
 )
 from joda.diagnosis.overlap import places
-from joda.diagnosis.phrases import extrapolated, named
+from joda.diagnosis.phrases import check_effect, extrapolated, named
 from joda.diagnosis.split import held_out, in_blocks, parted
 from joda.errors import JodaError
 from joda.files import write_together

@@ -10,9 +10,8 @@ import typer
 
 from joda.diagnosis.findings import Diagnosis, Finding
 from joda.diagnosis.outcome import NO_TRUST, read_runs
-from joda.diagnosis.phrases import LEARN, effect_names, percent
+from joda.diagnosis.phrases import LEARN, check_effect, percent
 from joda.diagnosis.verdict import diagnosed
-from joda.errors import JodaError
 from joda.files import check_targets, write_text, write_together
 from joda.measured.driven import ALL, named_joints
 from joda.measured.maps import draw_maps, draw_models, draw_runs, replayed
@@ -140,13 +139,6 @@ def diagnose_all(
             own = {joint: loads(one.to_json()) for joint, one in found.items()}
             write_text(Path(json), dumps({"joints": own}, indent=2, ensure_ascii=False) + "\n")
     return found
-
-
-def check_effect(name: str, templates: Collection[str] = ()) -> None:
-    """Raises JodaError if there is no effect of that name, nor a template."""
-    every = dict.fromkeys((*effect_names(), *templates))
-    if name not in every:
-        raise JodaError(f"no effect '{name}'; there are {', '.join(every)}.")
 
 
 def sentences(diagnosis: Diagnosis) -> list[str]:

@@ -134,7 +134,7 @@ def command(
     effort: options.Efforts = None,
     resume: options.Resume = False,
     estimate: Annotated[
-        bool, typer.Option("--estimate", help="Only say what asking a model will about cost.")
+        bool, typer.Option("--estimate", help="Only estimate what asking a model will cost.")
     ] = False,
     review: Annotated[
         bool,

@@ -159,7 +159,7 @@ def refine(
     if twice := _both(runs, check):
         raise JodaError(f"{twice}: is fitted too; what is held out (--check) must not be.")
     if unknown := set(fit) - set(KINDS):
-        raise JodaError(f"fit: '{sorted(unknown)[0]}' is none of {', '.join(KINDS)}.")
+        raise JodaError(f"--fit: '{sorted(unknown)[0]}' is none of {', '.join(KINDS)}.")
     if not runs:
         raise JodaError("no runs; give at least one CSV file with time and position.")
     compiled = load_model(source)
@@ -180,7 +180,9 @@ def refine(
     )
     measured, held_out, servo = fitted.read, kept.read, fitted.servo or kept.servo
     if _of_one_kind([*measured, *held_out]) and (moving := set(fit) - set(STILL)):
-        raise JodaError(f"fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out.")
+        raise JodaError(
+            f"--fit: '{sorted(moving)[0]}' is not in quasi-static curves, leave it out."
+        )
     profiles = profiles_of(compiled)
     if name not in profiles:
         raise JodaError(
@@ -385,12 +387,16 @@ def command(
     fit: Annotated[
         str,
         typer.Option(
-            help="What may change, with commas: values, intervals, strengths, damping_ratio, "
-            "inertia, gravity."
+            help="What may change, with commas: values, intervals, strengths (one factor for "
+            "each channel), damping_ratio, inertia, gravity."
         ),
     ] = "values,intervals",
     free_shape: Annotated[
-        bool, typer.Option("--free-shape", help="Let curves change sign, rising parts fall.")
+        bool,
+        typer.Option(
+            "--free-shape",
+            help="Let curves change their sign, and rising parts become falling ones.",
+        ),
     ] = False,
     finer: Annotated[
         int, typer.Option(min=0, max=3, help="So many times control points are doubled first.")

@@ -129,13 +129,13 @@ def command(
     output: options.Scene,
     force: Annotated[
         bool,
-        typer.Option("--force", help="Overwrite the output; replace a mass that can be, too."),
+        typer.Option("--force", help="Overwrite the output; replace a plausible mass too."),
     ] = False,
 ) -> None:
     """Give what a joint moves a mass estimated from its size.
 
-    For models whose mass cannot be, as `joda context` and `joda generate` say. Rough, within a
-    factor of three; a scale is better. Example:
+    For models whose mass is not plausible, as `joda context` and `joda generate` say. Rough,
+    within a factor of three; a scale is better. Example:
 
         joda weigh out/oven.xml --joint door -o weighed.xml --force
     """

@@ -10,6 +10,7 @@ import numpy as np
 
 from joda.diagnosis.adding import Error
 from joda.diagnosis.applied_corrections import AppliedCorrections
+from joda.diagnosis.settings import SETTINGS
 from joda.files import check_targets, named_like
 from joda.measured.corrections_file import corrections_beside, corrections_text
 from joda.measured.errors import MULTIPLE
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 NO_TRUST: Mapping[str, float] = MappingProxyType({})
 """Nothing is told of how far off a number may be."""
-PARTED = 5.0
-"""Whole runs that are missed by so many times more than segments have parted from the measured."""
 
 
 def read_runs(
@@ -123,7 +122,7 @@ def parting(after: Error, noise: float, blocks: bool) -> list[str]:
     """A sentence where what was held out parts as a whole although segments of it do not."""
     if after.whole is None or after.window > MULTIPLE * noise:
         return []
-    if after.whole < PARTED * max(after.window, noise):
+    if after.whole < SETTINGS.whole_runs.parted * max(after.window, noise):
         return []
     return [
         f"Free runs{' of blocks' if blocks else ''} still part from the measured ones although "

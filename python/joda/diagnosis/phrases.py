@@ -1,10 +1,12 @@
 """Effects in words: what is missing, where, how much, and what shows it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from joda.diagnosis.settings import SETTINGS
 from joda.effects import CHANNEL_EFFECTS, EFFECTS
 from joda.effects.base import Kind
+from joda.errors import JodaError
 from joda.profile import Joint
 from joda.template import Template, read_templates
 
@@ -27,10 +29,6 @@ LEARN = (
     "What has no name can be learned from these runs: joda add ... --effect learned_force, which "
     "adds the law only if runs held out of the fit are clearly better with it."
 )
-
-
-SUREST = 0.99
-"""Highest probability that is said."""
 
 
 def effect_names() -> tuple[str, ...]:
@@ -79,7 +77,7 @@ def named(effect: str, templates: Mapping[str, Template] | None = None) -> str:
 
 def percent(probability: float) -> str:
     """Of an effect, never said to be certain."""
-    return f"{100 * min(probability, SUREST):.0f} %"
+    return f"{100 * min(probability, SETTINGS.naming.surest):.0f} %"
 
 
 def placed(interval: tuple[float, float], joint: Joint) -> str:
@@ -148,3 +146,10 @@ def _lower(sentence: str) -> str:
     """A sentence as a clause; only the first of several."""
     first = sentence.split(". ")[0].rstrip(".")
     return first[0].lower() + first[1:]
+
+
+def check_effect(name: str, templates: Collection[str] = ()) -> None:
+    """Raises JodaError if there is no effect of that name, nor a template."""
+    every = dict.fromkeys((*effect_names(), *templates))
+    if name not in every:
+        raise JodaError(f"no effect '{name}'; there are {', '.join(every)}.")

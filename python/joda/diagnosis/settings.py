@@ -122,6 +122,7 @@ class NamingSettings:
         min_variation: how much a curve varies at least that differs along the way (its mean).
         level_deviation: by how much it is off its median where it is level (that).
         reversal_noises: by how much a joint must come back to have been moved both ways (noises).
+        surest: highest probability that is said (probability).
     """
 
     named: int = 5
@@ -149,6 +150,7 @@ class NamingSettings:
     min_variation: float = 0.5
     level_deviation: float = 0.25
     reversal_noises: float = 6.0
+    surest: float = 0.99
 
 
 @dataclass(frozen=True)
@@ -172,6 +174,8 @@ class WholeRunSettings:
             the joint.
         free_share: part of all samples that free runs must hold, before an end, to tell of all.
         simulators_apart: part of a strength by which another simulator's may differ.
+        parted: how many times more than segments whole runs must be missed by to have parted from
+            what was measured.
     """
 
     max_multiple: float = 5.0
@@ -185,6 +189,7 @@ class WholeRunSettings:
     before_end: float = 0.3
     free_share: float = 0.9
     simulators_apart: float = 5e-3
+    parted: float = 5.0
 
 
 @dataclass(frozen=True)
@@ -285,6 +290,10 @@ class SearchSettings:
             (per sample).
         stepping_tried: what a first fit in such steps leaves at most, for more of them to be made
             (per sample).
+        shorter: how much shorter segments are in which what is unexplained is asked again.
+        confirmed_in: how much longer than these those are in which what they tell must hold.
+        most_missed: how many segments that are missed most, and how many others, are asked there
+            (segments).
     """
 
     noise_loss: float = 1.5
@@ -301,6 +310,9 @@ class SearchSettings:
     stepping_excess: float = 0.1
     stepping_tried: float = 1.0
     runaway: float = 1.0
+    shorter: float = 9.0
+    confirmed_in: tuple[float, ...] = (2.0, 3.0)
+    most_missed: int = 50
 
 
 @dataclass(frozen=True)
@@ -348,6 +360,7 @@ class ErrorSettings:
             normalised.
         unvisited_samples: part of the samples at either end of what was visited that do not count
             as visited.
+        unknown_end: error of an interval's end of which nothing tells, normalised.
     """
 
     known_law: float = 0.01
@@ -365,6 +378,7 @@ class ErrorSettings:
     at_end: float = 0.02
     clearly_visited: float = 0.03
     unvisited_samples: float = 0.005
+    unknown_end: float = 3**-0.5
 
 
 @dataclass(frozen=True)
@@ -398,6 +412,10 @@ class AddingSettings:
             did not.
         equal_error: how many times the error with an effect one may leave that is likelier, to take
             its place.
+        whole_runs: fewest runs or curves of which some are held out whole; of fewer, parts of each
+            (runs).
+        shown: part of what the run that is missed most shows, of one that is to judge.
+        blocks: fewest blocks in which the joint moves, of runs held out in parts (blocks).
     """
 
     chance: float = 0.05
@@ -418,6 +436,9 @@ class AddingSettings:
     max_error: float = 0.95
     max_error_unlikely: float = 0.8
     equal_error: float = 1.05
+    whole_runs: int = 4
+    shown: float = 0.05
+    blocks: int = 8
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,6 @@ from joda.measured.measured_joint import Measured
 
 Array = NDArray[np.float64]
 
-SHORTER, FOLLOWED = 9.0, (2.0, 3.0)
-"""How much shorter those are in which what is unexplained is asked first, and how much longer than
-these those in which what they tell must hold."""
-TELLING = 50
-"""Of how many segments that are missed most, and of how many others all is asked there."""
-
 
 def runs_away(found: Evidence, selection: Selection) -> bool:
     """Whether no effect follows the joint in usual segments, by what they leave there."""
@@ -50,13 +44,16 @@ def in_shorter(
         strictness: see `decide`.
     """
     longest, near = usual.estimator.segments.length, usual.fit.x
-    length = max(longest / SHORTER, shortest(measured.runs))
-    if length * FOLLOWED[-1] > longest or not segments_for(measured, length).usable.any():
+    length = max(longest / SETTINGS.search.shorter, shortest(measured.runs))
+    if (
+        length * SETTINGS.search.confirmed_in[-1] > longest
+        or not segments_for(measured, length).usable.any()
+    ):
         return None
     ranking = ask(fit_segments(measured, partial(telling, measured, length, near), near))
     found = [evidence(ranking)]
     selection = decide(found[0], strictness)
-    for longer in FOLLOWED:
+    for longer in SETTINGS.search.confirmed_in:
         if selection.verdict == "adequate" or not hopeful(ranking):
             return None
         first = ranking.candidates[0]
@@ -78,8 +75,8 @@ def telling(measured: Measured, length: float, near: Array, *, fine: bool) -> Se
     squares = estimator.begun(base.simulator, near).squares
     each = np.where(estimator.counts, squares / np.maximum(segments.count, 1), -np.inf)
     order = np.argsort(-each)[: np.count_nonzero(estimator.counts)]
-    others = np.sort(order[TELLING:])
-    every = max(len(others) // TELLING, 1)
+    others = np.sort(order[SETTINGS.search.most_missed :])
+    every = max(len(others) // SETTINGS.search.most_missed, 1)
     kept = np.zeros(len(each), bool)
-    kept[order[:TELLING]] = kept[others[::every]] = True
+    kept[order[: SETTINGS.search.most_missed]] = kept[others[::every]] = True
     return segments.only(kept)

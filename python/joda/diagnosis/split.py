@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.shape_refinement import LONGEST
 from joda.estimation.estimator import SegmentEstimator
 from joda.estimation.problem import joint_model_for, segments_for
@@ -27,14 +28,8 @@ from joda.measured.runs import Run
 
 Flags = NDArray[np.bool_]
 
-MIN_RUNS = 4
-"""Runs or curves of which some are held out whole; of fewer, parts of each."""
-SHOWS = 0.05
-"""Part of what the run that is missed most shows; one that is to judge shows more."""
 LENGTHS = (2.0, 1.0, 0.5, 0.25)
 """Of blocks, in segments of the diagnosis: the longest of which there are enough are taken."""
-MIN_BLOCKS = 8
-"""Blocks in which the joint moves."""
 SAMPLES = 12
 """Of a block at the least, where the run has as many."""
 NOISES, TRAVEL = 10.0, 0.01
@@ -73,10 +68,10 @@ def held_blocks(measured: Measured, judges: Segments | None = None) -> list[Bloc
     """
     runs = [Block(k, slice(0, len(run.time))) for k, run in enumerate(measured.runs)]
     moving = [block for block in runs if _moves(measured, block)]
-    if len(moving) >= MIN_RUNS:
+    if len(moving) >= SETTINGS.adding.whole_runs:
         missed = _missed(measured, judges or segments_for(measured, LONGEST, fine=False))
         ranked = sorted(moving, key=lambda block: -missed[block.run])
-        third = 2 if missed[ranked[2].run] > SHOWS * missed.max() else 1
+        third = 2 if missed[ranked[2].run] > SETTINGS.adding.shown * missed.max() else 1
         return sorted(ranked[third::3], key=moving.index)
     length = (judges or segments_for(measured)).length
     for factor in LENGTHS:
@@ -84,7 +79,7 @@ def held_blocks(measured: Measured, judges: Segments | None = None) -> list[Bloc
             block for k, run in enumerate(measured.runs) for block in _cut(k, run, factor * length)
         ]
         moving = [block for block in blocks if _moves(measured, block)]
-        if len(moving) >= MIN_BLOCKS:
+        if len(moving) >= SETTINGS.adding.blocks:
             break
     return (moving if len(moving) > 1 else blocks)[1::4]
 
@@ -92,7 +87,7 @@ def held_blocks(measured: Measured, judges: Segments | None = None) -> list[Bloc
 def held_segments(measured: Measured, segments: Segments) -> Flags:
     """Which of the segments of these measurements are held out, by their middles; shape (m,)."""
     if not measured.runs:
-        few = len(measured.curves) < MIN_RUNS
+        few = len(measured.curves) < SETTINGS.adding.whole_runs
         return np.asarray(np.arange(len(segments.at)) % 4 == 2 if few else segments.run % 4 == 3)
     held = np.zeros(len(segments.at), bool)
     middle = segments.time[segments.rows[np.arange(len(held)), segments.count // 2]]
@@ -126,7 +121,7 @@ def held_out(measured: Measured, held: Measured) -> str:
 def _cut(number: int, run: Run, length: float) -> list[Block]:
     """A run in blocks of about some length (s), of as many samples each."""
     n = len(run.time)
-    most = max(n // SAMPLES, min(MIN_RUNS, n // smoothing.MIN_SAMPLES), 1)
+    most = max(n // SAMPLES, min(SETTINGS.adding.whole_runs, n // smoothing.MIN_SAMPLES), 1)
     count = int(np.clip(round(float(np.ptp(run.time)) / length), 1, most))
     edges = np.arange(count + 1) * n // count
     return [Block(number, slice(int(a), int(b))) for a, b in pairwise(edges)]
@@ -177,7 +172,7 @@ def _of(measured: Measured, blocks: list[Block]) -> Measured:
 
 def _parted_curves(measured: Measured) -> tuple[Measured, Measured]:
     curves, ways = measured.curves, (False, True)
-    if len(curves) >= MIN_RUNS:
+    if len(curves) >= SETTINGS.adding.whole_runs:
         parts = [[one for k, one in enumerate(curves) if (k % 4 == 3) == way] for way in ways]
     else:
         parts = [[one.part(_held(one) == way) for one in curves] for way in ways]
@@ -187,5 +182,5 @@ def _parted_curves(measured: Measured) -> tuple[Measured, Measured]:
 def _held(curve: QuasiStaticComparison) -> Flags:
     """Which samples of a curve are held out, shape (n,)."""
     n = len(curve.direction)
-    stretch = np.arange(n) * min(STRETCHES, max(n // STRETCH, MIN_RUNS)) // n
+    stretch = np.arange(n) * min(STRETCHES, max(n // STRETCH, SETTINGS.adding.whole_runs)) // n
     return np.asarray(stretch % 4 == 2)

@@ -46,8 +46,6 @@ SHAPE = {
     SETTINGS.tolerances.known_shape: ERRORS.known_shape,
 }
 """Part of its size by which an effect's law may differ from its kind, by what is known of it."""
-UNKNOWN_END = 3**-0.5
-"""The same of the interval's other end, where the other end of the range tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -263,7 +261,7 @@ def _restitution(baseline: Baseline, found: FittedHypothesis) -> Uncertainty:
     law = _of_its_law(found) * size
     error = float(np.hypot(best_ratio(whole, segments, base, sides)[1], law))
     known = (side in sides or (side in told and not told[side].may_be(size)) for side in (-1, 1))
-    low, high = (ERRORS.at_end if there else UNKNOWN_END for there in known)
+    low, high = (ERRORS.at_end if there else ERRORS.unknown_end for there in known)
     return Uncertainty(error, (low, high))
 
 

@@ -204,7 +204,7 @@ def _places(comparison: Comparison) -> Iterator[str]:
             "load": f"under a load of {a:.3g} to {b:.3g} {force}",
         }[place.by]
         if place.force is None:
-            how = "without a force of one sign"
+            how = "where the mean residual force is within its error of zero"
         else:
             much = "much" if place.force > 0 else "little"
             how = (

@@ -158,7 +158,7 @@ def command(
     """Run the paper's cases against both its baselines.
 
     Leaves a table, and a gallery of pictures. Each case has a number that says what its object
-    does; a profile and the baselines fitted to it are parted where the numbers of all seeds are.
+    does; the profile differs from the fitted baselines where the numbers of all seeds do.
     Example:
 
         joda experiments switch --seeds 1 -o experiments
