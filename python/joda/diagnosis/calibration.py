@@ -241,6 +241,7 @@ def _calibrated(found: "_Search", beside: bool) -> Calibration | None:
                 break
             fit, fewer = found.without_one(names, best, ratio)
         best, names = fit, fewer
+    best, names = found.exchanged(names, best, whole)
     if first - best.loss < SETTINGS.corrections.body_gain + found.price * len(names):
         return None
     own = every.only(names)
@@ -289,6 +290,23 @@ class _Search:
     def price(self) -> float:
         """Of a number, in loss."""
         return float(np.log(max(self.baseline.estimator.samples, 2.0)))
+
+    def exchanged(
+        self, names: tuple[NuisanceName, ...], fit: Fit, whole: Fit
+    ) -> tuple[Fit, tuple[NuisanceName, ...]]:
+        """A fit and its numbers, or the likeliest with another number in the place of one: that was
+        held while others could still stand in for it. `whole` is the fit of all numbers."""
+        rest = [name for name in self.every.names if name not in names]
+        if fit.loss - whole.loss < SETTINGS.corrections.tried_loss or not rest:
+            return fit, names
+        others = [
+            tuple(one for one in self.every.names if one == other or (one in names and one != name))
+            for name in names
+            for other in rest
+        ]
+        fits = [self.near(instead, (self.every.names, whole)) for instead in others]
+        pairs = [(fit, names), *zip(fits, others, strict=True)]
+        return min(pairs, key=lambda pair: pair[0].loss)
 
     def calm(self, loss: float) -> bool:
         """Whether what a fit leaves is noise, or hardly anything of what the model leaves."""
