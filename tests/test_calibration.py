@@ -139,6 +139,16 @@ def test_a_zero_is_told_by_where_an_end_stopped_the_joint(seed):
 
 
 @pytest.mark.slow
+def test_a_zero_that_was_held_first_is_exchanged_for_what_stood_in_for_it(seed=1801374956):
+    """A constant force stands in for the zero of a joint that gravity pulls, but worse."""
+    case = draw(seed, None, forced=True, family="field")
+    measured, right = read(case)[0], case.seal["wrong"]["position_offset"]
+    found = Calibrator(measured).numbers(fit_baseline(measured))
+    assert found is not None and found.names == ("position_offset",)
+    assert found.fit.x[-1] == pytest.approx(right, rel=0.05)
+
+
+@pytest.mark.slow
 @pytest.mark.sweep(2, "one number")
 def test_an_offset_of_the_force_is_told(tmp_path, rng):
     offset = float(rng.choice([-1, 1]) * rng.uniform(0.05, 0.12))

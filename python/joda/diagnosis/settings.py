@@ -292,6 +292,7 @@ class SearchSettings:
             (per sample).
         shorter: how much shorter segments are in which what is unexplained is asked again.
         confirmed_in: how much longer than these those are in which what they tell must hold.
+        confirmed_last: the same, of those in which it must hold last.
         most_missed: how many segments that are missed most, and how many others, are asked there
             (segments).
     """
@@ -311,7 +312,8 @@ class SearchSettings:
     stepping_tried: float = 1.0
     runaway: float = 1.0
     shorter: float = 9.0
-    confirmed_in: tuple[float, ...] = (2.0, 3.0)
+    confirmed_in: float = 2.0
+    confirmed_last: float = 3.0
     most_missed: int = 50
 
 

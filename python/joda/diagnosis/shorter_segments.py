@@ -43,17 +43,14 @@ def in_shorter(
         closer_asked: what ranks the best of that again, in longer segments.
         strictness: see `decide`.
     """
-    longest, near = usual.estimator.segments.length, usual.fit.x
-    length = max(longest / SETTINGS.search.shorter, shortest(measured.runs))
-    if (
-        length * SETTINGS.search.confirmed_in[-1] > longest
-        or not segments_for(measured, length).usable.any()
-    ):
+    search, longest, near = SETTINGS.search, usual.estimator.segments.length, usual.fit.x
+    length = max(longest / search.shorter, shortest(measured.runs))
+    if length * search.confirmed_last > longest or not segments_for(measured, length).usable.any():
         return None
     ranking = ask(fit_segments(measured, partial(telling, measured, length, near), near))
     found = [evidence(ranking)]
     selection = decide(found[0], strictness)
-    for longer in SETTINGS.search.confirmed_in:
+    for longer in (search.confirmed_in, search.confirmed_last):
         if selection.verdict == "adequate" or not hopeful(ranking):
             return None
         first = ranking.candidates[0]
