@@ -174,7 +174,6 @@ def command(
     if warp:
         _bench_warp(scene, worlds or (), as_json)
         return
-
     with spinner("bench") as progress:
         rows = bench(scene, progress=progress)
     if as_json:
@@ -195,9 +194,6 @@ def _bench_plot(plot: Path, force: bool, as_json: bool) -> None:
 
 def _bench_warp(scene: Path | None, worlds: Sequence[int], as_json: bool) -> None:
     """`joda bench --warp`."""
-    from joda.plugin import load
-
-    load()
     from joda.warp import quiet
     from joda.warp.bench import WORLDS
     from joda.warp.bench import bench as run

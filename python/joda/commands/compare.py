@@ -4,10 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from json import dumps, loads
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from joda.files import check_targets, write_text, write_together
@@ -271,12 +270,8 @@ def command(
     runs: options.Runs,
     joint: options.Joints = None,
     as_json: options.JsonFile = None,
-    report: Annotated[
-        Path | None, typer.Option(help="Write an HTML page with pictures to this file.")
-    ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
-    ] = None,
+    report: options.Report = None,
+    output: options.Picture = None,
     corrections: options.Corrections = None,
     passive: options.Passive = False,
     force: options.Force = False,

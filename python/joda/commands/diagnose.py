@@ -223,9 +223,7 @@ def command(
     joint: options.Joints = None,
     as_json: options.JsonFile = None,
     report: options.Report = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
-    ] = None,
+    output: options.Picture = None,
     exclude: Annotated[
         list[str] | None, typer.Option(help="An effect that is not considered.")
     ] = None,

@@ -92,14 +92,12 @@ class QuasiStatic:
         position: rad or m, in the order measured: the direction of travel follows from it.
         force: that slowly moves the joint there, N·m or N.
         unread: names of the file's other columns.
-        cut: whether samples before the first were left out: it may move there already.
     """
 
     name: str
     position: Array
     force: Array
     unread: tuple[str, ...] = ()
-    cut: bool = False
 
 
 def known(run: Run) -> list[NDArray[np.intp]]:

@@ -17,14 +17,10 @@ from joda.propose.sheet import Entry, sheet
 from joda.scenes.model_cache import loading_once
 
 Advance = Callable[[int, int, str], None]
-
-
 Results = dict[str, Generated | JodaError]
-
 
 SHEET = "sheet.html"
 """The contact sheet."""
-
 
 BOTH_ENDS = Pictures(2, (480, 360))
 """Pictures of a joint that nobody looks at but the sheet, which shows them half as large."""

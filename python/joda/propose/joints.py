@@ -14,7 +14,6 @@ from joda.scenes.model import joint_name, joint_type, load_model
 MODELS = (".xml", ".urdf")
 """How names of models end."""
 
-
 NO_RANGE = (
     "passed over, as it has no range, over which a profile is: if it is to have one, give it a "
     'range="0 1.5", in a URDF a <limit> and another type than continuous.'

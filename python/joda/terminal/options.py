@@ -37,6 +37,9 @@ Joints = Annotated[
     ),
 ]
 Report = Annotated[Path | None, typer.Option(help="Write an HTML page with pictures to this file.")]
+Picture = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Write the picture (PNG) to this file.")
+]
 Passive = Annotated[
     bool, typer.Option("--passive", help="The joint's actuators were off while it was measured.")
 ]
