@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ FOLDS = 4
 
 class Holdout:
     """Fits on a part of the runs, judged on the rest; where that are few segments, or none that the
-    model misses, every segment is held out of one of several fits (cross-validation)."""
+    model misses, or none that tells of an effect, every segment is held out of one of several fits
+    (cross-validation)."""
 
     def __init__(self, baseline: Baseline, measured: Measured) -> None:
         """Holds segments out as `joda.diagnosis.split` does; of what these do not show, others."""
@@ -33,17 +35,22 @@ class Holdout:
         counts = baseline.estimator.counts
         held = held_segments(measured, baseline.estimator.segments)
         self.folds = [counts & held]
-        own = baseline.base.simulator, baseline.base.unknowns, baseline.fit
-        self.before = self._error(*own) if self.folds[0].any() else 0.0
-        every = np.flatnonzero(counts)
+        self._own = baseline.base.simulator, baseline.base.unknowns, baseline.fit
+        self.before = self._error(*self._own, self.folds) if self.folds[0].any() else 0.0
         count = max(int(baseline.estimator.segments.count[self.folds[0]].sum()), 1)
         noise = self.floor * np.sqrt(1 + SETTINGS.naming.shown_errors * np.sqrt(2 / count))
         few = np.count_nonzero(self.folds[0]) < SETTINGS.naming.held_out_segments
-        silent = self.before < noise or few
-        if silent and len(every) > 1:
-            parts = (every[k::FOLDS] for k in range(min(FOLDS, len(every))))
-            self.folds = [np.isin(np.arange(len(counts)), part) for part in parts]
-            self.before = self._error(*own)
+        self.crosses = np.count_nonzero(counts) > 1 and (self.before < noise or few)
+        if self.crosses:
+            self.folds, self.before = self._crossed
+
+    @cached_property
+    def _crossed(self) -> tuple[list[NDArray[np.bool_]], float]:
+        """Parts of all segments, and the error without an effect where each is held out once."""
+        every = np.flatnonzero(counts := self.baseline.estimator.counts)
+        parts = (every[k::FOLDS] for k in range(min(FOLDS, len(every))))
+        folds = [np.isin(np.arange(len(counts)), part) for part in parts]
+        return folds, self._error(*self._own, folds)
 
     def errors(self, found: FittedHypothesis) -> tuple[float, float]:
         """RMS misfit of the segments held out, rad or m, without the effect and with it; robust, so
@@ -58,7 +65,11 @@ class Holdout:
             without = _misfit(segments, base.simulator, self.baseline.fit, impacts)
             with_it = _misfit(segments, make, found.fit, impacts)
             return robust_rms(without, self.floor), robust_rms(with_it, self.floor)
-        return self.before, self._error(make, unknowns, found.fit)
+        after = self._error(make, unknowns, found.fit, self.folds)
+        if self.crosses or abs(after - self.before) > SETTINGS.naming.held_out_alike * self.before:
+            return self.before, after
+        folds, before = self._crossed
+        return before, self._error(make, unknowns, found.fit, folds)
 
     @property
     def as_given(self) -> float:
@@ -68,9 +79,11 @@ class Holdout:
         own = baseline.estimator.segments, baseline.base.simulator, given
         return robust_rms(_misfit(*own, np.any(self.folds, axis=0)), self.floor)
 
-    def _error(self, make: Make, unknowns: Unknowns, fit: Fit) -> float:
+    def _error(
+        self, make: Make, unknowns: Unknowns, fit: Fit, folds: Sequence[NDArray[np.bool_]]
+    ) -> float:
         estimator, missed = self.baseline.estimator, []
-        for held in self.folds:
+        for held in folds:
             train = replace(estimator, counts=estimator.counts & ~held)
             near = train.fit(make, unknowns, fit.x, fit.start, 6)
             missed += _misfit(estimator.segments, make, near, held)

@@ -298,7 +298,7 @@ def perturbed(
         for way in (-by, by):
             x = best.x.copy()
             x[k] += way
-            trial = estimator.fit(make, unknowns, x, best.start, ITERATIONS)
+            trial = estimator.fit(make, unknowns, x, best.start, ITERATIONS, worth=best.loss)
             if trial.loss < best.loss - SETTINGS.search.equal_loss:
                 best = estimator.fit(make, unknowns, trial.x, trial.start)
     return _free(

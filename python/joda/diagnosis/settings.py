@@ -94,6 +94,8 @@ class NamingSettings:
             apart.
         something_else: of the misfit that an effect may leave that is said to be missing
             with something else (%).
+        held_out_alike: difference of the errors held out without an effect and with it, in those
+            without, up to which the segments held out do not tell of it.
         held_out_left: part of an error held out that an effect leaves at most, where that
             must tell of it.
         held_out_noises: by which segments held out may be missed with what is said to be
@@ -130,6 +132,7 @@ class NamingSettings:
     alternative_share: float = 0.35
     alike: float = 0.1
     something_else: float = 50.0
+    held_out_alike: float = 0.02
     held_out_left: float = 0.95
     held_out_noises: float = 10.0
     held_out_segments: int = 6

@@ -13,6 +13,7 @@ eliminated.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +33,15 @@ BACKTRACKS = 6
 """Step lengths that an iteration tries, each shorter than the last."""
 LOSS_TOLERANCE = 0.5
 """Decrease of the loss below which a fit has converged."""
+LOSS_SHARE = 1e-4
+"""The same, of the loss."""
 PROMISE = 3.0
 """How many times the decrease that a step promises may come of it and of those after it."""
+SECANT, SHORTEST = 0.5, 1e-12
+"""Part of a promised decrease that must come for the derivatives to be updated by the step, not
+sought anew; and the square of the shortest step that tells of them."""
+FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-6
+"""Of Gauss-Newton's steps, in units of the normal matrix' diagonal."""
 STARTED = 0.05
 """Decrease of the squares that is still to be expected, below which starts are fitted."""
 EARLY, MISSED, FEW_MISSED = 0.25, 4.0, 0.5
@@ -139,6 +147,24 @@ class Linearization:
         r = self.r + self.J @ move + (self.S @ own[:, :, None])[:, :, 0]
         return np.asarray((r**2).sum(axis=1) + ((self.z + own) ** 2).sum(axis=1))
 
+    def secant(self, r: Array, z: Array, weight: Array, move: Array, unit: Array) -> Self:
+        """About where a step ended, by Broyden's update of the derivatives: they change along the
+        step only, as the residuals ask for. Source: Madsen, Nielsen and Tingleff (2004), Methods
+        for non-linear least squares problems, section 3.5.
+
+        Args:
+            r, z, weight: there, see above.
+            move: of the numbers, shape (k,).
+            unit: of these, in which steps are measured, shape (k,).
+        """
+        own, along = z - self.z, move / unit
+        missed = r - self.r - self.J @ move - (self.S @ own[:, :, None])[:, :, 0]
+        missed /= np.maximum(along @ along + (own**2).sum(axis=1), SHORTEST)[:, None]
+        J = self.J + missed[:, :, None] * (along / unit)
+        return replace(
+            self, r=r, J=J, S=self.S + missed[:, :, None] * own[:, None, :], z=z, weight=weight
+        )
+
     def follow(self, move: Array) -> Array:
         """How the starts move, in prior standard deviations, when the numbers do; shape (m, d)."""
         return np.asarray(-(self.inverse @ self.start_gradient(self.r + self.J @ move))[:, :, 0])
@@ -222,13 +248,21 @@ class SegmentEstimator:
         central: bool = True,
     ) -> Linearization:
         """The model about a point; `central` or one-sided, where slopes are differences."""
-        segments, simulator = self.segments, make(x)
-        r, squares = self.squares(simulator, start)
-        J, S = self.slopes(make, simulator, unknowns, x, start, r, central)
+        at = self._point(make(x), unknowns, x, start, cauchy_scale)
+        return self._about(make, unknowns, at, cauchy_scale, central)
+
+    def _about(
+        self, make: Make, unknowns: Unknowns, at: "_Point", cauchy_scale: float, central: bool
+    ) -> Linearization:
+        J, S = self.slopes(make, at.simulator, unknowns, at.x, at.start, at.r, central)
+        return Linearization(at.r, J, S, *self._weighed(at, cauchy_scale))
+
+    def _weighed(self, at: "_Point", cauchy_scale: float) -> tuple[Array, Array]:
+        """How far starts are from the measured ones, and how much each segment counts."""
+        segments = self.segments
         room = cauchy_scale * np.maximum(segments.count, 1)
-        weight = np.where(self.tells, 1 / (1 + squares / room), 0.0)
-        z = (start - segments.start) / segments.prior_std
-        return Linearization(r, J, S, z, weight)
+        weight = np.where(self.tells, 1 / (1 + at.squares / room), 0.0)
+        return (at.start - segments.start) / segments.prior_std, weight
 
     def slopes(
         self,
@@ -307,21 +341,26 @@ class SegmentEstimator:
         self, simulator: Simulator, start: Array, squares: Array, iterations: int
     ) -> Fit:
         """Starts from which a joint misses less, each segment by itself, and what is left then."""
-        segments = self.segments
-        damping, unit = np.full(len(start), 1e-3), np.eye(start.shape[1])
+        segments, about = self.segments, None
+        damping, unit = np.full(len(start), FIRST_DAMPING), np.eye(start.shape[1])
         for _ in range(iterations):
-            about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
+            if about is None:
+                about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
             A = about.start_matrix * (1 + damping[:, None, None] * unit)
             g = about.start_gradient(about.r)
             step = np.linalg.solve(A, g)
-            if (step * g).sum() < STARTED:
+            if (promised := float((step * g).sum())) < STARTED:
                 break
             moved = start - segments.prior_std * step[:, :, 0]
-            trial = self.squares(simulator, moved)[1]
+            r, trial = self.squares(simulator, moved)
             better = trial < squares
-            start = np.where(better[:, None], moved, start)
+            gained = float((squares - trial)[better].sum())
+            r, start = (np.where(better[:, None], *p) for p in ((r, about.r), (moved, start)))
             squares = np.where(better, trial, squares)
             damping = np.where(better, np.maximum(damping / 10, 1e-9), 10 * damping)
+            z = (start - segments.start) / segments.prior_std
+            kept = gained > SECANT * promised
+            about = about.secant(r, z, about.weight, EMPTY, EMPTY) if kept else None
         return Fit(EMPTY, start, squares, self.loss(squares))
 
     def begun(self, make: Make, x: Array) -> Fit:
@@ -364,41 +403,90 @@ class SegmentEstimator:
             report: after each iteration, the best so far.
             worth: loss from which on it ends where the next step promises no less.
         """
-        segments = self.segments
-        start = segments.start if start is None else start
         x = np.clip(x, unknowns.low, unknowns.high)
-        squares = self.squares(make(x), start)[1]
-        loss = self.loss(squares, cauchy_scale) + unknowns.penalty(x)
-        damping, central, H = 1e-3, False, None
-        for _ in range(iterations):
-            about = self.linear(make, unknowns, x, start, cauchy_scale, central)
+        start = self.segments.start if start is None else start
+        at = self._point(make(x), unknowns, x, start, cauchy_scale)
+        about: Linearization | None = None
+        H, damping, central, done = None, FIRST_DAMPING, False, 0
+        while done < iterations:
+            fresh = about is None
+            if about is None:
+                about = self._about(make, unknowns, at, cauchy_scale, central)
             H, gradient = about.normal()
-            H = H + unknowns.known
-            gradient = gradient + unknowns.pull(x)
-            before = loss
-            if loss > worth:
-                move = _step(H, gradient, damping, unknowns, x)
-                left = self.loss(about.squares(move), cauchy_scale) + unknowns.penalty(x + move)
-                if loss - PROMISE * (loss - left) > worth:
+            H, gradient = H + unknowns.known, gradient + unknowns.pull(at.x)
+            move = _step(H, gradient, damping, unknowns, at.x)
+            left = self.loss(about.squares(move), cauchy_scale) + unknowns.penalty(at.x + move)
+            promised, enough = at.loss - left, max(LOSS_TOLERANCE, LOSS_SHARE * at.loss)
+            if at.loss - PROMISE * promised > worth:
+                break
+            before, tried = at, damping
+            for _ in range(BACKTRACKS if PROMISE * promised > enough else 0):
+                there = self._moved(make, unknowns, about, before, move, cauchy_scale, promised)
+                if there.loss < before.loss:
+                    at, tried = there, max(tried / 10, LEAST_DAMPING)
                     break
-            for _ in range(BACKTRACKS):
-                move = _step(H, gradient, damping, unknowns, x)
-                simulator, moved = make(x + move), start + segments.prior_std * about.follow(move)
-                trial, stayed = (self.squares(simulator, at)[1] for at in (moved, start))
-                moved = np.where((trial < stayed)[:, None], moved, start)
-                trial = np.minimum(trial, stayed)
-                new = self.loss(trial, cauchy_scale) + unknowns.penalty(x + move)
-                if new < loss:
-                    x, start, squares, loss = x + move, moved, trial, new
-                    damping = max(damping / 10, 1e-6)
-                    break
-                damping *= 10
-            report(Fit(x, start, squares, loss, H))
-            if before - loss < LOSS_TOLERANCE:
+                tried *= 10
+                move = _step(H, gradient, tried, unknowns, before.x)
+            report(Fit(at.x, at.start, at.squares, at.loss, H))
+            gained = before.loss - at.loss
+            if gained < enough and not fresh:
+                about = None
+                continue
+            done, damping = done + 1, tried
+            if gained < enough:
                 if central:
                     break
-                damping, central = 1e-3, True  # one-sided differences are cheap, but biased
-        return Fit(x, start, squares, loss, H)
+                about, damping, central = None, FIRST_DAMPING, True  # one-sided ones are biased
+            elif central or gained < SECANT * promised:
+                about = None
+            else:
+                about = about.secant(at.r, *self._weighed(at, cauchy_scale), move, unknowns.step)
+        return Fit(at.x, at.start, at.squares, at.loss, H)
+
+    def _point(
+        self, simulator: Simulator, unknowns: Unknowns, x: Array, start: Array, cauchy_scale: float
+    ) -> "_Point":
+        """What a model with numbers misses from starts."""
+        r, squares = self.squares(simulator, start)
+        loss = self.loss(squares, cauchy_scale) + unknowns.penalty(x)
+        return _Point(simulator, x, start, r, squares, loss)
+
+    def _moved(
+        self,
+        make: Make,
+        unknowns: Unknowns,
+        about: Linearization,
+        at: "_Point",
+        move: Array,
+        cauchy_scale: float,
+        promised: float,
+    ) -> "_Point":
+        """Where a move of the numbers leads, the starts following; where that does not keep what is
+        promised, those only that it helps."""
+        x, simulator = at.x + move, make(at.x + move)
+        start = at.start + self.segments.prior_std * about.follow(move)
+        there = self._point(simulator, unknowns, x, start, cauchy_scale)
+        if at.loss - there.loss > SECANT * promised:
+            return there
+        r, squares = self.squares(simulator, at.start)
+        helps = there.squares < squares
+        r, start = (np.where(helps[:, None], *pair) for pair in ((there.r, r), (start, at.start)))
+        squares = np.minimum(squares, there.squares)
+        loss = self.loss(squares, cauchy_scale) + unknowns.penalty(x)
+        return _Point(simulator, x, start, r, squares, loss)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A model with numbers, from starts, shapes (k,) and (m, d), and what it misses: residuals,
+    their squares by segment, and the loss."""
+
+    simulator: Simulator
+    x: Array
+    start: Array
+    r: Array
+    squares: Array
+    loss: float
 
 
 def _step(H: Array, gradient: Array, damping: float, unknowns: Unknowns, x: Array) -> Array:

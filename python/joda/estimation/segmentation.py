@@ -44,7 +44,7 @@ JUMPED, JUMPS = 10.0, 3
 """Noises by which a single one may, where it is more than all others together: one that sticks soon
 after stays where it was moved to, and a free one goes on. Where a force or damping acts, so that
 how it goes on is less well known, so many of the largest may be no more than all others."""
-SHARED = 1e-3
+SHARED = 1e-2
 """Variance, in units of a sample's own, above which a segment's samples share it."""
 OUTSIDE_NOISES = 4.0
 """Noises outside its range at which a joint is beyond it."""

@@ -16,10 +16,14 @@ def joined(segments: Sequence[Segment]) -> Array:
     return np.concatenate([segment.misfit for segment in segments] or [np.zeros(0)])
 
 
-def missed(replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float]) -> float:
-    """RMS error of runs in segments, rad or m; NaN if there are none."""
+def missed(
+    replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float], quickly: bool = False
+) -> float:
+    """RMS error of runs in segments, rad or m, NaN if there are none; `quickly`: whether the joint
+    simulator may stand for MuJoCo."""
     pairs = zip(runs, sigma, strict=True)
-    return rms(np.concatenate([joined(replayer.segments(run, noise)) for run, noise in pairs]))
+    parts = [joined(replayer.segments(run, noise, quickly=quickly)) for run, noise in pairs]
+    return rms(np.concatenate(parts))
 
 
 def missed_whole(replayer: Replayer, runs: Sequence[Run], sigma: Sequence[float]) -> float:

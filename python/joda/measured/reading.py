@@ -153,7 +153,7 @@ def taken(
             run.part(np.flatnonzero(run.time < run.time[0] + ROW_DURATION))
             for run in timed[:ROW_RUNS]
         ]
-        errors = [missed(one, some, sigma[:ROW_RUNS]) for one in (replayer, other)]
+        errors = [missed(one, some, sigma[:ROW_RUNS], quickly=True) for one in (replayer, other)]
         samples = sum(len(run.time) for run in some)
         gain = samples * (errors[0] ** 2 - errors[1] ** 2) / float(np.mean(np.square(sigma)))
         if errors[1] < CLEARLY * errors[0] or gain > SURELY:

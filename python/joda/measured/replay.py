@@ -57,6 +57,9 @@ START = 3.0
 WIDER, SOUGHT = 3.0, np.linspace(-START, START, 25)
 """Where a joint that impacts at an end is followed poorly from there: by how much less well the
 start is known, and other velocities that are tried."""
+OFF = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
+PUSHED = np.array([0.0, 0.0, 0.0, 1.0])
+"""Of four paths nearby: by what their starts are off, and whether another force acts."""
 FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 APPLIED = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 COMMANDED = int(mujoco.mjtState.mjSTATE_CTRL)
@@ -385,10 +388,21 @@ class Replayer:
         spread = begins.deviation[:, None] * np.linalg.cholesky(covariance)
         return _Followed(least, Start(begins.mean + begins.deviation * z, spread))
 
-    def segments(self, run: Run, sigma: float, length: float = SEGMENT_LENGTH) -> list[Segment]:
+    def segments(
+        self,
+        run: Run,
+        sigma: float,
+        length: float = SEGMENT_LENGTH,
+        quickly: bool = False,
+    ) -> list[Segment]:
         """The run in segments one after another; where the force is unknown there are none.
 
         Of more than `MAX_SEGMENTS` segments so many are replayed, evenly spread over the run.
+
+        Args:
+            run, sigma: measured, and the noise of its position, rad or m.
+            length: of a segment, s.
+            quickly: whether the simulator may stand for MuJoCo.
         """
         steps = max(round(length / self.h), 2)
         length = steps * self.h
@@ -418,9 +432,15 @@ class Replayer:
         near, step = np.zeros_like(starts), np.zeros_like(starts)
         at_rest = np.stack([np.zeros(len(kept)), -starts[:, 1] / errors[:, 1]], axis=1)
         least, best = np.full(len(kept), np.inf), dict[int, Segment]()
+        simulator = self.simulator if quickly and self.servo is None else None
         for number in range(TRIES + 1):
             tried = np.clip(at_rest if number == 1 else near + step, -START, START)
-            nearby = self._nearby(starts + errors * tried, near_by, forces, own, push)
+            begin = starts + errors * tried
+            nearby = (
+                self._nearby_quickly(simulator, begin, near_by, forces, push)
+                if simulator
+                else self._nearby(begin, near_by, forces, own, push)
+            )
             for k, (samples, paths) in enumerate(zip(pieces, nearby, strict=True)):
                 place = (run.time[samples] - at[k]) / self.h
                 path = np.stack([np.interp(place, np.arange(steps + 1), p) for p in paths])
@@ -452,14 +472,26 @@ class Replayer:
         Yields:
             of each segment, shape (4, steps + 1).
         """
-        off = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
-        pushed = np.array([0.0, 0.0, 0.0, push])
         mujoco.mj_resetData(self.model, self.data)
         for start, offset, force, command in zip(starts, offsets, forces, commands, strict=True):
-            states = self._placed(start + offset * off)
-            paths, last = self._roll(states, force + pushed[:, None], command)
+            states = self._placed(start + offset * OFF)
+            paths, last = self._roll(states, force + push * PUSHED[:, None], command)
             mujoco.mj_setState(self.model, self.data, last[0], FULL)
             yield paths
+
+    def _nearby_quickly(
+        self, simulator: JointSimulator, starts: Array, offsets: Array, forces: Array, push: float
+    ) -> Array:
+        """The same as `_nearby`, without MuJoCo and commands; each path keeps its own memory."""
+        count, steps = forces.shape
+        at, fresh = steps * np.arange(count), np.arange(count) == 0
+        paths = []
+        for off, pushed in zip(OFF, PUSHED, strict=True):
+            applied, begin = (forces + push * pushed).ravel(), starts + offsets * off
+            before, after = simulator.replay(applied, at, begin, fresh, self.h)
+            rows = after.reshape(count, steps)
+            paths.append(np.hstack([before[at, None], rows]))
+        return np.stack(paths, axis=1)
 
     def _placed(self, starts: Array) -> Array:
         """Full states at starts (k, 2), with the memory in `data`; shape (k, size)."""

@@ -25,6 +25,9 @@ WIDEST = 0.5
 EDGE, SOFT_EDGE = (0.002, 0.3, 0.01), (0.002, 0.48, 0.01)
 """Of a constant on a part of the range, in units of that part: of a resistance, which is called
 otherwise where it is a hump, and of a force."""
+USUAL_EDGE = 0.05, 0.15
+"""The same before the data, and its prior standard deviation: where no run tells of an edge it must
+not drift to a wide one, which then keeps that end of the interval where it is."""
 CATCH = (0.0, 0.3, 0.01, np.nan, 0.9)
 """Dry friction of a catch, in units of its force."""
 LEAN, USUAL_LEAN = (-1.2, 1.2, 0.03), 0.4
@@ -366,11 +369,12 @@ def _constant(units: Units, template: Template) -> Iterator[Hypothesis]:
 
         bounds, tries = places(place)
         soft = [] if whole else [EDGE if name in LOCAL else SOFT_EDGE]
+        unknowns = unknowns_of(STRENGTH, *soft, *bounds)
         same = whole and channel == "conservative" and not units.hinge
         return Hypothesis(
             label,
             "both",
-            unknowns_of(STRENGTH, *soft, *bounds),
+            unknowns if whole else known(unknowns, 1, *USUAL_EDGE),
             np.array([(TRIAL, *[EDGE[0]] * len(soft), *t) for t in tries]),
             write,
             between,
