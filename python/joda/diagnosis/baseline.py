@@ -165,13 +165,6 @@ class Baseline:
         """The candidate with its numbers tried elsewhere."""
         return perturbed(self.estimator, self.base, found)
 
-    def moved_to(self, found: FittedHypothesis, other: FittedHypothesis) -> FittedHypothesis:
-        """The candidate fitted again from the model's numbers and the starts of another one."""
-        make, unknowns = joined(self.base, found.hypothesis)
-        x = np.append(other.fit.x[: self.base.count], found.x)
-        fit = self.estimator.fit(make, unknowns, x, other.fit.start, worth=found.fit.loss)
-        return scored(self.estimator, found.hypothesis, min(found.fit, fit, key=lambda f: f.loss))
-
     def simplex_searched(self, found: FittedHypothesis) -> FittedHypothesis:
         """The candidate after a search without derivatives."""
         return simplex_searched(self.estimator, self.base, found)

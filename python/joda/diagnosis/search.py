@@ -69,7 +69,6 @@ def rank(
             candidates += _fitted(baseline, candidates, rest, work)
             candidates += _beside(baseline, tried, candidates, work)
             candidates += _perturbed(baseline, candidates, work)
-            candidates += _from_the_best(baseline, candidates, work)
             candidates += _simplex_searched(baseline, candidates, work)
         baseline = _restarted(baseline, candidates)
         others = [one.written(baseline.base) for one in best_of_each(candidates)[:1]]
@@ -229,16 +228,6 @@ def _perturbed(
     near = [one for one in others if one.fit.loss < most]
     work.total = work.done + len(near)
     return perturbed + work.all(baseline.perturbed, near)
-
-
-def _from_the_best(
-    baseline: Baseline, candidates: Sequence[FittedHypothesis], work: _Work
-) -> list[FittedHypothesis]:
-    """The best effects with the model's numbers, and the starts, of the very best one: what is
-    simpler may do as well from there."""
-    best, *others = best_of_each(candidates)[:PERTURBED] or [None]
-    worse = [one for one in others if best and one.fit.loss > best.fit.loss + SEARCH.rough_gain]
-    return work.all(lambda one: baseline.moved_to(one, best), worse)
 
 
 def _simplex_searched(
