@@ -17,6 +17,7 @@ from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.findings import Correction
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.settings import SETTINGS
 from joda.estimation.base_model import BASE_STD, BaseModel
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
@@ -143,6 +144,21 @@ class Calibration:
             )
 
         return self.loss < min(map(least, candidates), default=baseline.fit.loss)
+
+    def nearly(self, baseline: Baseline, candidates: Sequence[FittedHypothesis]) -> bool:
+        """Whether they explain about as much as the best effect does alone."""
+        least = min((one.fit.loss for one in candidates), default=baseline.fit.loss)
+        most = SETTINGS.corrections.nearly_share * (baseline.fit.loss - least)
+        return self.loss < least + most
+
+    def better_with(self, beside: Ranking, alone: Ranking) -> bool:
+        """Whether with an effect beside these numbers clearly less is left than with one alone."""
+        price = self.loss - self.fit.loss
+
+        def least(ranking: Ranking) -> float:
+            return min((one.fit.loss + one.cost for one in ranking.candidates), default=np.inf)
+
+        return least(beside) + price < least(alone) - SETTINGS.corrections.equal_numbers
 
     def corrections(self, measured: Measured) -> tuple[Correction, ...]:
         """What is off, for the user.

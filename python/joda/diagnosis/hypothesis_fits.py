@@ -43,6 +43,10 @@ BEST = 3
 """How many trials of a hypothesis with many are fitted."""
 MIN_DIFFERENCE = 0.06
 """How much these must differ in one of their numbers."""
+STANDS_IN, SAME, PROBED = 5.0, 0.7, 0.05
+"""Prior standard deviations by which a strength of the model is off that may stand in for a
+hypothesis; the correlation of what both move from which it does; and the part of a trial's strength
+by which that is told."""
 FINEST = 3
 """How many times the places at which a size differs along the way become more."""
 MAX_RESIDUAL = 10.0
@@ -184,6 +188,31 @@ def screened(
     return [out[k] for k in chosen]
 
 
+def in_place_of_a_factor(
+    estimator: SegmentEstimator, base: BaseModel, point: InitialPoint, hypothesis: Hypothesis
+) -> list[Array]:
+    """Where a strength of the model that is far off stands in for the hypothesis, as more friction
+    does for another friction: numbers with that strength as it is given, and as much of the
+    hypothesis in its place."""
+    own, x, about = base.unknowns, point.fit.x, point.about
+    if not (far := np.abs(x - own.mean) / own.prior_std).any() or far.max() < STANDS_IN:
+        return []
+    k, trial = int(np.argmax(far)), hypothesis.trials[0].copy()
+    trial[0] *= PROBED
+    simulator = base.with_profile(hypothesis.write(base.written(x), trial), x)
+    segments = estimator.segments
+    d = (segments.residuals(segments.misfit(simulator, point.fit.start)) - about.r)[:, :, None]
+    J = about.J[:, :, k : k + 1]
+    square, across, other = (float(about.products(*p)[0, 0]) for p in ((d, d), (d, J), (J, J)))
+    if not across**2 > SAME**2 * square * other or not (amount := (x - own.mean)[k] * across) > 0:
+        return []
+    trial[0] = np.clip(
+        trial[0] * amount / square, hypothesis.unknowns.low[0], hypothesis.unknowns.high[0]
+    )
+    given = np.where(np.arange(len(x)) == k, own.mean, x)
+    return [np.concatenate([given, trial])]
+
+
 def coarse(
     estimator: SegmentEstimator,
     base: BaseModel,
@@ -194,7 +223,8 @@ def coarse(
     make, unknowns = joined(base, hypothesis)
 
     def best(point: InitialPoint, trials: Sequence[Array], kept: int) -> list[Fit]:
-        starts = (np.concatenate([point.fit.x, x]) for x in trials)
+        starts = [np.concatenate([point.fit.x, x]) for x in trials]
+        starts += in_place_of_a_factor(estimator, base, point, hypothesis)
         wide = point.cauchy_scale
         fits = [estimator.fit(make, unknowns, x, point.fit.start, ROUGH, wide) for x in starts]
         ahead = sorted(fits, key=lambda fit: fit.loss)[:kept]

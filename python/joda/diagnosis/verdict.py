@@ -121,9 +121,14 @@ def diagnosed(
         if calibrate and found is None and plain.selection.verdict != "adequate":
             ranking, beside = plain.ranking, True
             found = calibrator.numbers(ranking.baseline, beside)
-        if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
+        if found and (
+            (beats := found.beats(ranking.baseline, ranking.candidates, clearly=beside))
+            or found.nearly(ranking.baseline, ranking.candidates)
+        ):
             looks = looked(found.of(measured), exclude, progress)
-            if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
+            verdicts = looks.selection.verdict, plain.selection.verdict
+            worse = verdicts[0] == "unexplained" != verdicts[1]
+            if (beats and not worse) or found.better_with(looks.first[0], ranking):
                 repaired = found, looks
     latest = (repaired[1] if repaired else plain).selection.verdict
     if calibrate and latest == "unexplained":

@@ -37,7 +37,7 @@ LOSS_SHARE = 1e-4
 """The same, of the loss."""
 PROMISE = 3.0
 """How many times the decrease that a step promises may come of it and of those after it."""
-SECANT, SHORTEST = 0.5, 1e-12
+SECANT, SHORTEST = 0.8, 1e-12
 """Part of a promised decrease that must come for the derivatives to be updated by the step, not
 sought anew; and the square of the shortest step that tells of them."""
 FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-6
