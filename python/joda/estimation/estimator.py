@@ -349,18 +349,18 @@ class SegmentEstimator:
             A = about.start_matrix * (1 + damping[:, None, None] * unit)
             g = about.start_gradient(about.r)
             step = np.linalg.solve(A, g)
-            if (promised := float((step * g).sum())) < STARTED:
+            promised = (step * g).sum(axis=(1, 2))
+            if promised.sum() < STARTED:
                 break
             moved = start - segments.prior_std * step[:, :, 0]
             r, trial = self.squares(simulator, moved)
             better = trial < squares
-            gained = float((squares - trial)[better].sum())
+            lags = (squares - trial < SECANT * promised) & (promised > STARTED) & self.tells
             r, start = (np.where(better[:, None], *p) for p in ((r, about.r), (moved, start)))
             squares = np.where(better, trial, squares)
             damping = np.where(better, np.maximum(damping / 10, 1e-9), 10 * damping)
             z = (start - segments.start) / segments.prior_std
-            kept = gained > SECANT * promised
-            about = about.secant(r, z, about.weight, EMPTY, EMPTY) if kept else None
+            about = None if lags.any() else about.secant(r, z, about.weight, EMPTY, EMPTY)
         return Fit(EMPTY, start, squares, self.loss(squares))
 
     def begun(self, make: Make, x: Array) -> Fit:
