@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from joda.diagnosis.units import units_of
 from joda.estimation.base_model import base_of
-from joda.estimation.estimator import Fit, SegmentEstimator
+from joda.estimation.estimator import Fit, Linearization, SegmentEstimator
 from joda.estimation.problem import joint_model_for, posed, segments_for
 from joda.estimation.segmentation import STEPS, _responses, _step, segments_of
 from joda.estimation.segments import GRID
@@ -438,6 +438,26 @@ def test_a_fit_ends_where_it_promises_no_less_than_is_worth_it(tmp_path):
     (calls, again, whole, found, worth), (_, few, least, left, _) = tried
     assert again == calls and found == whole < worth
     assert few < calls / 2 and left > 1.01 * least > worth
+
+
+def test_derivatives_that_are_updated_are_those_along_the_step(rng):
+    """What a straight law leaves asks for no change; what bends is met where the step ended, and
+    nothing across the step changes."""
+    m, n, k = 3, 8, 2
+    J, S = rng.standard_normal((m, n, k)), rng.standard_normal((m, n, 2))
+    about = Linearization(
+        rng.standard_normal((m, n)), J, S, rng.standard_normal((m, 2)), np.ones(m)
+    )
+    move, own, unit = rng.standard_normal(k), rng.standard_normal((m, 2)), np.array([0.1, 3.0])
+    straight = about.r + J @ move + np.einsum("mnd,md->mn", S, own)
+    same = about.secant(straight, about.z + own, about.weight, move, unit)
+    assert np.allclose(same.J, J) and np.allclose(same.S, S)
+    bent = straight + rng.standard_normal((m, n))
+    there = about.secant(bent, about.z + own, about.weight, move, unit)
+    back = there.r - there.J @ move - np.einsum("mnd,md->mn", there.S, own)
+    assert np.allclose(back, about.r)
+    across = np.array([-move[1] / unit[1], move[0] / unit[0]]) * unit
+    assert np.allclose(there.J @ across, J @ across)
 
 
 # --- rest and pace

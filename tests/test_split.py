@@ -129,6 +129,23 @@ def test_where_segments_held_out_tell_nothing_all_are_in_turn(tmp_path, rng):
     assert np.array_equal(np.any(held.folds, axis=0), baseline.estimator.counts)
 
 
+@pytest.mark.slow
+def test_segments_that_tell_of_no_effect_are_no_evidence_against_it(tmp_path, rng):
+    """All segments judge it in turn, where those held out are missed alike without it and with
+    it, whatever else is missed there."""
+    measured = thrown(tmp_path, rng, 12, drag=0.1)
+    baseline = fit_baseline(measured)
+    held = Holdout(baseline, measured)
+    drag = next(one for one in baseline.hypotheses if one.effect == "quadratic_damping")
+    found = baseline.fit_hypothesis(drag)
+    before, after = held.errors(found)
+    assert after < 0.5 * before == 0.5 * held.before
+    silent = replace(found, fit=replace(found.fit, x=np.append(baseline.fit.x, 0.0)))
+    silent = replace(silent, hypothesis=replace(drag, write=lambda profile, x: profile))
+    crossed, alike = held.errors(silent)
+    assert crossed == held._crossed[1] != before and alike == pytest.approx(crossed, rel=1e-3)
+
+
 def test_where_nothing_was_held_out_nothing_is_missed():
     assert robust_rms([], 1e-3) == robust_rms([np.zeros(0)], 1e-3) == 0.0
 

@@ -69,6 +69,16 @@ def test_a_start_is_sought_as_mujoco_moves_the_joint():
         assert apart.max() < 0.01 * sigma
 
 
+def test_segments_are_missed_by_as_much_without_mujoco():
+    """The joint's own simulator takes the plugin's steps, also those of starts nearby."""
+    train, _ = read(draw(12, "presliding_friction", True, family="household"))
+    for run, sigma in zip(train.runs, train.sigma, strict=True):
+        pairs = [train.replayer.segments(run, sigma, quickly=quickly) for quickly in (False, True)]
+        for with_it, without in zip(*pairs, strict=True):
+            assert np.abs(with_it.misfit - without.misfit).max() < 0.01 * sigma
+            assert with_it.force == pytest.approx(without.force, rel=1e-3, abs=1e-3)
+
+
 def test_a_run_that_begins_just_before_an_end_is_followed(tmp_path, rng):
     """Smoothed samples, half of them after it threw the joint back, tell another velocity."""
     (tmp_path / "model.xml").write_text(
