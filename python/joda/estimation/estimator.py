@@ -4,10 +4,10 @@ Gauss-Newton over the numbers and every segment's start, which is eliminated seg
 segment's misfit counts in proportion while it is near the noise and only as its logarithm when it
 is far off, so that one bad segment, or a slightly wrong law, decides nothing.
 
-SciPy's `least_squares` with the bounds, scales and sparsity of the same problems takes 3.2 times as
-long in the median; it ends at less loss in 11 of 23, this in 12
+SciPy's `least_squares` with the bounds, scales and sparsity of the same problems takes 9.4 times as
+long in the median; it ends at less loss in 11 of 23, this in 10
 (`python tests/benchmarks scipy_beside 23 1127`). The starts are most of its numbers; here they are
-eliminated.
+eliminated, and derivatives are only sought anew where a step does not keep what they promise.
 """
 
 from collections.abc import Callable
