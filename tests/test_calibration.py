@@ -1,5 +1,7 @@
 """Numbers of a joint and of its measurement that are off are found, and are no effects."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from joda import JodaError
 from joda.diagnosis.baseline import fit_baseline
 from joda.diagnosis.calibration import Calibrator
 from joda.diagnosis.correction_report import correction_of
+from joda.diagnosis.hypothesis_fits import in_place_of_a_factor
 from joda.diagnosis.verdict import diagnosed
 from joda.estimation.nuisance import nuisances_of
 from joda.hidden import draw
@@ -294,6 +297,37 @@ def test_improve_writes_what_is_wrong_and_compare_reads_it(tmp_path, rng):
     before = joda.compare(tmp_path / "arm.xml", "arm", [unseen]).rmse_window
     after = joda.compare(new, "arm", [unseen], corrections=done.corrections).rmse_window
     assert after < 2 * SIGMA < 0.2 * before
+
+
+def test_a_strength_that_stands_in_for_an_effect_is_where_that_is_begun(tmp_path, rng):
+    """Thrice the model's friction, of which no more than a half is usual: as it is given, with the
+    friction that is missing in its place."""
+    runs = logged(tmp_path, rng, extra=lambda q, v: -0.3 * np.tanh(v / 0.005))
+    (tmp_path / "arm.xml").write_text(arm())
+    baseline = fit_baseline(read_measured(tmp_path / "arm.xml", "arm", runs))
+    estimator, base = baseline.estimator.coarser, baseline.base.coarser()
+    own = estimator, base, baseline.initial_points[0]
+    assert own[2].fit.x[0] == pytest.approx(3, rel=0.15)
+    kinds = {}
+    for one in baseline.hypotheses:
+        kinds.setdefault(one.effect, one)
+    friction = kinds["constant_friction_hinge"]
+    (begin,) = in_place_of_a_factor(*own, friction)
+    assert begin[0] == 1.0
+    assert friction.magnitude(begin[base.count :]) == pytest.approx(0.3, rel=0.15)
+    assert not in_place_of_a_factor(*own, kinds["gravity_offset"])
+    near = replace(own[2], fit=replace(own[2].fit, x=base.unknowns.mean))
+    assert not in_place_of_a_factor(*own[:2], near, friction)
+
+
+@pytest.mark.long
+def test_a_friction_and_an_offset_are_no_friction_of_one_direction(seed=44305711):
+    """Which explains the runs alone as well as an offset does, but not as well as both."""
+    case = draw(seed, "constant_friction_hinge", True, None, "field")
+    found = diagnosed(read(case)[0]).diagnosis
+    assert found.effects[0].effect == case.seal["effect"]
+    (offset,) = [one for one in found.corrections if one.parameter == "force_offset"]
+    assert abs(offset.value - case.seal["wrong"]["force_offset"]) < 2 * offset.error
 
 
 @pytest.mark.long
