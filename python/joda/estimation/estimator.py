@@ -214,7 +214,9 @@ class SegmentEstimator:
     def losses(
         self, squares: Array, cauchy_scale: float = CAUCHY_SCALE, level: float = 1.0
     ) -> Array:
-        """The same of each segment, shape (m,)."""
+        """The same of each segment, shape (m,); of an infinite scale the squares themselves."""
+        if np.isinf(cauchy_scale):
+            return np.asarray(squares / level)
         room = cauchy_scale * np.maximum(self.segments.count, 1)
         return np.asarray(room * np.log1p(squares / level / room))
 
@@ -341,26 +343,21 @@ class SegmentEstimator:
         self, simulator: Simulator, start: Array, squares: Array, iterations: int
     ) -> Fit:
         """Starts from which a joint misses less, each segment by itself, and what is left then."""
-        segments, about = self.segments, None
+        segments = self.segments
         damping, unit = np.full(len(start), FIRST_DAMPING), np.eye(start.shape[1])
         for _ in range(iterations):
-            if about is None:
-                about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
+            about = self.linear(lambda _: simulator, NOTHING, EMPTY, start)
             A = about.start_matrix * (1 + damping[:, None, None] * unit)
             g = about.start_gradient(about.r)
             step = np.linalg.solve(A, g)
-            promised = (step * g).sum(axis=(1, 2))
-            if promised.sum() < STARTED:
+            if (step * g).sum() < STARTED:
                 break
             moved = start - segments.prior_std * step[:, :, 0]
-            r, trial = self.squares(simulator, moved)
+            trial = self.squares(simulator, moved)[1]
             better = trial < squares
-            lags = (squares - trial < SECANT * promised) & (promised > STARTED) & self.tells
-            r, start = (np.where(better[:, None], *p) for p in ((r, about.r), (moved, start)))
+            start = np.where(better[:, None], moved, start)
             squares = np.where(better, trial, squares)
             damping = np.where(better, np.maximum(damping / 10, 1e-9), 10 * damping)
-            z = (start - segments.start) / segments.prior_std
-            about = None if lags.any() else about.secant(r, z, about.weight, EMPTY, EMPTY)
         return Fit(EMPTY, start, squares, self.loss(squares))
 
     def begun(self, make: Make, x: Array) -> Fit:
@@ -387,6 +384,7 @@ class SegmentEstimator:
         cauchy_scale: float = CAUCHY_SCALE,
         report: Callable[[Fit], None] = lambda fit: None,
         worth: float = np.inf,
+        updated: bool = True,
     ) -> Fit:
         """The numbers and starts with the least loss.
 
@@ -402,6 +400,8 @@ class SegmentEstimator:
             cauchy_scale: mean square residual from which a segment counts as its logarithm.
             report: after each iteration, the best so far.
             worth: loss from which on it ends where the next step promises no less.
+            updated: whether a step that keeps what it promised may update the derivatives, which
+                takes more iterations, of which most cost little; else each seeks them anew.
         """
         x = np.clip(x, unknowns.low, unknowns.high)
         start = self.segments.start if start is None else start
@@ -427,17 +427,17 @@ class SegmentEstimator:
                     break
                 tried *= 10
                 move = _step(H, gradient, tried, unknowns, before.x)
-            report(Fit(at.x, at.start, at.squares, at.loss, H))
             gained = before.loss - at.loss
             if gained < enough and not fresh:
                 about = None
                 continue
             done, damping = done + 1, tried
+            report(Fit(at.x, at.start, at.squares, at.loss, H))
             if gained < enough:
                 if central:
                     break
                 about, damping, central = None, FIRST_DAMPING, True  # one-sided ones are biased
-            elif central or gained < SECANT * promised:
+            elif central or not updated or gained < SECANT * promised:
                 about = None
             else:
                 about = about.secant(at.r, *self._weighed(at, cauchy_scale), move, unknowns.step)

@@ -99,7 +99,8 @@ class Shooting:
         def heard(fit: Found) -> None:
             report(fit.x, self.robust(estimator, fit))
 
-        return estimator.fit(self.simulator, unknowns, theta, start, iterations, report=heard).x
+        own = self.simulator, unknowns, theta, start, iterations
+        return estimator.fit(*own, report=heard, updated=False).x
 
     def covariance(self, estimator: SegmentEstimator, theta: Array) -> Array:
         """Of the numbers' errors, from segments and the prior, shape (n, n)."""
