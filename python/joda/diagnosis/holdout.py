@@ -85,7 +85,7 @@ class Holdout:
         estimator, missed = self.baseline.estimator, []
         for held in folds:
             train = replace(estimator, counts=estimator.counts & ~held)
-            near = train.fit(make, unknowns, fit.x, fit.start, 6)
+            near = train.fit(make, unknowns, fit.x, fit.start, 6, updated=False)
             missed += _misfit(estimator.segments, make, near, held)
         return robust_rms(missed, self.floor)
 

@@ -308,7 +308,7 @@ def _profiled(fitted: _Fitted, covariance: Array, overdispersion: float) -> Arra
                 def make(y: Array, value: float = value, k: int = int(k)) -> Simulator:
                     return fitted.make(np.insert(y, k, value))
 
-                fit = estimator.fit(make, others, y, near, ITERATIONS)
+                fit = estimator.fit(make, others, y, near, ITERATIONS, updated=False)
                 y, near = fit.x, fit.start
                 rise = max(fit.loss - least, 0.0) / overdispersion
                 moved = np.abs(fitted.described(np.insert(y, k, value)) - best)

@@ -420,7 +420,7 @@ class SegmentEstimator:
             if at.loss - PROMISE * promised > worth:
                 break
             before, tried = at, damping
-            for _ in range(BACKTRACKS if PROMISE * promised > enough else 0):
+            for _ in range(BACKTRACKS):
                 there = self._moved(make, unknowns, about, before, move, cauchy_scale, promised)
                 if there.loss < before.loss:
                     at, tried = there, max(tried / 10, LEAST_DAMPING)
