@@ -473,7 +473,7 @@ class SegmentEstimator:
         r, start = (np.where(helps[:, None], *pair) for pair in ((there.r, r), (start, at.start)))
         squares = np.minimum(squares, there.squares)
         loss = self.loss(squares, cauchy_scale) + unknowns.penalty(x)
-        return _Point(simulator, x, start, r, squares, loss)
+        return replace(there, start=start, r=r, squares=squares, loss=loss)
 
 
 @dataclass(frozen=True)
