@@ -92,6 +92,14 @@ def test_a_segment_begins_where_an_end_that_yields_has_let_go_of_the_joint():
     assert back - 0.01 < min(own[0] for own in tells) < back + 0.02
 
 
+@pytest.mark.parametrize("more", range(GRID))
+def test_no_segment_begins_after_the_last_sample(more):
+    """Where an end lets go of the joint just as the run ends."""
+    position = np.where(np.arange(400 + more) < 399 + more, -0.003, 0.1)
+    segments = cut(position, position)
+    assert (np.diff(segments.at) > 0).all() and segments.at[-1] < len(segments.force)
+
+
 @pytest.mark.parametrize("step", [1e-3, 4e-3])
 def test_what_is_let_go_begins_at_rest_and_what_is_flicked_does_not(step):
     t = step * np.arange(round(0.4 / step))

@@ -63,6 +63,10 @@ BEYOND_ENDS = (
     "is {}, but from where the joint comes to an end, the free-run error is up to {:.0f} times "
     "what noise, initial state and force explain, whatever the stops (solreflimit, solimplimit).{}"
 )
+AN_OFFSET = (
+    " An offset of the recorded force would do the same: see whether the sensor reads zero where "
+    "nothing pushes."
+)
 WHOLLY = " Segments show nothing of it; free runs do."
 PRESS = (
     "Press the joint slowly against either end and let it go, and let it come there slowly and "

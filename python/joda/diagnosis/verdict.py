@@ -30,6 +30,7 @@ from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import FreeRuns, worst
 from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.horizons import HorizonSearch, looked
+from joda.diagnosis.hypothesis_fits import FittedHypothesis
 from joda.diagnosis.joint_calibration import jointly, needed
 from joda.diagnosis.plausible import Needs, unvisited_interval
 from joda.diagnosis.ranking import Ranking, hopeful, select
@@ -51,6 +52,7 @@ from joda.diagnosis.whole_run_search import WholeRuns, in_whole_runs
 from joda.estimation.base_model import BaseModel
 from joda.estimation.nuisance import nuisances_of
 from joda.estimation.problem import segments_for
+from joda.field import evaluate
 from joda.measured.curves import curves_verdict, failing_force
 from joda.measured.errors import MULTIPLE, worst_missed
 from joda.measured.measured_joint import Measured
@@ -275,6 +277,8 @@ def _missing(
     beside = [(ranking.candidates[k], one.probability) for k, one in findings.items()]
     own = numbers_beside(ranking.baseline, beside) if sure else ()
     summary += f" But {confounder}." if confounder else off_beside(own)
+    if _forced(measured) and _same_everywhere(base, candidate):
+        summary += sentences.AN_OFFSET
     told = tuple(findings.values())
     worth = tuple(one for one in told if one.probability >= SETTINGS.naming.worth_naming)
     report = replace(
@@ -517,6 +521,15 @@ def _by_other_numbers(
     return Diagnosed(
         report, corrected=corrected(fitted, own, SETTINGS.corrections.min_off, fitted.fit.x)
     )
+
+
+def _same_everywhere(base: BaseModel, candidate: FittedHypothesis) -> bool:
+    """Whether an effect is a force that is the same all over the range."""
+    s = np.linspace(0.0, 1.0, 101)
+    profiles = candidate.written(base), base.written(candidate.fit.x)
+    with_it, without = (evaluate(one.channels.conservative, s)[0] for one in profiles)
+    force = with_it - without
+    return bool(force[0] and np.allclose(force, force[0]))
 
 
 def _forced(measured: Measured) -> bool:

@@ -44,7 +44,7 @@ USUAL: dict[NuisanceName, float] = {
 """How far off they usually are (one standard deviation): factors relatively, an offset of the force
 in units of its root mean square, a delay in s, a position's zero in ranges, the direction of the
 centre of mass as seen from the hinge in rad: an encoder's zero stands in for it unless told."""
-FULL_SCALE, MAX_OFFSET = 0.04, 0.2
+FULL_SCALE, MAX_OFFSET = 0.05, 0.25
 """How far off an offset of the force usually is, of the largest force, if that is more: of joints
 that go by themselves most of the time; and the most, of the root mean square: an offset that is
 about all that was recorded is a force that was held against."""

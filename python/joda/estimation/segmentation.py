@@ -431,7 +431,7 @@ def _after_pressing(begins: Integers, index: Integers, s: Array, noise: Array) -
         own = beyond[row[row >= 0]]
         if own[:1].any() and not own.all():
             more.append(index[row[np.argmin(own)]])
-    return np.union1d(begins, -(-np.array(more, int) // GRID) * GRID)
+    return _begun_at(begins, index, more)
 
 
 def _where_it_stays(
@@ -451,7 +451,13 @@ def _where_it_stays(
         last = np.minimum(moves, len(own) - 1)
         long = (first > impact) & (index[own[last]] - index[own[np.minimum(first, last)]] >= chunk)
         more.extend(index[own[first[long]]] + chunk // 2)
-    return np.union1d(begins, -(-np.array(more, int) // GRID) * GRID)
+    return _begun_at(begins, index, more)
+
+
+def _begun_at(begins: Integers, index: Integers, more: Sequence[int]) -> Integers:
+    """Where segments begin, also at more steps or just after, while samples follow."""
+    rounded = -(-np.array(more, int) // GRID) * GRID
+    return np.union1d(begins, rounded[rounded <= index[-1]])
 
 
 def _leaves(begins: Integers, index: Integers, s: Array, noise: Array) -> list[slice]:
