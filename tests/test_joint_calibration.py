@@ -98,7 +98,8 @@ def test_numbers_and_effects_are_asked_for_together_where_these_leave_something(
     (tmp_path / "arm.xml").write_text(arm())
     measured = read_measured(tmp_path / "arm.xml", "arm", runs)
     monkeypatch.setattr(verdict.Calibrator, "numbers", lambda *_: numbers)
-    monkeypatch.setattr(verdict, "looked", lambda *_: looks)
-    monkeypatch.setattr(verdict, "_together", lambda *_: ("both", looks) if together else None)
+    monkeypatch.setattr(verdict, "looked", lambda *_, **__: looks)
+    answer = ("both", looks) if together else None
+    monkeypatch.setattr(verdict.WithNumbers, "answer", property(lambda _: answer))
     monkeypatch.setattr(verdict, "_set_right", lambda _, found, *rest: found)
     assert verdict.diagnosed(measured) == (numbers if ends == "numbers" else ends)

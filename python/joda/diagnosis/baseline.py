@@ -13,6 +13,7 @@ from joda.diagnosis.hypothesis_fits import (
     FittedHypothesis,
     InitialPoint,
     coarse,
+    found_before,
     initial_points,
     joined,
     perturbed,
@@ -61,6 +62,7 @@ class Baseline:
         fit: of its factors alone.
         initial_points: from where hypotheses are fitted.
         hypotheses: all of the catalogue.
+        found: where effects were found before; these hypotheses are begun there too.
     """
 
     estimator: SegmentEstimator
@@ -69,6 +71,7 @@ class Baseline:
     fit: Fit
     initial_points: tuple[InitialPoint, ...]
     hypotheses: tuple[Hypothesis, ...]
+    found: tuple[FittedHypothesis, ...] = ()
 
     @cached_property
     def covariance(self) -> Array:
@@ -144,7 +147,10 @@ class Baseline:
     def coarse(self, hypothesis: Hypothesis) -> "CoarseFit":
         """The hypothesis fitted roughly, in longer steps, to segments without impacts."""
         estimator, base = self.estimator.coarser, self.base.coarser()
-        return CoarseFit(hypothesis, coarse(estimator, base, self.initial_points, hypothesis))
+        fits = coarse(estimator, base, self.initial_points, hypothesis)
+        return CoarseFit(
+            hypothesis, (*fits, *found_before(estimator, base, self.found, hypothesis))
+        )
 
     def refined(self, found: "CoarseFit", worth: float = np.inf) -> FittedHypothesis:
         """The same fitted to the end, if that promises less loss than is worth it."""

@@ -17,7 +17,6 @@ from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.findings import Correction
 from joda.diagnosis.hypotheses import Hypothesis
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
-from joda.diagnosis.ranking import Ranking
 from joda.diagnosis.settings import SETTINGS
 from joda.estimation.base_model import BASE_STD, BaseModel
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, SegmentEstimator, excess
@@ -93,6 +92,17 @@ class Calibration:
         return _surely_off(self.names, own, self.errors)
 
     @property
+    def widths(self) -> Array:
+        """How far off they are, of how far off they usually are; shape (k,)."""
+        own = self.fit.x[len(self.fit.x) - len(self.names) :]
+        return np.asarray(np.abs(own) / self.numbers.prior_stds)
+
+    @property
+    def cost(self) -> float:
+        """What they cost, in loss: their price, and how unusual they are."""
+        return self.loss - self.fit.loss + float(self.widths @ self.widths)
+
+    @property
     def alternatives(self) -> list[list[NuisanceName]]:
         """Of each number, the names of those that the data cannot tell from it."""
         return [[name for name, _ in alike] for alike in self.others]
@@ -145,21 +155,6 @@ class Calibration:
 
         return self.loss < min(map(least, candidates), default=baseline.fit.loss)
 
-    def nearly(self, baseline: Baseline, candidates: Sequence[FittedHypothesis]) -> bool:
-        """Whether they explain about as much as the best effect does alone."""
-        least = min((one.fit.loss for one in candidates), default=baseline.fit.loss)
-        most = SETTINGS.corrections.nearly_share * (baseline.fit.loss - least)
-        return self.loss < least + most
-
-    def better_with(self, beside: Ranking, alone: Ranking) -> bool:
-        """Whether with an effect beside these numbers clearly less is left than with one alone."""
-        price = self.loss - self.fit.loss
-
-        def least(ranking: Ranking) -> float:
-            return min((one.fit.loss + one.cost for one in ranking.candidates), default=np.inf)
-
-        return least(beside) + price < least(alone) - SETTINGS.corrections.equal_numbers
-
     def corrections(self, measured: Measured) -> tuple[Correction, ...]:
         """What is off, for the user.
 
@@ -193,15 +188,23 @@ class Calibrator:
             beside: whether effects were looked for too, so that these can be compared; then the
                 model as it is does not suffice, and numbers that are off by little count too.
         """
-        measured, every = self.measured, nuisances_of(self.measured, baseline.base)
-        if not measured.runs or not every.names:
+        search = self._search(baseline)
+        if not self.measured.runs or not search.every.names:
             return None
-        if self._segments is not baseline.estimator:
-            self._segments, self._fits = baseline.estimator, {}
-        found = _calibrated(_Search(measured, baseline, every, self._fits), beside)
+        found = _calibrated(search, beside)
         if found and not beside and all(found.numbers.little(found.fit.x)):
             return None
-        return _longer(measured, found) if found and found.alone else found
+        return _longer(self.measured, found) if found and found.alone else found
+
+    def fitted(self, baseline: Baseline, names: Sequence[NuisanceName]) -> Array:
+        """The model's strengths and the numbers of these names, fitted; shape (k,)."""
+        return self._search(baseline).fitted(tuple(names)).x
+
+    def _search(self, baseline: Baseline) -> "_Search":
+        if self._segments is not baseline.estimator:
+            self._segments, self._fits = baseline.estimator, {}
+        every = nuisances_of(self.measured, baseline.base)
+        return _Search(self.measured, baseline, every, self._fits)
 
 
 def known_as_ratio(names: Collection[NuisanceName], base: BaseModel) -> tuple[NuisanceName, ...]:

@@ -246,6 +246,26 @@ def coarse(
     return tuple(found)
 
 
+def found_before(
+    estimator: SegmentEstimator,
+    base: BaseModel,
+    found: Sequence[FittedHypothesis],
+    hypothesis: Hypothesis,
+) -> list[Fit]:
+    """The hypothesis fitted roughly from where it was found before: beside other numbers of the
+    body and of the measurement, or in other segments."""
+    make, unknowns = joined(base, hypothesis)
+    own = len(base.places)
+    fits = []
+    for one in found:
+        same = one.hypothesis.effect, one.hypothesis.direction, len(one.x)
+        if same == (hypothesis.effect, hypothesis.direction, len(hypothesis.unknowns.low)):
+            strengths = np.append(one.fit.x[:own], base.unknowns.mean[own:])
+            x = np.append(strengths, one.x)
+            fits.append(estimator.fit(make, unknowns, x, estimator.started(make(x)).start, ROUGH))
+    return fits
+
+
 def refined(
     estimator: SegmentEstimator,
     base: BaseModel,

@@ -214,8 +214,6 @@ class CorrectionSettings:
             and what the least needed one seems to spare.
         equal_numbers: up to which data cannot tell one number from another, nor from an
             effect (loss).
-        nearly_share: part of what an effect explains by which numbers may explain less, where it is
-            asked whether another effect beside them explains clearly more.
         max_loss_share: part of the loss that all numbers together leave at most; of what is
             beyond noise, where effects were looked for too.
         calm_excess: what numbers leave that explain all there is; or `calm_share` (per
@@ -241,7 +239,6 @@ class CorrectionSettings:
     number_loss: float = 25.0
     tried_loss: float = 3.0
     equal_numbers: float = 9.0
-    nearly_share: float = 0.05
     max_loss_share: float = 0.5
     calm_excess: float = 0.05
     calm_share: float = 0.02

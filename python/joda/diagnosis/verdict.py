@@ -1,7 +1,8 @@
 """What a model lacks: the verdict on a ranking, with probabilities, sizes and sentences."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from joda.diagnosis.corrections import (
     one_factor,
 )
 from joda.diagnosis.data_sufficiency import at_rest, moved_one_way, too_little, too_noisy
+from joda.diagnosis.effects_with_numbers import Answer, WithNumbers
 from joda.diagnosis.end_stops import OtherEnds, suited, with_other_ends
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import FreeRuns, worst
@@ -32,10 +34,10 @@ from joda.diagnosis.holdout import Holdout
 from joda.diagnosis.horizons import HorizonSearch, looked
 from joda.diagnosis.hypothesis_fits import FittedHypothesis
 from joda.diagnosis.joint_calibration import jointly, needed
-from joda.diagnosis.plausible import Needs, unvisited_interval
-from joda.diagnosis.ranking import Ranking, hopeful, select
+from joda.diagnosis.plausible import unvisited_interval
+from joda.diagnosis.ranking import Ranking, select
 from joda.diagnosis.report import experiment_for, finding, likeliest_findings, reported
-from joda.diagnosis.search import Progress, rank
+from joda.diagnosis.search import Progress
 from joda.diagnosis.selection import Evidence, Selection
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.summary import (
@@ -50,7 +52,6 @@ from joda.diagnosis.summary import (
 from joda.diagnosis.units import units_of
 from joda.diagnosis.whole_run_search import WholeRuns, in_whole_runs
 from joda.estimation.base_model import BaseModel
-from joda.estimation.nuisance import nuisances_of
 from joda.estimation.problem import segments_for
 from joda.field import evaluate
 from joda.measured.curves import curves_verdict, failing_force
@@ -62,6 +63,9 @@ from joda.measured.whiteness import strays
 from joda.profile import Profile
 from joda.scenes.limits import Stops
 from joda.threads import one_blas_thread
+
+Look = Callable[..., HorizonSearch]
+"""`looked`, but for the effects that are not considered, and the progress."""
 
 
 @dataclass(frozen=True)
@@ -111,71 +115,108 @@ def diagnosed(
     if not measured.runs and (why := too_little(measured)):  # nor is their noise known
         return Diagnosed(reported(measured, "insufficient_data", why, (), None))
     baseline = fit_baseline(measured)
+    look = partial(looked, exclude=exclude, progress=progress)
+    if not calibrate:
+        return _told(measured, None, look(measured, baseline=baseline), look)
     calibrator = Calibrator(measured)
-    found = calibrator.numbers(baseline) if calibrate else None
-    repaired: tuple[Calibration, HorizonSearch] | None = None
+    both = WithNumbers(calibrator, baseline, exclude, progress)
+    found = calibrator.numbers(baseline)
     if found and found.alone:
-        plain = looked(found.of(measured), exclude, progress)
-        repaired = found, plain
-    else:
-        plain = looked(measured, exclude, progress, baseline)
-        ranking, beside = plain.first[0], False
-        if calibrate and found is None and plain.selection.verdict != "adequate":
-            ranking, beside = plain.ranking, True
-            found = calibrator.numbers(ranking.baseline, beside)
-        if found and (
-            (beats := found.beats(ranking.baseline, ranking.candidates, clearly=beside))
-            or found.nearly(ranking.baseline, ranking.candidates)
-        ):
-            looks = looked(found.of(measured), exclude, progress)
-            verdicts = looks.selection.verdict, plain.selection.verdict
-            worse = verdicts[0] == "unexplained" != verdicts[1]
-            if (beats and not worse) or found.better_with(looks.first[0], ranking):
-                repaired = found, looks
-    latest = (repaired[1] if repaired else plain).selection.verdict
-    if calibrate and latest == "unexplained":
-        repaired = _together(measured, baseline.base, exclude, progress) or repaired
-    if repaired:
-        return _set_right(measured, *repaired, exclude, progress)
-    out = replace(_concluded(measured, plain), looks=plain.evidence)
-    denied = plain.selection.verdict == "adequate" and out.diagnosis.verdict == "unexplained"
-    if calibrate and denied and (found := calibrator.numbers(plain.ranking.baseline, beside=True)):
-        looks = looked(found.of(measured), exclude, progress)
-        right = _set_right(measured, found, looks, exclude, progress)
-        return right if right.diagnosis.verdict != "unexplained" else out
-    return out
+        answer: Answer = found, look(found.of(measured))
+        unusual = (found.widths > SETTINGS.corrections.unusual).any()
+        if answer[1].selection.verdict == "unexplained" or unusual:
+            answer = _likelier(answer, both.answer)
+        return _told(measured, *answer, look)
+    if both.explain_most and both.answer:
+        return _told(measured, *both.answer, look)
+    plain = look(measured, baseline=baseline)
+    if found is None and plain.selection.verdict == "adequate":
+        return _unless_denied(measured, plain, calibrator, look)
+    answer = _by_numbers(measured, plain, found, calibrator, look)
+    verdict = answer[1].selection.verdict
+    hidden = verdict == "unexplained" or answer[0] or both.help(plain.ranking)
+    if verdict != "adequate" and hidden:
+        answer = _likelier(answer, both.answer)
+    return _told(measured, *answer, look)
 
 
-def _together(
-    measured: Measured, base: BaseModel, exclude: Collection[str], progress: Progress
-) -> tuple[Calibration, HorizonSearch] | None:
-    """Numbers that are off, and an effect that is missing once these are right, where neither alone
-    explains the runs: every effect is asked with all numbers free beside it, then the numbers
-    beside the likeliest, then all effects with these set right. None if none is then likelier than
-    not."""
-    every = nuisances_of(measured, base)
-    widths = {str(name): std for name, std in zip(every.names, every.prior_stds, strict=True)}
-    if "mass" in widths:  # then all is told in units of the force as it was recorded
-        widths.pop("force_scale", None)
-    if not (measured.runs and widths):
-        return None
-    free = replace(measured, loose=widths)
-    ranking = rank(fit_baseline(free), exclude, progress, hopeful, Needs(measured).allow)
-    if not select(ranking).likely:
-        return None
-    other = measured.changed(profile=ranking.candidates[0].written(ranking.baseline.base))
-    if (found := Calibrator(other).numbers(fit_baseline(other))) is None:
-        return None
-    looks = looked(found.of(measured), exclude, progress)
-    return (found, looks) if looks.selection.likely else None
+def _unless_denied(
+    measured: Measured, plain: HorizonSearch, calibrator: Calibrator, look: Look
+) -> Diagnosed:
+    """That the model is adequate by its segments; where whole runs deny it, with numbers that are
+    off, if these are right then."""
+    out = _told(measured, None, plain, look)
+    if out.diagnosis.verdict != "unexplained":
+        return out
+    if not (found := calibrator.numbers(plain.ranking.baseline, beside=True)):
+        return out
+    right = _told(measured, found, look(found.of(measured)), look)
+    return right if right.diagnosis.verdict != "unexplained" else out
+
+
+def _by_numbers(
+    measured: Measured,
+    plain: HorizonSearch,
+    found: Calibration | None,
+    calibrator: Calibrator,
+    look: Look,
+) -> Answer:
+    """Numbers that are off, and what looking says with these, where they explain more than the best
+    effect does; else none, and what it says without.
+
+    Args:
+        measured: the joint as it was given.
+        plain: what looking says without.
+        found: numbers that explain what the model leaves, by themselves; None: they are sought.
+        calibrator: that seeks them.
+        look: at a joint.
+    """
+    ranking, beside = plain.first[0], found is None
+    if beside:
+        ranking = plain.ranking
+        found = calibrator.numbers(ranking.baseline, beside)
+    if found and found.beats(ranking.baseline, ranking.candidates, clearly=beside):
+        looks = look(found.of(measured))
+        if looks.selection.verdict != "unexplained" or plain.selection.verdict == "unexplained":
+            return found, looks
+    return None, plain
+
+
+def _likelier(given: Answer, both: Answer | None) -> Answer:
+    """What is given, or numbers and an effect that were asked together, if these leave clearly
+    less."""
+    if both is None:
+        return given
+    if given[1].selection.verdict == "unexplained":
+        return both
+
+    def left(found: Calibration | None, looks: HorizonSearch) -> float:
+        """Per sample, with the cost of all numbers."""
+        ranking, cost = looks.first[0], found.cost if found else 0.0
+        least = min(one.fit.loss + one.cost for one in ranking.candidates)
+        if looks.selection.verdict == "adequate":
+            least = ranking.baseline.fit.loss
+        return (least + cost) / max(ranking.baseline.estimator.samples, 1.0)
+
+    samples = max(given[1].first[0].baseline.estimator.samples, 1.0)
+    clearly = SETTINGS.corrections.equal_numbers / samples
+    return both if left(*both) < left(*given) - clearly else given
+
+
+def _told(
+    measured: Measured, found: Calibration | None, looks: HorizonSearch, look: Look
+) -> Diagnosed:
+    """What looking at a joint says, with its numbers set right if some are off."""
+    if found:
+        return _set_right(measured, found, looks, look)
+    return replace(_concluded(measured, looks), looks=looks.evidence)
 
 
 def _set_right(
     measured: Measured,
     found: Calibration,
     looks: HorizonSearch,
-    exclude: Collection[str],
-    progress: Progress,
+    look: Look,
 ) -> Diagnosed:
     """What looking at a joint and runs says whose numbers were set right, with these.
 
@@ -194,10 +235,9 @@ def _set_right(
                 break
             left = left.only(left.sure) if left.sure else None
         if left is None:
-            plain = looked(measured, exclude, progress)
-            return replace(_concluded(measured, plain), looks=plain.evidence)
+            return _told(measured, None, look(measured), look)
         found = left
-        looks = looked(found.of(measured), exclude, progress)
+        looks = look(found.of(measured))
     others = [one.of(measured) for one in found.drawn()]
     same = not SAME_EFFECT.keys().isdisjoint(found.names)
     out = replace(_concluded(found.of(measured), looks, others, same), looks=looks.evidence)
