@@ -13,7 +13,6 @@ import numpy as np
 
 from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.calibration import Calibration, Calibrator, covariance
-from joda.diagnosis.horizons import HorizonSearch, looked
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
 from joda.diagnosis.plausible import Needs
 from joda.diagnosis.ranking import Ranking, hopeful, select
@@ -38,10 +37,6 @@ PARTS: tuple[NuisanceName, ...] = ("force_scale", "inertia", "gravity")
 the same."""
 OFFSET: NuisanceName = "force_offset"
 Names = tuple[NuisanceName, ...]
-
-
-Answer = tuple[Calibration | None, HorizonSearch]
-"""Numbers that are off, None where none is, and what looking says once these are right."""
 
 
 class WithNumbers:
@@ -99,9 +94,10 @@ class WithNumbers:
         free = without.freed(self.every.names)
         return bool(free.fit.loss < best.fit.loss - SETTINGS.corrections.number_loss)
 
-    @cached_property
-    def answer(self) -> Answer | None:
-        """What is missing once numbers are right; None if no effect is then likelier than not.
+    def likeliest(self) -> tuple[Calibration | None, Baseline] | None:
+        """The numbers that are off beside the likeliest effect, None where none is, and the model
+        with these set right, whose hypotheses begin where effects were found; None if no effect is
+        likelier than not.
 
         Where the force has an offset that is unusual, or beside a force over position, such forces
         are asked once more without: one over a part of the range is an offset and its opposite over
@@ -122,9 +118,7 @@ class WithNumbers:
             return None
         found = best.calibration(self.measured)
         right = found.of(self.measured) if found else self.measured
-        begun = replace(fit_baseline(right), found=best.ranking.candidates)
-        looks = looked(right, self.exclude, self.progress, begun)
-        return (found, looks) if looks.selection.likely else None
+        return found, replace(fit_baseline(right), found=best.ranking.candidates)
 
     def _asked(self, free: Baseline, exclude: Collection[str]) -> "_Beside | None":
         """The effect with which the numbers that it needs leave least, by their price."""

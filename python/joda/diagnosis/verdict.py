@@ -26,7 +26,7 @@ from joda.diagnosis.corrections import (
     one_factor,
 )
 from joda.diagnosis.data_sufficiency import at_rest, moved_one_way, too_little, too_noisy
-from joda.diagnosis.effects_with_numbers import Answer, WithNumbers
+from joda.diagnosis.effects_with_numbers import WithNumbers
 from joda.diagnosis.end_stops import OtherEnds, suited, with_other_ends
 from joda.diagnosis.findings import Diagnosis, Finding, Verdict
 from joda.diagnosis.free_runs import FreeRuns, worst
@@ -66,6 +66,8 @@ from joda.threads import one_blas_thread
 
 Look = Callable[..., HorizonSearch]
 """`looked`, but for the effects that are not considered, and the progress."""
+Answer = tuple[Calibration | None, HorizonSearch]
+"""Numbers that are off, None where none is, and what looking says once these are right."""
 
 
 @dataclass(frozen=True)
@@ -125,19 +127,30 @@ def diagnosed(
         answer: Answer = found, look(found.of(measured))
         unusual = (found.widths > SETTINGS.corrections.unusual).any()
         if answer[1].selection.verdict == "unexplained" or unusual:
-            answer = _likelier(answer, both.answer)
+            answer = _likelier(answer, _asked_with(both, look))
         return _told(measured, *answer, look)
-    if both.explain_most and both.answer:
-        return _told(measured, *both.answer, look)
+    most = both.explain_most
+    if most and (asked := _asked_with(both, look)):
+        return _told(measured, *asked, look)
     plain = look(measured, baseline=baseline)
     if found is None and plain.selection.verdict == "adequate":
         return _unless_denied(measured, plain, calibrator, look)
     answer = _by_numbers(measured, plain, found, calibrator, look)
     verdict = answer[1].selection.verdict
     hidden = verdict == "unexplained" or answer[0] or both.help(plain.ranking)
-    if verdict != "adequate" and hidden:
-        answer = _likelier(answer, both.answer)
+    if verdict != "adequate" and hidden and not most:
+        answer = _likelier(answer, _asked_with(both, look))
     return _told(measured, *answer, look)
+
+
+def _asked_with(both: WithNumbers, look: Look) -> Answer | None:
+    """What looking says once numbers are right that are off beside the likeliest effect; None if no
+    effect is then likelier than not."""
+    if (there := both.likeliest()) is None:
+        return None
+    found, begun = there
+    looks = look(found.of(both.measured) if found else both.measured, baseline=begun)
+    return (found, looks) if looks.selection.likely else None
 
 
 def _unless_denied(
