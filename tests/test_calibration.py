@@ -176,6 +176,31 @@ def test_an_offset_of_a_tenth_of_the_strongest_push_is_one():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "effect"),
+    [
+        (1759789885, "gravity_offset"),
+        (1573506733, "spring_loaded_snap_detent_to_high_end"),
+        (1200207190, "spring_return_to_high_end"),
+        (616137927, "constant_negative_conservative_hinge"),
+    ],
+)
+def test_an_effect_is_found_with_all_numbers_free_beside_it(seed, effect):
+    """What was said without: a mechanism with two stable sides, in place of a tilt and an offset;
+    nothing that explains all, of a latch; no effect but four numbers, of a spring and a mass; a
+    force over the rest of the range and an offset, of one over its part."""
+    case = draw(seed, effect, family="field")
+    found = diagnosed(read(case)[0]).diagnosis
+    wrong = case.seal.get("wrong", {})
+    told = {one.parameter: one for one in found.corrections}
+    assert found.effects[0].effect == effect and found.effects[0].probability > 0.8
+    if "mass" in wrong or "force_scale" in wrong:
+        heavier = wrong.get("mass", 1.0) / wrong.get("force_scale", 1.0)
+        assert abs(told["mass"].factor - heavier) < 3 * told["mass"].error
+    assert ("force_offset" in told) == (seed == 1759789885)
+
+
+@pytest.mark.slow
 def test_a_constant_force_may_be_an_offset_also_where_it_is_too_strong_for_most(tmp_path, rng):
     measured, _ = found_of(tmp_path, rng, offset=float(rng.choice([-1, 1]) * 0.6))
     said = diagnosed(measured).diagnosis

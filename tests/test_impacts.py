@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from hidden_cases import read
 
 from joda.diagnosis.baseline import RESTITUTION, fit_baseline
 from joda.diagnosis.impacts import IMPACT_SAMPLES, mean_of, speed_ratios
 from joda.diagnosis.verdict import diagnosed
+from joda.hidden import draw
 from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
 from joda.measured.runs import Run
@@ -177,3 +179,14 @@ def test_no_end_is_bouncier_than_one_that_gives_nearly_all_back(tmp_path):
     ends = [one for one in baseline.hypotheses if one.effect == RESTITUTION]
     assert len(ends) == 3
     assert baseline.restitution(ends) == []
+
+
+@pytest.mark.slow
+def test_a_bouncy_end_is_told_whatever_its_stiffness(seed=1112655636):
+    """Of a stop far softer than the model's, beside a mass of 0.59 of the model's."""
+    case = draw(seed, RESTITUTION, family="field")
+    found = diagnosed(read(case)[0]).diagnosis
+    (first,) = found.effects[:1]
+    assert (found.verdict, first.effect) == ("missing_effect", RESTITUTION)
+    assert abs(first.magnitude - case.seal["magnitude"]) < 2 * first.magnitude_error
+    assert first.held_out_error_after < 0.5 * first.held_out_error_before

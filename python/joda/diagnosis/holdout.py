@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from joda.diagnosis.baseline import RESTITUTION, Baseline
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.diagnosis.impacts import Rebound, ends_of
 from joda.diagnosis.settings import SETTINGS
 from joda.diagnosis.split import held_segments
 from joda.estimation.estimator import CAUCHY_SCALE, Fit, Make, SegmentEstimator
@@ -56,15 +57,17 @@ class Holdout:
         """RMS misfit of the segments held out, rad or m, without the effect and with it; robust, so
         that no single one decides, in which the joint goes over a barrier or just not.
 
-        Of the restitution of the ends, all segments with impacts tell; no other is fitted to them.
+        Of the restitution of the ends, all impacts there tell, with the stiffness of a stop that
+        suits them best; no other number is fitted to them.
         """
-        base, segments = self.baseline.base, self.baseline.estimator.segments
+        base = self.baseline.base
         make, unknowns = joined(base, found.hypothesis)
         if found.hypothesis.effect == RESTITUTION:
-            impacts = segments.impacts & (segments.count > 0)
-            without = _misfit(segments, base.simulator, self.baseline.fit, impacts)
-            with_it = _misfit(segments, make, found.fit, impacts)
-            return robust_rms(without, self.floor), robust_rms(with_it, self.floor)
+            rebounds, ends = self.baseline.rebounds, ends_of(found.hypothesis)
+            impacts = Rebound.together([rebounds[side] for side in ends if side in rebounds])
+            losses = np.array([impacts.own, impacts.losses.min()])
+            before, with_it = _rms_of(losses / max(impacts.samples, 1.0), self.floor)
+            return float(before), float(with_it)
         after = self._error(make, unknowns, found.fit, self.folds)
         if self.crosses or abs(after - self.before) > SETTINGS.naming.held_out_alike * self.before:
             return self.before, after
@@ -108,7 +111,12 @@ def robust_rms(missed: Sequence[Array], noise: float) -> float:
     scale = np.sqrt(CAUCHY_SCALE) * noise
     logs = [np.log1p((rms(one) / scale) ** 2) for one in missed]
     mean = np.average(logs, weights=[len(one) for one in missed])
-    return float(scale * np.sqrt(np.expm1(mean)))
+    return float(_rms_of(CAUCHY_SCALE * mean, noise))
+
+
+def _rms_of(loss: Array, noise: float) -> Array:
+    """The same of a Cauchy loss per sample, or several."""
+    return np.asarray(noise * np.sqrt(CAUCHY_SCALE * np.expm1(loss / CAUCHY_SCALE)))
 
 
 def _misfit(segments: Segments, make: Make, fit: Fit, counts: NDArray[np.bool_]) -> list[Array]:
