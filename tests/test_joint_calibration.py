@@ -92,7 +92,7 @@ def test_what_is_left_is_fitted_beside_the_effect(found, names):
 def test_numbers_and_effects_are_asked_for_together_where_these_leave_something(
     tmp_path, monkeypatch, left, together, ends
 ):
-    numbers = SimpleNamespace(alone=True, of=lambda measured: measured, widths=np.ones(1))
+    numbers = SimpleNamespace(alone=True, of=lambda measured: measured, unusual=False)
     looks = SimpleNamespace(selection=SimpleNamespace(verdict=left))
     runs = logged(tmp_path, np.random.default_rng(0))
     (tmp_path / "arm.xml").write_text(arm())

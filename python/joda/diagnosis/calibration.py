@@ -92,15 +92,20 @@ class Calibration:
         return _surely_off(self.names, own, self.errors)
 
     @property
-    def widths(self) -> Array:
-        """How far off they are, of how far off they usually are; shape (k,)."""
-        own = self.fit.x[len(self.fit.x) - len(self.names) :]
-        return np.asarray(np.abs(own) / self.numbers.prior_stds)
+    def unusual(self) -> bool:
+        """Whether one of them is further off than usually."""
+        return bool((np.abs(self._widths) > SETTINGS.corrections.unusual).any())
 
     @property
     def cost(self) -> float:
         """What they cost, in loss: their price, and how unusual they are."""
-        return self.loss - self.fit.loss + float(self.widths @ self.widths)
+        return self.loss - self.fit.loss + float(self._widths @ self._widths)
+
+    @property
+    def _widths(self) -> Array:
+        """How far off they are, of how far off they usually are; shape (k,)."""
+        own = self.fit.x[len(self.fit.x) - len(self.names) :]
+        return np.asarray(own / self.numbers.prior_stds)
 
     @property
     def alternatives(self) -> list[list[NuisanceName]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from joda.diagnosis.baseline import Baseline, fit_baseline
 from joda.diagnosis.calibration import Calibration, Calibrator, covariance
-from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined
+from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined, scored
 from joda.diagnosis.plausible import Needs
 from joda.diagnosis.ranking import Ranking, hopeful, select
 from joda.diagnosis.search import Progress, rank
@@ -36,6 +36,11 @@ PARTS: tuple[NuisanceName, ...] = ("force_scale", "inertia", "gravity")
 """Numbers that are not asked beside a mass: `added_inertia` and `gravity_offset` are the effects of
 the same."""
 OFFSET: NuisanceName = "force_offset"
+CONSTANT = "constant_positive_conservative_hinge", "constant_negative_conservative_hinge"
+"""Constant forces in either direction."""
+AT_END, WIDEST_EDGE = 0.05, 0.45
+"""How far from an end of the range an interval may end that reaches it; the most of an interval
+that an edge of it may be."""
 Names = tuple[NuisanceName, ...]
 
 
@@ -113,7 +118,9 @@ class WithNumbers:
             free = self._freed(usual)
             others = {one.effect for one in free.hypotheses if not one.like_a_number}
             other = self._asked(free, {*self.exclude, *others})
-            best = min(filter(None, (best, other)), key=lambda one: one.loss, default=None)
+            opposite = _opposites(best) if best and OFFSET in best.names else []
+            there = [one for one in (best, other, *opposite) if one]
+            best = min(there, key=lambda one: one.loss, default=None)
         if best is None:
             return None
         found = best.calibration(self.measured)
@@ -236,3 +243,26 @@ def _needed(ranking: Ranking, effect: FittedHypothesis) -> _Beside:
             break
         best = least
     return best
+
+
+def _opposites(best: _Beside) -> list[_Beside]:
+    """Constant forces over the rest of the range in place of one over a part and an offset."""
+    effect = best.effect
+    if effect.hypothesis.effect not in CONSTANT or not effect.hypothesis.ends:
+        return []
+    strength, edge, a, b = effect.x
+    slope = edge * (b - a)  # one rises where the other falls
+    rest = (b - slope, 1.0) if a < AT_END else (0.0, a + slope) if b > 1 - AT_END else None
+    if rest is None:
+        return []
+    edge = min(slope / (rest[1] - rest[0]), WIDEST_EDGE)
+    fit = replace(best.fit, x=np.append(best.fit.x[:-4], [strength, edge, *rest]))
+    names = tuple(name for name in best.names if name != OFFSET)
+    out = []
+    for hypothesis in best.ranking.baseline.hypotheses:
+        others = hypothesis.effect in CONSTANT and hypothesis.effect != effect.hypothesis.effect
+        if others and len(hypothesis.unknowns.low) == len(effect.x):
+            other = replace(best, effect=replace(effect, hypothesis=hypothesis), fit=fit)
+            other = other.freed(names)
+            out.append(replace(other, effect=scored(best.estimator, hypothesis, other.fit)))
+    return out

@@ -125,8 +125,7 @@ def diagnosed(
     found = calibrator.numbers(baseline)
     if found and found.alone:
         answer: Answer = found, look(found.of(measured))
-        unusual = (found.widths > SETTINGS.corrections.unusual).any()
-        if answer[1].selection.verdict == "unexplained" or unusual:
+        if answer[1].selection.verdict == "unexplained" or found.unusual:
             answer = _likelier(answer, _asked_with(both, look))
         return _told(measured, *answer, look)
     most = both.explain_most
