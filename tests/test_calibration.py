@@ -14,7 +14,7 @@ from joda.diagnosis.calibration import Calibrator
 from joda.diagnosis.correction_report import correction_of
 from joda.diagnosis.hypothesis_fits import in_place_of_a_factor
 from joda.diagnosis.verdict import diagnosed
-from joda.estimation.nuisance import nuisances_of
+from joda.estimation.nuisance import USUAL, nuisances_of
 from joda.hidden import draw
 from joda.measured.reading import read_measured
 from joda.measured.run_files import write_run
@@ -206,6 +206,15 @@ def test_a_constant_force_may_be_an_offset_also_where_it_is_too_strong_for_most(
     said = diagnosed(measured).diagnosis
     assert said.effects[0].effect.startswith("constant_") and said.effects[0].interval == (0, 1)
     assert "An offset of the recorded force would do the same" in said.summary
+
+
+@pytest.mark.slow
+def test_where_only_an_offset_may_be_off_a_force_is_named_or_that(tmp_path, rng):
+    trust = dict.fromkeys(set(USUAL) - {"force_offset"}, 0.0)
+    measured, _ = found_of(tmp_path, rng, trust, offset=0.6)
+    said = diagnosed(measured).diagnosis
+    told = {one.parameter for one in said.corrections} | {one.effect for one in said.effects}
+    assert told & {"force_offset", "constant_positive_conservative_hinge", "gravity_offset"}
 
 
 @pytest.mark.parametrize(

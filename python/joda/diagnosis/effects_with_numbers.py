@@ -114,18 +114,24 @@ class WithNumbers:
         if self._offset_unusual or (
             best and OFFSET in best.names and best.effect.hypothesis.like_a_number
         ):
-            usual = self.every.only([name for name in self.every.names if name != OFFSET])
-            free = self._freed(usual)
-            others = {one.effect for one in free.hypotheses if not one.like_a_number}
-            other = self._asked(free, {*self.exclude, *others})
             opposite = _opposites(best) if best and OFFSET in best.names else []
-            there = [one for one in (best, other, *opposite) if one]
+            there = [one for one in (best, self._without_offset, *opposite) if one]
             best = min(there, key=lambda one: one.loss, default=None)
         if best is None:
             return None
         found = best.calibration(self.measured)
         right = found.of(self.measured) if found else self.measured
         return found, replace(fit_baseline(right), found=best.ranking.candidates)
+
+    @property
+    def _without_offset(self) -> "_Beside | None":
+        """The likeliest force over position where the force has no offset."""
+        usual = self.every.only([name for name in self.every.names if name != OFFSET])
+        if not usual.names:
+            return None
+        free = self._freed(usual)
+        others = {one.effect for one in free.hypotheses if not one.like_a_number}
+        return self._asked(free, {*self.exclude, *others})
 
     def _asked(self, free: Baseline, exclude: Collection[str]) -> "_Beside | None":
         """The effect with which the numbers that it needs leave least, by their price."""

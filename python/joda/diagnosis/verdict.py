@@ -205,7 +205,7 @@ def _likelier(given: Answer, both: Answer | None) -> Answer:
     def left(found: Calibration | None, looks: HorizonSearch) -> float:
         """Per sample, with the cost of all numbers."""
         ranking, cost = looks.first[0], found.cost if found else 0.0
-        least = min(one.fit.loss + one.cost for one in ranking.candidates)
+        least = min((one.fit.loss + one.cost for one in ranking.candidates), default=np.inf)
         if looks.selection.verdict == "adequate":
             least = ranking.baseline.fit.loss
         return (least + cost) / max(ranking.baseline.estimator.samples, 1.0)
