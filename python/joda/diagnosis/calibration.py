@@ -88,8 +88,7 @@ class Calibration:
     @property
     def sure(self) -> tuple[NuisanceName, ...]:
         """Those that are off by several of their errors."""
-        own = self.fit.x[len(self.fit.x) - len(self.names) :]
-        return _surely_off(self.names, own, self.errors)
+        return _surely_off(self.names, self._own, self.errors)
 
     @property
     def unusual(self) -> bool:
@@ -104,8 +103,12 @@ class Calibration:
     @property
     def _widths(self) -> Array:
         """How far off they are, of how far off they usually are; shape (k,)."""
-        own = self.fit.x[len(self.fit.x) - len(self.names) :]
-        return np.asarray(own / self.numbers.prior_stds)
+        return np.asarray(self._own / self.numbers.prior_stds)
+
+    @property
+    def _own(self) -> Array:
+        """They, as they are fitted; shape (k,)."""
+        return self.fit.x[len(self.fit.x) - len(self.names) :]
 
     @property
     def alternatives(self) -> list[list[NuisanceName]]:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from joda.diagnosis.baseline import Baseline, fit_baseline
-from joda.diagnosis.calibration import Calibration, Calibrator, covariance
+from joda.diagnosis.calibration import ALSO_AN_EFFECT, Calibration, Calibrator, covariance
 from joda.diagnosis.hypothesis_fits import FittedHypothesis, joined, scored
 from joda.diagnosis.plausible import Needs
 from joda.diagnosis.ranking import Ranking, hopeful, select
@@ -35,7 +35,6 @@ NEAR = 3
 PARTS: tuple[NuisanceName, ...] = ("force_scale", "inertia", "gravity")
 """Numbers that are not asked beside a mass: `added_inertia` and `gravity_offset` are the effects of
 the same."""
-OFFSET: NuisanceName = "force_offset"
 CONSTANT = "constant_positive_conservative_hinge", "constant_negative_conservative_hinge"
 """Constant forces in either direction."""
 AT_END, WIDEST_EDGE = 0.05, 0.45
@@ -76,7 +75,7 @@ class WithNumbers:
         """Whether with all numbers free the force's offset is further off than usually."""
         x = self.baseline.fit.x[self.without.base.count :]
         own = dict(zip(self.every.names, x / self.every.prior_stds, strict=True))
-        return bool(abs(own.get(OFFSET, 0.0)) > SETTINGS.corrections.unusual)
+        return bool(abs(own.get(ALSO_AN_EFFECT, 0.0)) > SETTINGS.corrections.unusual)
 
     def _freed(self, numbers: Nuisances) -> Baseline:
         own = zip(numbers.names, numbers.prior_stds, strict=True)
@@ -112,9 +111,9 @@ class WithNumbers:
             return None
         best = self._asked(self.baseline, self.exclude)
         if self._offset_unusual or (
-            best and OFFSET in best.names and best.effect.hypothesis.like_a_number
+            best and ALSO_AN_EFFECT in best.names and best.effect.hypothesis.like_a_number
         ):
-            opposite = _opposites(best) if best and OFFSET in best.names else []
+            opposite = _opposites(best) if best and ALSO_AN_EFFECT in best.names else []
             there = [one for one in (best, self._without_offset, *opposite) if one]
             best = min(there, key=lambda one: one.loss, default=None)
         if best is None:
@@ -126,7 +125,7 @@ class WithNumbers:
     @property
     def _without_offset(self) -> "_Beside | None":
         """The likeliest force over position where the force has no offset."""
-        usual = self.every.only([name for name in self.every.names if name != OFFSET])
+        usual = self.every.only([name for name in self.every.names if name != ALSO_AN_EFFECT])
         if not usual.names:
             return None
         free = self._freed(usual)
@@ -217,7 +216,7 @@ class _Beside:
         others = []
         for name in self.names:
             alike = []
-            for other in set(self.every.names) - set(self.names):
+            for other in (one for one in self.every.names if one not in self.names):
                 tried = self.with_and_without(other, name)
                 if tried.fit.loss < self.fit.loss + SETTINGS.corrections.equal_numbers:
                     value = self.every.only(tried.names).values(tried.fit.x)[other]
@@ -233,7 +232,7 @@ class _Beside:
             self.effect.hypothesis,
         )
         numbers = replace(self.fit, x=self.fit.x[: base.count + len(self.names)])
-        loss = self.fit.loss + self.price * len(self.names)
+        loss = self.loss - self.effect.cost
         return Calibration(own, numbers, errors, loss, False, tuple(others))
 
 
@@ -263,7 +262,7 @@ def _opposites(best: _Beside) -> list[_Beside]:
         return []
     edge = min(slope / (rest[1] - rest[0]), WIDEST_EDGE)
     fit = replace(best.fit, x=np.append(best.fit.x[:-4], [strength, edge, *rest]))
-    names = tuple(name for name in best.names if name != OFFSET)
+    names = tuple(name for name in best.names if name != ALSO_AN_EFFECT)
     out = []
     for hypothesis in best.ranking.baseline.hypotheses:
         others = hypothesis.effect in CONSTANT and hypothesis.effect != effect.hypothesis.effect

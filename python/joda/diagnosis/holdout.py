@@ -60,14 +60,13 @@ class Holdout:
         Of the restitution of the ends, all impacts there tell, with the stiffness of a stop that
         suits them best; no other number is fitted to them.
         """
-        base = self.baseline.base
-        make, unknowns = joined(base, found.hypothesis)
         if found.hypothesis.effect == RESTITUTION:
             rebounds, ends = self.baseline.rebounds, ends_of(found.hypothesis)
             impacts = Rebound.together([rebounds[side] for side in ends if side in rebounds])
             losses = np.array([impacts.own, impacts.losses.min()])
             before, with_it = _rms_of(losses / max(impacts.samples, 1.0), self.floor)
             return float(before), float(with_it)
+        make, unknowns = joined(self.baseline.base, found.hypothesis)
         after = self._error(make, unknowns, found.fit, self.folds)
         if self.crosses or abs(after - self.before) > SETTINGS.naming.held_out_alike * self.before:
             return self.before, after

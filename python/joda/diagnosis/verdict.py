@@ -136,8 +136,8 @@ def diagnosed(
         return _unless_denied(measured, plain, calibrator, look)
     answer = _by_numbers(measured, plain, found, calibrator, look)
     verdict = answer[1].selection.verdict
-    hidden = verdict == "unexplained" or answer[0] or both.help(plain.ranking)
-    if verdict != "adequate" and hidden and not most:
+    asks = verdict != "adequate" and not most
+    if asks and (verdict == "unexplained" or answer[0] or both.help(plain.ranking)):
         answer = _likelier(answer, _asked_with(both, look))
     return _told(measured, *answer, look)
 
